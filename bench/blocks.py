@@ -96,7 +96,7 @@ def interleaved(
     """
     taken: dict[str, list[Sample]] = {name: [] for name in variants}
     for measure in variants.values():
-        measure()  # the first time pays for memory
+        measure()  # warm-up: the first run allocates memory
     for _ in range(limit):
         for _ in range(blocks):
             for name in random.sample(list(variants), len(variants)):

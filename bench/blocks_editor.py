@@ -202,7 +202,7 @@ def measured(bench: Bench, rounds: int) -> dict[str, tuple[float, float, float]]
             load = bench.load_s(workspace)
             drops = [bench.drop_ms(there) for there in (True, False)]
             taken[name].append((load, max(each[0] for each in drops), max(each[1] for each in drops)))
-    return {name: _middle(each[1:]) for name, each in taken.items()}  # the first time pays for memory
+    return {name: _middle(each[1:]) for name, each in taken.items()}  # without the warm-up (allocations)
 
 
 def _middle(rows: list[tuple[float, float, float]]) -> tuple[float, float, float]:

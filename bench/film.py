@@ -27,7 +27,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL_MS = 200.0
-QUIET = 1.5  # load in the minute before a film; above, the computer had other work
+QUIET = 1.5  # 1-minute load average; above it, other programs kept the computer busy
 TIME_S = 900.0
 
 

@@ -72,7 +72,7 @@ def why_no_networks() -> str:
 def joined(wifi: Wifi) -> Iterator[Link]:
     """Context manager of the link, for a process in its own network namespace. Raises `LinkError`."""
     with ExitStack() as stack:
-        # The other network lives as long as a process in it, which ends with its standard input.
+        # The other namespace exists while a process runs in it; `cat` ends with its standard input.
         holder = subprocess.Popen(["unshare", "-n", "cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         stack.callback(holder.wait)
         assert holder.stdin is not None
@@ -81,7 +81,7 @@ def joined(wifi: Wifi) -> Iterator[Link]:
         stack.callback(holder.stdin.close)
         holder.stdin.write(b"up\n")
         holder.stdin.flush()
-        holder.stdout.readline()  # so it has entered its network
+        holder.stdout.readline()  # `cat` replies only after `unshare` has entered the namespace
         link = Link("netem", ("nsenter", "-n", "-t", str(holder.pid), "--"))
         why_no_netem = by_netem(wifi, holder.pid, link)
         if why_no_netem:
@@ -136,7 +136,7 @@ def by_process(wifi: Wifi, other_pid: int, link: Link) -> Iterator[None]:
             link.told = json.loads(last) if last.startswith("{") else {}
 
 
-# ---- the process that is the link -----------------------------------------------------------------
+# ---- link process ---------------------------------------------------------------------------------
 
 
 def tun(name: str) -> int:
@@ -182,7 +182,7 @@ class Way:
             try:
                 os.write(self._target, packet)
             except OSError:
-                self.dropped += 1  # that end is not up
+                self.dropped += 1  # the interface at that end is down
         return self._waiting[0][0] if self._waiting else now + 1.0
 
 
@@ -195,7 +195,7 @@ def main() -> int:
         print(f"there is no TUN device: {error.strerror}", flush=True)
         return 1
     ways = {own: Way(wifi, own, other), other: Way(wifi, other, own)}
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program that started this
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is handled by the parent process
     print("up", flush=True)
     end = sys.stdin.fileno()
     while True:

@@ -111,7 +111,7 @@ class Hub:
         self._data = bytes(SIZE)
         self._subs = {n: node.new_sub(f"in_{n}", "bytes", max_messages=ROOM) for n in ends}
         self._pubs = {n: node.new_pub(f"out_{n}", "bytes") for n in ends}
-        self._plain_pubs = {n: context.socket(zmq.XPUB) for n in ends}  # a PUB that tells who has come
+        self._plain_pubs = {n: context.socket(zmq.XPUB) for n in ends}  # XPUB reports subscriptions
         self._plain_subs = {n: context.socket(zmq.SUB) for n in ends}
         for n in ends:
             self._plain_pubs[n].setsockopt(zmq.SNDHWM, 0)
@@ -213,7 +213,7 @@ def measure(
         for name, cell in random.sample(variants, len(variants)):
             if block:
                 taken[name, cell].append(cost(hub, children, cell))
-            elif cell.pace == "burst":  # the first time pays for memory
+            elif cell.pace == "burst":  # warm-up: the first run allocates memory
                 cost(hub, children, cell)
         longest_s = max(longest_s, time.monotonic() - started)
         if block and time.monotonic() + longest_s > ends_at:

@@ -145,13 +145,13 @@ def measure(size: int, count: int, blocks: int, *, is_picture: bool) -> tuple[di
             heard(child, "plain", lambda: bool(plain.poll(50)))
             while plain.poll(200):
                 plain.recv()
-            for _ in range(10):  # until the publisher knows that memory is shared
+            for _ in range(10):  # until the publisher uses shared memory
                 heard(child, "nep", lambda: sub.listen(timeout_s=0.1)[0])
             if is_picture:
                 variants["nep, loan"] = partial(bursts.take, "loan", partial(listen, sub))
             else:
                 heard(child, "zenoh", lambda: not came.empty())
-                while True:  # until those that were asked for have come
+                while True:  # until all requested messages have arrived
                     try:
                         came.get(timeout=0.2)
                     except queue.Empty:

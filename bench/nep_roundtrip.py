@@ -173,7 +173,7 @@ def main() -> int:
     arguments = parser.parse_args()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain = Plain(context, "tcp://127.0.0.1:*")
-    # Where there is no such name: TCP once more.
+    # Platforms without Unix sockets use a second TCP socket.
     local = Plain(context, f"ipc://@nep-bench-{os.getpid()}" if has_unix_sockets() else "tcp://127.0.0.1:*")
     with (
         nep.master("127.0.0.1:0", learn_s=0.0) as master,

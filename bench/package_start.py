@@ -73,7 +73,7 @@ def surroundings() -> Iterator[dict[str, str]]:
         )
         probe.close()
         if hasattr(os, "geteuid") and os.geteuid() == 0:
-            environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
+            environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium's sandbox doesn't work as root
         yield environ
 
 
@@ -132,7 +132,7 @@ def main() -> int:
         "source again": source,
     }
     for command in kinds.values():
-        once(command, cold=False)  # compiles what is not compiled yet
+        once(command, cold=False)  # warm-up: fills the bytecode cache
     starts: dict[str, list[Start]] = {name: [] for name in kinds}
     for _ in range(given.times):
         for name, command in kinds.items():

@@ -110,7 +110,7 @@ def measure(arguments: argparse.Namespace, scenario: str, places: Places) -> dic
             for name, kind, size in random.sample(cells, len(cells)):
                 row = PLAIN if name == AGAIN else name
                 if blocks and time.monotonic() > ends_at:
-                    break  # the first block is always whole
+                    break  # the first block is always complete
                 if row not in pairs or kind not in pairs[row].kinds:
                     continue
                 try:
@@ -296,7 +296,7 @@ def asked() -> argparse.Namespace:
 def main() -> int:
     """Measure, save and print the result; return 1 if a run does not count or a goal is missed."""
     arguments = asked()
-    signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(143))  # so that all that runs is ended
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(143))  # to end all child processes
     if arguments.inside:
         inside(arguments)
         return 0

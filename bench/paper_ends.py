@@ -445,9 +445,9 @@ def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Run one end of a row; return 1 if it can't run."""
     role, row, host, place = arguments
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program that started this
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is handled by the parent process
     own = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # what a library prints must not be taken for an answer
+    os.dup2(2, 1)  # keeps output of libraries out of the replies
 
     def answer(said: dict[str, object]) -> None:
         own.write(json.dumps(said) + "\n")
@@ -456,7 +456,7 @@ def main(arguments: Sequence[str]) -> int:
         end = ENDS[row][role == "pong"](role, host, place)
         with end.closes:
             run(end, answer)
-            # A library may want to tell somebody that it goes, who is not there any more.
+            # A library may block on exit while it notifies a peer that has already ended.
             threading.Timer(LEAVE_S, os._exit, [0]).start()
     except Exception as error:  # noqa: BLE001 - whatever it is, the other rows go on
         answer({"not run": str(error) or type(error).__name__})
@@ -465,7 +465,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    # The threads of some libraries do not end; all that has to be closed was.
+    # Threads of some libraries never end; everything else has been closed.
     code = main(sys.argv[1:])
     sys.stderr.flush()
     os._exit(code)

@@ -110,7 +110,7 @@ def goals(found: Found) -> list[Goal]:
     for what, kind, (least, most), goal in asked:
         sizes = [size for size in local.sizes(kind) if least <= size <= most]
         if not {least, most} <= set(sizes):
-            continue  # a part of them says nothing of the mean
+            continue  # the mean of a part of the sizes isn't comparable
         ratio = local.mean_ratio(NEP, PLAIN, kind, sizes)
         again = local.mean_ratio(AGAIN, PLAIN, kind, sizes)
         if ratio is not None and again is not None:
@@ -128,7 +128,7 @@ def does_count(found: Found) -> bool:
     return bool(means) and all(mean is not None and is_trusted(mean) for mean in means)
 
 
-# ---- words ----------------------------------------------------------------------------------------
+# ---- text -----------------------------------------------------------------------------------------
 
 
 def size_text(size: int) -> str:
@@ -257,7 +257,7 @@ def write(found: Found, docs: Path) -> list[Path]:
     return [document, figures, *draw(found, docs / "images")]
 
 
-# ---- pictures -------------------------------------------------------------------------------------
+# ---- figures --------------------------------------------------------------------------------------
 
 
 def draw(found: Found, folder: Path) -> list[Path]:

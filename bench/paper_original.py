@@ -98,7 +98,7 @@ def why_missing(python2: str) -> str:
     try:
         done = subprocess.run(
             [python2, "-E", "-c", asked],
-            cwd=tempfile.gettempdir(),  # in the folder of our sources it would find our nep
+            cwd=tempfile.gettempdir(),  # outside the repository, which contains our nep package
             capture_output=True,
             text=True,
             check=False,

@@ -80,7 +80,7 @@ class Places:
             here = f"local/paper-{os.getpid()}"
             return here, here
         endpoints = {"endpoints": [f"tcp/{self.hosts[0]}:{free_port(self.hosts[0])}"]}
-        # As it comes zenoh drops what the link does not take within 50 ms: here 1 MB needs 170.
+        # By default, zenoh drops fragments after waiting 50 ms; here 1 MB takes 170 ms.
         drop = {"max_wait_before_drop_fragments": 5_000_000}
         link = {"link": {"tx": {"queue": {"congestion_control": {"drop": drop}}}}}
         files = []
@@ -101,7 +101,7 @@ class Places:
             return (sys.executable, str(HERE / "paper_ends.py"), role, row)
         path = self.folder / "paper_original_end.py"
         path.write_text(ORIGINAL_END, encoding="utf-8")
-        return (self.python2, "-E", str(path), role, row)  # without PYTHONPATH, which leads to our nep
+        return (self.python2, "-E", str(path), role, row)  # -E ignores PYTHONPATH, which leads to our nep
 
 
 class Process:

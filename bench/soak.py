@@ -102,7 +102,7 @@ def take(began: float, opened: Studio) -> Sample:
         try:
             sizes[other.pid] = private_mb(other)
         except psutil.Error:
-            continue  # it has just ended
+            continue  # the process has just exited
     return Sample(
         round(time.monotonic() - began, 1),
         round(private_mb(own), 1),
@@ -156,7 +156,7 @@ def soak(opened: Studio, seconds: float) -> list[Sample]:
     next_step = next_sample = began
     while (now := time.monotonic()) < began + seconds:
         if now >= next_step:
-            # at first everything is opened once, so that it is there when the judging begins
+            # warm-up: open every panel once before the samples that are judged
             next_step = now + (HURRY_S if now < began + FIRST_S else STEP_S)
             next(doing)()
         if now >= next_sample:
@@ -210,7 +210,7 @@ def judge(samples: Sequence[Sample]) -> bool:
     lasting = set(warm[0].sizes).intersection(*(sample.sizes for sample in warm))
     for name in ("studio_mb", "others_mb", "handles", "threads"):
         values = [float(getattr(sample, name)) for sample in warm]
-        if name == "others_mb":  # without the programs, which come and go
+        if name == "others_mb":  # only processes that ran throughout the measurement
             values = [sum(sample.sizes[pid] for pid in lasting) for sample in warm]
         if name.endswith("mb"):
             risen, may = rise(warm, values), max(RISE_MB, RISE_SHARE * values[0])

@@ -99,7 +99,7 @@ def one_round(
         watching.send(robot.name, id=ids[-1], op="invoke", action=action, input=dict(given))
     if not watching.wait(ids, ["running"], MOVE_S):
         raise SystemExit(f"round {number}: the robots did not begin to move")
-    threading.Event().wait(0.15)  # they have got up some speed
+    threading.Event().wait(0.15)  # lets the robots gain speed
     for robot in robots:
         watching.send(robot.name, id="", op="alive")
     echoed = _timed(lambda: _echo(number, robots, watching))

@@ -65,7 +65,7 @@ def driver_seconds() -> float:
         name = Path(f"/proc/self/task/{thread.id}/comm")
         try:
             is_driver = name.read_text(encoding="utf-8", errors="replace").startswith(DRIVER)
-        except OSError:  # not on Linux, or it has ended
+        except OSError:  # not on Linux, or the thread has ended
             continue
         if is_driver:
             total += thread.user_time + thread.system_time

@@ -74,7 +74,7 @@ class Load:
             flush=True,
         )
         if plain is None or name.startswith("plain"):
-            self.bare_ms = max(self.bare_ms, bare_ms)  # with the load the computer is busy anyway
+            self.bare_ms = max(self.bare_ms, bare_ms)  # a load keeps the computer busy anyway
         return row
 
     def counted(self) -> tuple[int, int, int]:
@@ -86,7 +86,7 @@ class Load:
     def is_exact(self) -> bool:
         """Wait for the last messages; return True if every sent message is kept or counted."""
         for publisher in self.publishers:
-            publisher.tell("30 1.0")  # by what comes behind a burst one knows what was lost of it
+            publisher.tell("30 1.0")  # losses of a burst are detected by the messages after it
         sent = sum(int(publisher.answer().split()[0]) for publisher in self.publishers)
         before = (-1, -1, -1)
         while self.counted() != before:

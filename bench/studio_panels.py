@@ -120,7 +120,7 @@ def measure(paints: Paints, dock: Dock, seconds: float) -> Cost:
         (driver_seconds() - driver) / took,
         paints.count / took,
     )
-    del dock.refresh  # the class's own again
+    del dock.refresh  # restores the method of the class
     return cost
 
 
@@ -170,7 +170,7 @@ def main() -> int:
         bare.answer()
         sender = stack.enter_context(child(SENDER, (), address))
         sender.answer()
-        opened = stack.enter_context(studio(address, "behaviour"))  # with the editor, the driver composes
+        opened = stack.enter_context(studio(address, "behaviour"))  # the editor makes the driver composite
         opened.session.launcher.start_virtual_robot(ROBOT)
         until(lambda: opened.session.fleet.connected, "the virtual robot is there", 60.0)
         until(lambda: CAMERA in opened.session.topics, "the topics are listed")

@@ -109,7 +109,7 @@ def environ_with(compiled: str) -> dict[str, str]:
     environ = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     environ.update(PYTHONPATH=str(ROOT), PYTHONPYCACHEPREFIX=compiled)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
-        environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
+        environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium's sandbox doesn't work as root
     return environ
 
 
@@ -156,7 +156,7 @@ def imports() -> None:
     """List the modules that take longest to import by themselves."""
     command = [sys.executable, "-X", "importtime", "-c", "import app.ui.application"]
     with tempfile.TemporaryDirectory(prefix="nep-pyc-") as compiled:
-        for _ in range(2):  # the first time compiles
+        for _ in range(2):  # the first run fills the bytecode cache
             done = subprocess.run(
                 command, cwd=ROOT, capture_output=True, text=True, check=True, env=environ_with(compiled)
             )
@@ -181,7 +181,7 @@ def main() -> int:
         return 0
     taken: dict[str, list[Stages]] = {name: [] for name in ("plain", "plain again", "window", "editor")}
     with tempfile.TemporaryDirectory(prefix="nep-pyc-") as compiled:
-        once(compiled, STUDIO, "editor")  # the first start compiles, and reads everything from the disk
+        once(compiled, STUDIO, "editor")  # the first start fills the bytecode cache and the disk cache
         for _ in range(arguments.times):
             for name, starts in taken.items():
                 plain = name.startswith("plain")

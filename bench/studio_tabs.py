@@ -34,7 +34,7 @@ from bench.studio_window import Studio, network, run_for, studio, until
 
 GOAL_MS = 100.0
 LARGE_GOAL_MS = 250.0
-MARGIN_MS = 25.0  # a median of the same twice may differ by that much and still be trusted
+MARGIN_MS = 25.0  # accepted difference between two medians of the same case
 SIZES = {"2 blocks": 2, "30 blocks": 30, "300 blocks": 300, "30 blocks again": 30}
 WATCH = """(() => {
   const now = () => performance.timeOrigin + performance.now();
@@ -146,7 +146,7 @@ def main() -> int:
         for _ in range(asked.rounds + 1):
             for name in SIZES:
                 pair = bench.pairs[name.removesuffix(" again")]
-                bench.switch(pair[0])  # from one of another size
+                bench.switch(pair[0])  # not measured: switches from a tab of another size
                 taken[name].append(bench.switch(pair[1]))
                 taken[name].append(bench.switch(pair[0]))
     for name, each in taken.items():

@@ -45,7 +45,7 @@ def graph(topics: int, update: int) -> GraphView:
             bandwidth_Bps=90 * rate,
             last_stamp_ns=1,
         )
-    return GraphView(1, 1 + topics, nodes, found)  # nobody comes or goes: only figures change
+    return GraphView(1, 1 + topics, nodes, found)  # nodes and topics stay the same; only figures change
 
 
 def fed(opened: Studio, meter: Meter, topics: int, seconds: float) -> Row:
@@ -90,7 +90,7 @@ def main() -> int:
         bare.answer()
         opened = stack.enter_context(studio(address))
         until(lambda: opened.session.master.kind == "connected", "the master is there")
-        opened.session.source.close()  # it would tell of an empty network in between
+        opened.session.source.close()  # its empty graphs would mix with the posted graphs
         opened.session._clock_ns = lambda: time_ns() % 100_000_000  # noqa: SLF001
         meter = Meter(opened)
         print(

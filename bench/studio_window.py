@@ -60,8 +60,8 @@ class Studio:
 def network() -> Iterator[str]:
     """Start a master in its own process, as Studio does, and the QApplication; yield the master's address."""
     if hasattr(os, "geteuid") and os.geteuid() == 0:
-        os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
-    os.environ["NEP_GATEWAY"] = "0"  # its ports exist once on a computer
+        os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium's sandbox doesn't work as root
+    os.environ["NEP_GATEWAY"] = "0"  # the gateway's ports can be open only once per computer
     qt_log.install_handlers()
     make_application()
     with socket.socket() as probe:
@@ -74,7 +74,7 @@ def network() -> Iterator[str]:
         application = QCoreApplication.instance()
         assert application is not None
         QTimer.singleShot(0, application.quit)
-        application.exec()  # tells pages of the web engine that the end is near
+        application.exec()  # emits aboutToQuit, so that web engine pages close
         master.kill()
         master.wait()
 

@@ -94,7 +94,7 @@ class Heard:
         with self.recording() as found:
             cause()
             until(effect, what, 40)
-            run_for(0.2)  # what follows at the next ticks
+            run_for(0.2)  # includes the functions of the next ticks
         return sorted(_named(code) for code in found - idle if not code.co_name.startswith("<"))
 
 
@@ -171,7 +171,7 @@ def edit(heard: Heard, studio: Studio) -> list[str]:
     bench = object.__new__(Bench)
     bench.view = view  # type: ignore[assignment]
     bench.ask(f"(() => {{ {WATCH} return 0 }})()")
-    journals = Path(os.environ["NEP_STUDIO_HOME"])  # settings are there, too: they do not have its blocks
+    journals = Path(os.environ["NEP_STUDIO_HOME"])  # also contains settings, but those have no blocks
 
     def written() -> dict[Path, bytes]:
         kept = {path: path.read_bytes() for path in journals.glob("*.json")}

@@ -22,20 +22,20 @@ from tests import leftovers, long_groups
 from tests.nep.programs import GREETINGS_S
 from tests.scheduler import FileScheduling
 
-gc.disable()  # until all tests are read: what is made meanwhile stays
+gc.disable()  # during collection: its objects stay alive, so scanning them is wasted time
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
+    # Shells start background jobs with SIGINT ignored, and child processes inherit this.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# Python from 3.12 on warns who forks with threads; that it goes well is what tests of forks are about.
+# Python 3.12 and later warn about forks in processes with threads; the fork tests cover this.
 os.environ["PYTHONWARNINGS"] = "ignore:This process:DeprecationWarning"
-# However busy the computer is: a value may take long to make, and an example to run.
+# No deadline: on a busy computer, generating a value or running an example may be slow.
 hypothesis.settings.register_profile(
     "nep", hypothesis.settings(), deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("nep")
-pytest.register_assert_rewrite("tests.robots.message_senders")  # a contract: others hold to it
-os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
+pytest.register_assert_rewrite("tests.robots.message_senders")  # shared contract tests
+os.environ["NEP_LANG"] = "en"  # tests compare English texts, whatever the system language
 _GRACE_S = 20.0
 _GRACE_AFTER_LEAK_S = 1.0
 _PAST_TIMEOUT_S = 60.0
@@ -56,7 +56,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     told = "the same for a driver program in any language, by its command (docs/write-a-driver.md)"
     parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=told)
     if importlib.util.find_spec("pytestqt") is None:
-        # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.
+        # Without pytest-qt (dev.py versions), its options must still be accepted; they have no effect.
         for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):
             parser.addini(name, "an option of pytest-qt, which is not here", type="linelist")
 
@@ -173,7 +173,7 @@ def _crashes_are_told(pytestconfig: pytest.Config) -> Iterator[None]:
     Without it, a worker that crashes would leave no message.
     """
     yield
-    told_to = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest keeps it from its capturing
+    told_to = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest's copy of the real stderr
     if told_to is not None:
         faulthandler.enable(told_to)
 

@@ -66,7 +66,7 @@ def descriptors() -> dict[int, str]:
         try:
             found[int(name)] = os.readlink(f"{_FD}/{name}")  # noqa: PTH115 - see above
         except OSError:
-            continue  # the descriptor of this very look, or one that was closed meanwhile
+            continue  # the descriptor of `listdir` itself, or one closed meanwhile
     return found
 
 
@@ -78,7 +78,7 @@ def _connections() -> list[Any]:
     for _ in range(_TRIES):
         try:
             return psutil.Process().net_connections(kind="inet")
-        except RuntimeError:  # psutil has no other word for it
+        except RuntimeError:  # the only exception that psutil raises for this
             continue
     return psutil.Process().net_connections(kind="inet")
 
@@ -143,11 +143,11 @@ class Allowances:
         if unnamed and _has_page():
             unnamed = set()
         elif unnamed or _named(before):
-            gc.collect()  # what only a cycle holds is closed now
+            gc.collect()  # closes descriptors held only by reference cycles
         _wait(lambda: not _named(before), deadline)
         if unnamed:
             _wait(lambda: not _unnamed(before), min(deadline, time.monotonic() + _CLOSED_SOON_S))
-            # What may not stay has all the time that there is: a busy computer closes late.
+            # Kinds without remaining allowance get the full deadline: a busy computer closes late.
             _wait(lambda: all(self._left[kind] > 0 for kind in _unnamed(before)), deadline)
             for kind in (unnamed := _unnamed(before)):
                 self._left[kind] -= 1
@@ -178,7 +178,7 @@ def _pooled_threads() -> int:
     """Return the number of threads in Qt's pools; 0 on systems without /proc."""
     found = 0
     for name in Path("/proc/self/task").glob("*/comm"):
-        with suppress(OSError):  # it has just ended
+        with suppress(OSError):  # the thread has just ended
             found += name.read_text().strip() == POOLED
     return found
 

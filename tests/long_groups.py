@@ -50,7 +50,7 @@ class Group(NamedTuple):
 
 GROUPS = (
     Group(
-        "films",  # every run has the film of test_path_mouse.py
+        "films",  # every run includes the film of test_path_mouse.py
         tests=(
             "tests/e2e/test_teacher_mouse.py",
             "tests/e2e/test_teacher_keyboard.py",
@@ -59,7 +59,7 @@ GROUPS = (
         sources=("tests/e2e/film.py", "tests/e2e/fingers.py", "tests/e2e/teacher_session.py"),
     ),
     Group(
-        "ROS 2",  # every run has the contract of back ends over Cyclone DDS: test_ros2.py[test_contract.py-]
+        "ROS 2",  # every run includes the contract over Cyclone DDS: test_ros2.py[test_contract.py-]
         tests=("tests/nep/backends/test_ros2.py::[ros2_", "tests/nep/bridges/test_ros2_bridge.py"),
         sources=(
             "nep/backends/ros2/",
@@ -76,7 +76,7 @@ GROUPS = (
         ),
     ),
     Group(
-        "interop",  # every run has tests/interop/gateway and the programs of test_javascript.py
+        "interop",  # every run includes tests/interop/gateway and the programs of test_javascript.py
         tests=(
             "tests/interop/test_matrix.py",
             "tests/interop/test_pictures.py",
@@ -108,7 +108,7 @@ GROUPS = (
         ),
     ),
     Group(
-        "high DPI",  # every run has tests/ui/theme/test_text_sizes.py
+        "high DPI",  # every run includes tests/ui/theme/test_text_sizes.py
         tests=("tests/ui/theme/test_high_dpi.py",),
         sources=(
             "app/ui/shell/",
@@ -153,7 +153,7 @@ def _base(root: Path) -> str | None:
     parent = _git(root, "rev-parse", "--verify", "--quiet", "HEAD^")
     if not parent:
         return None
-    # From the parent: the commit of a release is itself compared with the release before it.
+    # Start at the parent: the commit of a release is compared with the previous release.
     if tag := _git(root, "describe", "--tags", "--abbrev=0", "--match=v[0-9]*", parent):
         return tag
     head = _git(root, "rev-parse", "HEAD")

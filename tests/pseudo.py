@@ -159,7 +159,7 @@ def _texts_of_items(widget: QWidget) -> Iterable[tuple[str, str]]:
         for index in range(widget.count()):
             yield "itemText", widget.itemText(index)
     if isinstance(widget, QAbstractItemView) and (model := widget.model()) is not None:
-        columns = 0 if isinstance(model, QAbstractListModel) else model.columnCount()  # a list has no heads
+        columns = 0 if isinstance(model, QAbstractListModel) else model.columnCount()  # no headers in lists
         for column in range(columns):
             for role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
                 head = model.headerData(column, Qt.Orientation.Horizontal, role)

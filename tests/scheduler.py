@@ -68,11 +68,11 @@ class FileScheduling(LoadScopeScheduling):
         super()._assign_work_unit(node)
 
     def _reschedule(self, node: WorkerController) -> None:
-        # A worker starts a test only when it knows the next one, so it needs more than files of one test.
+        # A worker starts a test only when it knows the next one: a file with one test isn't enough.
         while not node.shutting_down and self._pending_of(self.assigned_work[node]) <= 2:
             if self.workqueue and not any(self._may_take(node, scope) for scope in self.workqueue):
                 node.shutdown()
-            super()._reschedule(node)  # assigns a file, or shuts the worker down when none is left
+            super()._reschedule(node)  # assigns a file, or shuts the worker down if none is left
 
     def remove_node(self, node: WorkerController) -> str | None:
         """Reassign the unfinished files of a crashed worker, except the test that crashed it."""

@@ -23,7 +23,7 @@ from packaging.requirements import Requirement
 from packaging.version import Version
 
 ROOT = Path(__file__).parents[1]
-# Downwards: a module may import from its own line and from those below it.
+# From top to bottom: a module may import from its own line and the lines below.
 LAYERS = (
     ("app.__main__",),
     ("app.ui", "app.run"),
@@ -156,11 +156,11 @@ def test_qt_is_imported_only_in_app_ui() -> None:
 
 
 def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
-    # Entries choose what to load: `python -m app run` must not load Qt, `nep --help` not all of nep.
+    # Entry points choose what to load: `python -m app run` must not load Qt, `nep --help` not all of nep.
     entries = {"app.__main__", "nep.__main__", "nep.cli"}
-    # Our view is Qt WebEngine, a subclass of it by the line: a fifth of a second that only the editor pays.
-    # A plot is a subclass of pyqtgraph's view, which takes as long; only who opens one pays.
-    # Nodes of ROS need XML-RPC, which takes 20 ms to load, and no other node does.
+    # The view subclasses Qt WebEngine, which takes 0.2 s to load and is used only by the editor.
+    # A plot subclasses pyqtgraph's view, which takes as long and is used only by open plot panels.
+    # ROS nodes need XML-RPC, which takes 20 ms to load; other nodes don't.
     heavy_of_ours = {
         "app.ui.blockly.view",
         "app.ui.blockly.view.BlocklyView",
@@ -351,7 +351,7 @@ def pinned() -> dict[str, list[Requirement]]:
 
 
 def test_studio_requirements_are_a_subset_of_the_dev_requirements() -> None:
-    # Where a package is wanted, for which the extra dev may have one reason more, is told behind a semicolon.
+    # Ignores environment markers, which may be wider in the extra dev.
     studio, dev = (
         set(re.sub(r" ;.*", "", (ROOT / "requirements" / f"{extra}.txt").read_text("utf-8")).split("\n"))
         for extra in ("studio", "dev")

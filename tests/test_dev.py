@@ -305,7 +305,7 @@ def test_ctrl_c_ends_child_processes_that_ignore_the_signal(handler: str) -> Non
         assert process.stdout.readline() == b"up\n"
         os.killpg(process.pid, signal.SIGINT)
         assert process.wait(30) == 130
-        # The pipe ends only when the last process that holds it has gone.
+        # The pipe reaches its end only after the last process that holds it has exited.
         assert process.stdout.read() == b""
 
 

@@ -26,7 +26,7 @@ from nep.version import __version__
 from tools.computer import venv_python
 from tools.versions import PROMISED
 
-# Two builds and an installation, also on a busy computer.
+# time for two builds and an installation on a busy computer
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 ROOT = Path(__file__).parents[1]
 EDITOR = "app/blocks/editor/"
@@ -107,7 +107,7 @@ def test_wheel_contains_exactly_the_expected_files(built: Built) -> None:
     expected |= {f"app/_{name}" for name in built.sources if name.startswith("resources/")}
     words = [PurePosixPath(name).parent for name in read_by_people if name.endswith(".po")]
     assert PurePosixPath("nep/locale/es/LC_MESSAGES") in words
-    for folder in words:  # and not the pseudo-language, which is for who works on the sources
+    for folder in words:  # excludes the pseudo-language, which is for developers only
         expected |= {f"{folder}/nep-studio.mo", f"{folder}/editor.json"}
     assert built.in_wheel() == {*expected, "nep/locale/languages.json"}
 
@@ -135,7 +135,7 @@ def test_distribution_metadata_matches_the_version_licence_and_supported_pythons
 
 
 def test_long_description_renders_without_links_to_local_files(built: Built) -> None:
-    # PyPI's own renderer; `twine check` without it lets any Markdown pass.
+    # The renderer of PyPI; without it, `twine check` accepts any Markdown.
     pytest.importorskip("comrak", reason="readme-renderer[md] has no wheels for this system")
     from readme_renderer.markdown import render
 

@@ -149,7 +149,7 @@ def test_writing_replaces_only_the_measured_scenarios(figures: ModuleType, tmp_p
     remote = kept["scenarios"][0] | {"name": "remote", "taken": "2026-11-20"}
     kept["scenarios"] = [remote, kept["scenarios"][0] | {"blocks": 99}]
     (tmp_path / "figures.json").write_text(json.dumps(kept), encoding="utf-8")
-    # In a process of its own: matplotlib keeps its fonts open.
+    # In a separate process, because matplotlib keeps its font files open.
     command = [sys.executable, "-c", WRITE, json.dumps(found()), str(tmp_path)]
     subprocess.run(command, cwd=BENCH, check=True)
     text = document.read_text(encoding="utf-8")
@@ -211,8 +211,8 @@ def test_link_applies_its_delay_and_rate_limit(figures: ModuleType) -> None:
     assert not done.returncode, done.stderr
     (small_s, large_s), came, made_by, told = json.loads(done.stdout)
     assert came == [True, True]
-    assert small_s >= 0.040  # 20 ms there and back
-    assert large_s >= 0.040 + 200_000 * 8 / 8e6  # both ways overlap, so one of them at least
+    assert small_s >= 0.040  # 20 ms in each direction
+    assert large_s >= 0.040 + 200_000 * 8 / 8e6  # the directions overlap, so at least one transfer time
     assert made_by == "netem" or told["packets"] > 200_000 / 1500
 
 
@@ -267,7 +267,7 @@ def test_both_scenarios_are_measured_and_missing_rows_are_reported(
         assert all(0 < each["median_ms"] <= each["p95_ms"] for each in cells.values())
         assert "no server" in scenarios[name]["not_run"]["rosbridge"]
         assert "--python2" in scenarios[name]["not_run"]["nep 0.5.3.5"]
-    if "remote" in scenarios:  # ours is delayed, so the way there and back takes 10 ms
+    if "remote" in scenarios:  # our link delays by 10 ms per round trip
         assert all(each["median_ms"] >= 10.0 for each in scenarios["remote"]["cells"])
     else:
         assert "TUN" in kept["not_run"]["remote"]

@@ -14,12 +14,12 @@ ROOT = Path(__file__).parents[1]
 HOMES = ("nep", "app", "tests", "tools", "bench", "docs", "examples", "installers")
 FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.toml")
 ELSEWHERE = frozenset({
-    "app/_resources/",  # where a wheel has them
+    "app/_resources/",  # path inside a wheel
     "nep/locale/pt_BR/LC_MESSAGES/nep-studio.po",  # example of a new language
-    "nep/Json",  # types of messages
+    "nep/Json",  # message types
     "nep/Msgpack",
     "nep/log",
-    "tools/nothing.py",  # a test says that it is not there
+    "tools/nothing.py",  # a missing file, used by a test
 })  # fmt: skip
 
 _PATH = re.compile(rf"(?<![\w/.~-])(?:{'|'.join(HOMES)}|resources)/[\w./-]*\.(?:py|ts|mjs|md|sh|css|json)\b")
@@ -101,7 +101,7 @@ def _words() -> frozenset[str]:
 def _quoted() -> Iterator[tuple[str, str]]:
     """Yield the file and the text of each quotation in backticks."""
     for place, text in _texts().items():
-        if not place.endswith((".ts", ".mjs")):  # there they quote texts
+        if not place.endswith((".ts", ".mjs")):  # backticks are template strings there
             for quoted in _QUOTED.findall(text):
                 yield place, quoted.removesuffix("()")
 

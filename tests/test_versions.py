@@ -173,7 +173,7 @@ def test_failed_environment_is_recreated_and_failed_tests_are_reported(
     with pytest.raises(Trouble, match="could not be made"):
         versions(Pythons(here(), fails="--require-hashes").computer(), [], tmp_path, tmp_path)
     for left in tmp_path.iterdir():
-        left.rmdir()  # what venv --clear does
+        left.rmdir()  # like venv --clear
     capsys.readouterr()
     assert versions(Pythons(here(), fails="pytest").computer(), [], tmp_path, tmp_path) == 1
     assert f"Python {HERE}  FAILED: tests" in capsys.readouterr().err

@@ -331,7 +331,7 @@ def test_every_marked_text_is_in_the_template(words) -> None:
     assert [each for each in marked() if each not in found] == []
 
 
-# The editor's bundle asks for these, and nobody sees or hears what they say.
+# Blockly messages requested by the editor's bundle but never shown or announced.
 UNSEEN = {
     "SHORTCUTS_": "names for a list of keys that is not in the bundle: ours is F1",
     "ARIA_LABEL_TRASH": "our bin says it",
@@ -340,7 +340,7 @@ UNSEEN = {
     "ZOOM_": "our buttons say it",
 }
 BLOCKLY_WORDS = Path(__file__).resolve().parents[1] / "app/blocks/editor/src/blockly_words.ts"
-# Keys are called so in Spanish, too.
+# Names of keys that are the same in Spanish.
 ALIKE = frozenset(
     {"ALT_KEY", "CONTEXT_MENU_KEY", "DELETE_KEY", "END_KEY", "ESCAPE", "HOME_KEY", "INSERT_KEY"}
     | {"BACKSPACE_KEY", "CAPS_LOCK_KEY", "PAGE_DOWN_KEY", "PAGE_UP_KEY", "PAUSE_KEY", "TAB_KEY"}

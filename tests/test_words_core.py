@@ -280,7 +280,7 @@ def test_errors_of_invalid_descriptions_are_translated() -> None:
     ):
         problems = validate(wrong)
         assert problems
-        told = [re.sub(r"'[^']*'", "", problem) for problem in problems]  # names stand in quotes
+        told = [re.sub(r"'[^']*'", "", problem) for problem in problems]  # quoted names aren't translated
         said(*told, data=("title", "actions", "ref", "rb:safeStop", "rb:profile", "safeStop"))
 
 
@@ -335,7 +335,7 @@ def test_errors_of_invalid_requests_and_replies_are_translated() -> None:
         said(request.reason, data=("xx", "Leave", "node_id", "str", "int", "list"))
     no_request = decode_request(b"").request
     assert isinstance(no_request, nep_errors.WireError)
-    assert no_request.reason.startswith("[")  # what follows is said by msgpack
+    assert no_request.reason.startswith("[")  # the rest is a message of msgpack
     with pytest.raises(nep_errors.WireError) as caught:
         decode_reply(packb({"is": "xx"}))
     said(caught.value.reason, data=("xx",))

@@ -46,7 +46,7 @@ def checked(*arguments: str | Path, given: str | None = None) -> subprocess.Comp
 
 
 def test_workflow_linter_finds_no_problems() -> None:
-    # A date alone must let no test fail: docs/release.md has who makes a release look for retired runners.
+    # Runners retired at a date must not fail a test; docs/release.md lists the check for a release.
     done = checked("--ignore", "GitHub retired it", *sorted(FOLDER.glob("*.yml")))
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)
 
@@ -97,7 +97,7 @@ def test_nightly_job_runs_all_tests() -> None:
     assert nightly["steps"][-1]["run"] == "python dev.py test -- --long"
 
 
-# ---- the steps, run here --------------------------------------------------------------------------
+# ---- workflow steps, run locally ------------------------------------------------------------------
 
 
 def run(folder: Path, script: str, environ: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
@@ -207,7 +207,7 @@ def test_tag_that_differs_from_the_version_stops_the_release(place: Path) -> Non
     assert (jobs["try"]["needs"], jobs["draft"]["needs"]) == ("package", ["library", "clients", "try"])
 
 
-# ---- the trial of each package, with stand-ins for what only its system has ------------------------
+# ---- trial of each package, with stand-ins for programs of its system ------------------------------
 
 STUDIO = """#!/usr/bin/env bash
 [ "$1" = --selftest ] && mkdir -p "$2" && echo '{"ok": true}' > "$2/report.json" && echo "$0" >> {said}

@@ -33,7 +33,7 @@ def test_start_page_examples_are_complete():
     ]
 
 
-# what the words of a card or note claim, and the blocks of which the example must then have one
+# Words in a title or note, and the block types of which the example must use at least one.
 CLAIMS = {
     r"\bwav(e|es|ing)\b": {"robot_pepper_do_wave"},
     r"\bface\b": {"robot_pepper_get_sees_face"},
@@ -176,7 +176,7 @@ def actions(link: FakeLink) -> list[str]:
 
 def test_quiz_example_counts_correct_answers():
     link = FakeLink()
-    link.sensors[("Pepper", "head_touched")] = True  # always yes
+    link.sensors[("Pepper", "head_touched")] = True  # always true
     play, link = run(3, link)
     play.end()
     assert play.runtime.error is None

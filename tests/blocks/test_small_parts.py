@@ -118,7 +118,7 @@ def test_event_block_keeps_newest_events_and_counts_dropped_ones():
     lone = ScriptTrigger("x", max_waiting=1)
     lone.enqueue(())
     lone.enqueue(())
-    assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss
+    assert lone.dropped == 0  # a queue of one replaces the waiting event, which isn't counted as a drop
 
 
 def test_threshold_fires_only_when_crossed():

@@ -17,8 +17,8 @@ class WireRobot:
     def __init__(self, master: str, name: str = "Pepper") -> None:
         self.described: Robot = robot(name)
         self.commands: list[Mapping[str, object]] = []
-        self.silent: set[str] = set()  # operations that it does not answer
-        self.slow: set[str] = set()  # actions that it accepts and does not end
+        self.silent: set[str] = set()  # operations that get no reply
+        self.slow: set[str] = set()  # actions that are accepted but never end
         self.refuses: dict[str, str] = {}
         self.changed = threading.Condition()
         self._node = nep.node(name, master=master)

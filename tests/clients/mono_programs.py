@@ -49,7 +49,7 @@ def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
     with (BUILD / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not target.exists() or any(each.stat().st_mtime > target.stat().st_mtime for each in needed):
-            made = BUILD / "new" / name  # mcs names the assembly after the file
+            made = BUILD / "new" / name  # mcs names the assembly after its file
             made.parent.mkdir(exist_ok=True)
             done = subprocess.run(
                 [*COMPILE, *options, f"-out:{made}", *map(str, files)],

@@ -165,7 +165,7 @@ def test_direct_connections_and_the_client_of_version_0_0_0_5_work_without_a_mas
             direct.say("again")
 
             def heard_by_csharp() -> bool:
-                publisher.send_string("into nothing")  # has the filter as a prefix and is another topic
+                publisher.send_string("into nothing")  # another topic that starts with the subscribed name
                 publisher.send_string('in {"a":"b c"}')
                 return not direct.is_silent()
 
@@ -227,7 +227,7 @@ def test_burst_to_csharp_and_large_messages_from_csharp_arrive_and_excess_counts
     adapter.ask("publish", pub=pub, text=text, count=20)
     assert all(listen(subscriber) == text for _ in range(20))
     assert subscriber.lost == 0
-    adapter.ask("publish", pub=pub, text=text, count=50)  # more than the limit in flight to one subscriber
+    adapter.ask("publish", pub=pub, text=text, count=50)  # exceeds the in-flight limit of a subscriber
     deadline, received = time.monotonic() + LONG_S, 0
     while received + subscriber.lost < 50 and time.monotonic() < deadline:
         received += subscriber.listen(timeout_s=0.1)[0]
@@ -493,7 +493,7 @@ def test_public_calls_behave_as_documented(master: Master) -> None:
 )
 def test_conformance_tester_finds_no_broken_rule() -> None:
     adapter = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
-    chosen = [word for rule in RULES for word in ("--rule", rule)]  # all of them take half a minute
+    chosen = [word for rule in RULES for word in ("--rule", rule)]  # all rules together take half a minute
     done = subprocess.run(
         [Path(sys.executable).parent / "nep", "wire", "check", *chosen, "--", "mono", adapter],
         capture_output=True,

@@ -262,7 +262,7 @@ class ForeignServer:
             try:
                 connection = self._server.accept()[0]
             except OSError:
-                return  # it was shut down
+                return  # the server socket was shut down
             self.accepted.append(connection)
             with suppress(OSError):
                 connection.sendall(self._answer)
@@ -290,7 +290,7 @@ class ForeignSocket:
         self._socket.bind(f"tcp://127.0.0.1:{port}")
 
     def close(self) -> None:
-        self._context.destroy(linger=0)  # which waits until the port is free
+        self._context.destroy(linger=0)  # blocks until the port is free
 
 
 def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignServer | ForeignSocket]]]:
@@ -340,7 +340,7 @@ def test_client_names_foreign_programs_and_later_connects_to_the_real_master(
     for said, start in foreign_programs(own):
         with closing(start(port)) as foreign:
             eventually(lambda said=said: client.ask("problem").startswith(f"problem {said}"))
-            if isinstance(foreign, ForeignServer):  # libzmq doesn't tell
+            if isinstance(foreign, ForeignServer):  # libzmq doesn't report accepted connections
                 eventually(lambda accepted=foreign.accepted: len(accepted) > 2)
     with context.socket(real) as found:
         found.bind(endpoint)
@@ -376,7 +376,7 @@ def test_silent_peer_is_disconnected_and_responsive_peer_stays_connected(context
             connection.sendall(GREETING + READY.replace(b"\x19", b"\x1c").replace(b"\x03SUB", b"\x06DEALER"))
             assert [left.line(), left.line()] == ["connected", "disconnected"]
         assert kept.line() == "connected"
-        assert kept.ask("refused") == "refused "  # no other line in between
+        assert kept.ask("refused") == "refused "  # no other event was reported in between
 
 
 def test_mutated_publishers_do_not_stop_the_subscriber(context, stack: ExitStack) -> None:

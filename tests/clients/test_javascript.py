@@ -317,10 +317,10 @@ def test_master_restart_under_traffic_loses_nothing(monkeypatch):
         pub = program.do("publisher", topic="to_py", type="json")["pub"]
         publisher.publish(0)
         program.do("publish", pub=pub, value=0)
-    publisher.publish(1)  # while there is no master
+    publisher.publish(1)  # while no master is running
     program.do("publish", pub=pub, value=1)
     with Master(address, learn_s=0.5):
-        later = own.new_sub("new", "json")  # waits until the nodes are back
+        later = own.new_sub("new", "json")  # blocks until the nodes have joined again
         new = program.do("publisher", topic="new", type="json")
         program.do("publish", pub=new["pub"], value=3)
         assert later.listen(True) == (True, 3)

@@ -32,7 +32,7 @@ def alone(
     if subprocess.run([unshare, "-rn", "true"], check=False, capture_output=True).returncode:
         pytest.skip("this computer does not permit networks of one's own (unshare -rn)")
     first = "ip link set lo up; " if up else ""
-    if silent:  # what goes into such a device is dropped without a word
+    if silent:  # packets sent to this device are dropped silently
         first += "ip link add fire type ifb && ip link set fire up && "
         first += f"ip address add {silent} dev fire || exit 77; "
     done = subprocess.run(

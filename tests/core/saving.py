@@ -53,7 +53,7 @@ def main(path: Path, journals: Path) -> None:
         child = os.fork()
         if child == 0:
             save_for_ever(path, journals, life * 1000, saved)
-        for _ in range(saves):  # a busy computer takes its time
+        for _ in range(saves):  # waits for each save, because a busy computer may be slow
             os.read(reading, 1)
         threading.Event().wait(last_ms / 1000)
         os.kill(child, signal.SIGKILL)

@@ -127,8 +127,8 @@ def at_rest(folder: Path) -> Session:
 def test_complete_alarms_and_their_snooze_are_restored_after_a_restart(tmp_path: Path) -> None:
     first = at_rest(tmp_path)
     kept = first.alarms.create(BELOW)
-    first.alarms.create(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
-    first.alarms.create(AlarmCondition("below", "/distance", "", 1))  # ... or which value
+    first.alarms.create(AlarmCondition("silent", "", for_s=2.0))  # incomplete: no topic
+    first.alarms.create(AlarmCondition("below", "/distance", "", 1))  # ... or no field path
     first.alarms.snooze(kept.id, 4e9)
     first.close()
     assert [rule.id for rule in read_alarms(tmp_path / FILE_NAME).rules] == [kept.id]
@@ -148,7 +148,7 @@ def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkey
     session.alarms.create(BELOW)
     assert all(each.id != "alarms:most" for each in session.alerts.active)
     one_more = session.alarms.create(BELOW)
-    session.alarms.restore()  # its place is taken
+    session.alarms.restore()  # the limit is reached, so nothing is restored
     assert not {one_more.id, first.id} & {rule.id for rule in session.alarms.rules}
     assert any(each.id == "alarms:most" for each in session.alerts.active)
     session.alarms.remove(session.alarms.rules[0].id)

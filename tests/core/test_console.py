@@ -61,7 +61,7 @@ def test_log_records_are_decoded_lazily() -> None:
     assert (told.level, told.origin, told.logger, told.text) == ("warn", "Pepper", "driver", "low")
     assert (told.stamp_s, told.location) == (9.0, "a.py:3")
     assert [line.number for line in console.records] == [1, 2, 3]
-    assert (console.revision, sent.reads) == (3, 1)  # reading is no change, and done once
+    assert (console.revision, sent.reads) == (3, 1)  # parsed once, without changing the revision
 
 
 def test_dropped_records_are_counted() -> None:

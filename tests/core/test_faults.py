@@ -41,7 +41,7 @@ def written(folder: Path) -> str:
     return (folder / "log" / "studio.log").read_text("utf-8")
 
 
-# -- said once -------------------------------------------------------------------------------------
+# -- repeated faults -------------------------------------------------------------------------------
 
 
 def test_repeated_fault_is_logged_at_increasing_intervals_with_its_count(
@@ -49,7 +49,7 @@ def test_repeated_fault_is_logged_at_increasing_intervals_with_its_count(
 ) -> None:
     for number in range(1000):
         try:
-            int(f"x{number}")  # another text each time, raised at the same place
+            int(f"x{number}")  # another message each time, raised at the same line
         except ValueError:
             log.exception("can't read number %d", number)
     text = written(tmp_path)
@@ -71,10 +71,10 @@ def test_repeated_fault_is_logged_once_until_it_is_evicted() -> None:
     assert [said(text) for text in ("one", "other", "one", "other")] == [True, True, False, False]
     assert all(said(f"text {number}") for number in range(2 * faults.MAX_COUNTED_FAULTS))
     assert len(once._counts) == faults.MAX_COUNTED_FAULTS
-    assert said("one")  # so long ago that it is new
+    assert said("one")  # evicted, so it counts as new
 
 
-# -- the file --------------------------------------------------------------------------------------
+# -- log file --------------------------------------------------------------------------------------
 
 
 def test_log_file_is_private_and_rotated(log: logging.Logger, tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_failure_to_create_the_log_folder_is_ignored(tmp_path: Path) -> None:
     assert (tmp_path / "log").read_text("utf-8") == "a file"
 
 
-# -- heard -----------------------------------------------------------------------------------------
+# -- unhandled exceptions --------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -169,7 +169,7 @@ def test_exception_is_formatted_on_one_line() -> None:
     assert error_text(KeyError()) == "KeyError"
 
 
-# -- a tick ----------------------------------------------------------------------------------------
+# -- faults in a tick ------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -22,8 +22,8 @@ def _of_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", "/home/ana")
-    monkeypatch.setenv("USERPROFILE", "/home/ana")  # Windows' word for it
-    # Windows itself is asked only there
+    monkeypatch.setenv("USERPROFILE", "/home/ana")  # the home directory on Windows
+    # Called only on Windows.
     monkeypatch.setattr(windows, "get_win_folder", lambda _name: "C:\\Users\\ana\\AppData\\Local")
 
 

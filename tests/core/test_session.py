@@ -193,7 +193,7 @@ def test_example_runs_and_its_stop_is_confirmed(session: Session) -> None:
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert session.runs.view().result_status == "ok"
     assert session.runs.view().title.startswith("Stopped after")
-    # the end of the program, which is told later, is no second stop
+    # The exit of the program is reported later and must not count as a second stop.
     stops = [record for record in session.console.records if "stopped (" in record.text]
     ended = threading.Event()
     for _ in range(40):

@@ -92,7 +92,7 @@ def test_flood_of_log_records_is_bounded_and_drops_are_counted_exactly(session: 
 
 def test_program_output_is_shown_once_even_if_it_is_also_published_as_log(session: Session) -> None:
     heard: list[object] = []
-    waits = block("control_wait", SECONDS=number(600))  # who ends at once has a second for its records
+    waits = block("control_wait", SECONDS=number(600))  # after an exit, only 1 s is left for log records
 
     def printed() -> list[tuple[str, str]]:
         return [(line.origin, line.text) for line in session.console.records if line.text in {"hello", "7"}]

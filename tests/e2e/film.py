@@ -22,10 +22,10 @@ from tests.e2e.person import Person, Reaction, middle
 from tests.e2e.x11 import LEFT, Picture, Screen
 
 WHEEL_UP, WHEEL_DOWN = 4, 5
-PLAIN = str.maketrans("“”", '""')  # the letters of a caption are those of ASCII
-STRIP, MARGIN, TEXT_PX = 44, 16, 20  # the caption's strip below the picture
+PLAIN = str.maketrans("“”", '""')  # cv2 draws only ASCII characters
+STRIP, MARGIN, TEXT_PX = 44, 16, 20  # caption strip below the picture
 PAPER, INK = (0x22, 0x1C, 0x18), (0xF5, 0xF2, 0xF0)  # blue, green, red
-STILL_LOOKS, STILL_S = 4, 0.12  # how often, and how far apart, it is looked whether the picture stands still
+STILL_LOOKS, STILL_S = 4, 0.12  # checks that the picture is still, and the seconds in between
 
 
 class MouseOnly(Screen):
@@ -124,7 +124,7 @@ def with_caption(picture: Picture, words: str) -> Picture:
     return np.vstack([picture[:, :, ::-1], strip])
 
 
-# -- what both paths need ---------------------------------------------------------------------------
+# -- shared by the mouse and keyboard paths ---------------------------------------------------------
 
 
 def topic(studio: Person, name: str) -> tuple[float, float]:

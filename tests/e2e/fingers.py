@@ -9,7 +9,7 @@ from tests.e2e.person import Person
 from tests.e2e.teacher_session import CANVAS, kind_of
 from tests.e2e.waiting import until
 
-PACE_S = 0.08  # the page moves its focus with the next picture, not with the key
+PACE_S = 0.08  # the page moves its focus in the next frame, not with the key press
 MANY = 40
 TAB = "document.querySelector('.nepTab:not([hidden])')"
 FOCUSED = (

@@ -11,7 +11,7 @@ from tests.e2e.x11 import WHEEL_DOWN, WHEEL_UP, Picture, Screen
 from tests.still import LOOK
 
 STEP_S = 40.0
-AGAIN_S = 10.0  # so long nothing came: a person would try again
+AGAIN_S = 10.0  # time after which a person would try again
 RUNNING = (0xFF, 0xB3, 0x00)  # the token "running" of the light theme
 Seen = Mapping[str, object]
 
@@ -35,7 +35,7 @@ class Person:
     def __init__(self, screen: Screen, ask: Callable[..., object]) -> None:
         self.screen, self._ask = screen, ask
 
-    # -- looking ----------------------------------------------------------------------------------
+    # -- reading the window -----------------------------------------------------------------------
 
     def look(self, **wanted: str | bool) -> list[Seen]:
         """Return the visible widgets; none while the window is not shown.
@@ -89,7 +89,7 @@ class Person:
         """Return the pixels of a widget on the screen."""
         return self.screen.picture(seen["rect"])
 
-    # -- doing ------------------------------------------------------------------------------------
+    # -- clicks and menus -------------------------------------------------------------------------
 
     def click(self, name: str = "", **wanted: object) -> Seen:
         """Wait until a widget is enabled and its layout is stable, then click it."""
@@ -163,7 +163,7 @@ class Person:
         """Return the position of an element of the page on the screen, once it no longer moves."""
         look = f"({LOOK})({json.dumps(selector)})"
         self.page(look)
-        again = f"window.nepStill === undefined ? {look} : window.nepStill"  # the page may come anew
+        again = f"window.nepStill === undefined ? {look} : window.nepStill"  # the page may have reloaded
         left, top, right, bottom = until(lambda: self.page(again), f"no {selector} in the page")
         view = self.find(kind="QWebEngineView")["rect"]
         return [view[0] + left, view[1] + top, right - left, bottom - top]

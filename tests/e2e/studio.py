@@ -101,7 +101,7 @@ class Studio(Person):
         """Last 3000 characters of its output."""
         return (self.home / "studio.log").read_text("utf-8", "replace")[-3000:]
 
-    # -- its processes ----------------------------------------------------------------------------
+    # -- processes of Studio ----------------------------------------------------------------------
 
     def wait_up(self) -> Studio:
         """Wait until the window is visible and painted."""

@@ -18,13 +18,13 @@ OPEN = (
     f"(e => e && e.style.display !== 'none')(document.querySelector('{FLYOUT}')) &&"
     f" document.querySelector('{TAB} .blocklyToolboxSelected .blocklyToolboxCategoryLabel')?.textContent"
 )
-GRIP = 12, 18  # where a hand takes a block, from its corner
-INDENT = 16  # how far the blocks inside another one stand to the right
+GRIP = 12, 18  # where a block is grabbed, from its corner
+INDENT = 16  # indentation of nested blocks
 
 Place = tuple[float, float]
 
 
-# -- what is seen, whoever looks --------------------------------------------------------------------
+# -- reading the page -------------------------------------------------------------------------------
 
 
 def words_of(studio: Person, block: str) -> str:
@@ -117,7 +117,7 @@ class Hands:
     def __init__(self, studio: Person) -> None:
         self.studio = studio
 
-    # -- places -------------------------------------------------------------------------------------
+    # -- positions ----------------------------------------------------------------------------------
 
     def rect(self, block: str) -> Sequence[float]:
         """Return the rectangle of a block's own shape on the screen."""
@@ -143,7 +143,7 @@ class Hands:
         view = self.studio.find(kind="QWebEngineView")["rect"]
         return view[0] + left, view[1] + top
 
-    # -- blocks out of the toolbox --------------------------------------------------------------------
+    # -- blocks from the toolbox ----------------------------------------------------------------------
 
     def take(self, category: str, kind: str, corner: Place, place: int = 0) -> str:
         """Drag a block out of the toolbox until its corner is at ``corner``; return its id.
@@ -217,7 +217,7 @@ class Hands:
         until(lambda: holds(self.studio, outer, made), lambda: f"{kind} is at its place")
         return made
 
-    # -- blocks of the page ---------------------------------------------------------------------------
+    # -- blocks on the page ---------------------------------------------------------------------------
 
     def carry(self, block: str, x: float, y: float) -> None:
         """Drag a block to a position on the screen without releasing it; `drop` releases it."""

@@ -77,7 +77,7 @@ def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Stud
         fingers.do("publish a mess", "Publish a message")
         write(studio, fingers, "Message name", "Warm light")
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
-        fingers.press("Escape")  # what is offered
+        fingers.press("Escape")  # closes the completion list
         write(studio, fingers, "Message", '{"level": 0.4 "on": true}', kind="JsonLinesEdit")
         studio.says("a comma is missing between two values")
         assert seen.heard == []
@@ -97,7 +97,7 @@ def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Stud
 
         fingers.do("call a serv", "Call a service")
         studio.says("1 service of 1 node")
-        studio.click("JSON")  # nothing is known of what it takes
+        studio.click("JSON")  # the service has no schema for a form
         write(studio, fingers, "Request", '{"name": "Aiko"}')
         studio.click("Arm and call")
         until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}; {said(studio)}")

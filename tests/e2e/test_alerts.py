@@ -73,7 +73,7 @@ def places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
         inside = overlap(rect, banner) and rect[2] * rect[3] < banner[2] * banner[3]
         is_tool = kind.endswith("Button") or kind in TOOLS
         if is_tool and rect[2] > 0 and not (inside and rect[0] >= banner[0]):
-            name = re.sub(r"\d+", "0", str(each["name"]))  # the status bar counts
+            name = re.sub(r"\d+", "0", str(each["name"]))  # the status bar shows counts
             found[kind, name, str(each["in"])] = rect
     return found
 
@@ -103,7 +103,7 @@ def test_alerts_cover_no_panel_and_panels_keep_their_size(
 
     studio.find("Use the virtual robot", enabled=True)
     fingers.press("2", held=["Alt"])
-    studio.screen.move(700, 500)  # over a panel: nothing may move under the mouse
+    studio.screen.move(700, 500)  # over a panel, so that any shift of the layout would be noticed
     banner = studio.find(kind="Banner")
     assert all(str(port) in str(banner["name"]) for port in held), "one alert for all ports"
     before = places(studio)

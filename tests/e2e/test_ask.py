@@ -38,7 +38,7 @@ def asking(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     """Studio that runs a behaviour which asks for a name."""
     script = started(asks("What is your name?", says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
-    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
+    studio.spot("[data-id=started]")  # loading the blocks closes open menus
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.click("Run", kind="RunButton")
@@ -72,7 +72,7 @@ def test_choice_is_selected_by_key_or_mouse_also_in_the_enlarged_room(
     last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())
     first = chooses("Play?", ["yes", "no"], last)
     studio = start(str(write(tmp_path / "Mine.nepb", started(first))))
-    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
+    studio.spot("[data-id=started]")  # loading the blocks closes open menus
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.click("Run", kind="RunButton")
@@ -93,7 +93,7 @@ def test_choice_is_selected_by_key_or_mouse_also_in_the_enlarged_room(
 def test_stop_removes_the_choices_of_a_question(start: Callable[..., Studio], tmp_path: Path) -> None:
     script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
-    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
+    studio.spot("[data-id=started]")  # loading the blocks closes open menus
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
     studio.click("Run", kind="RunButton")

@@ -58,7 +58,7 @@ def test_blocks_dropped_on_another_tab_are_moved_to_that_tab(studio: Studio) -> 
     until(lambda: "say Four" in shown(studio), "it has opened meanwhile")
     studio.screen.release()
     studio.says("Moved 2 blocks to Quiz")
-    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
+    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # the toast stays while hovered
     until(lambda: alone < shown(studio), "its tab is open")
     until(lambda: studio.page(SENTENCES) == 3, "with both blocks")
     until(lambda: len(studio.page(SELECTED) or []) == 1, "what came is selected")
@@ -118,7 +118,7 @@ def test_tab_opens_under_dragged_blocks_and_the_drag_continues_in_that_tab(studi
     )
     studio.screen.release()
     studio.says("Moved 2 blocks to Quiz")
-    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
+    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # the toast stays while hovered
     under = f"{SHOWN}.querySelector('[data-id=\"say Four\"]').querySelectorAll('.robot_pepper_do_say').length"
     until(lambda: studio.page(under) == 2, "they hang below the script of this tab")
     until(lambda: tabs(studio) == ["Quiz, not saved", "Greeting, not saved"], "both are edited")

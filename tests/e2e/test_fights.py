@@ -26,7 +26,7 @@ def bubbles(studio: Studio) -> list[str]:
     return studio.page("[...document.querySelectorAll('.nepBubble-warning')].map(e => e.textContent)") or []
 
 
-@pytest.mark.parametrize("theme", ["light"])  # the tries are looked at in the dark one
+@pytest.mark.parametrize("theme", ["light"])  # test_tries.py uses the dark theme
 def test_conflicting_scripts_are_marked_and_fixed_from_problems(
     start: Callable[..., Studio], tmp_path: Path, theme: str
 ) -> None:

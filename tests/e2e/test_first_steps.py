@@ -29,7 +29,7 @@ def step(studio: Studio, words: str) -> None:
 
 
 def test_first_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
-    studio.says("First steps (five minutes)")  # the very first start offers them
+    studio.says("First steps (five minutes)")  # offered at the very first start
     studio.click("First steps")
     step(studio, "Use the virtual robot")
     studio.click("Use the virtual robot", kind="Button")

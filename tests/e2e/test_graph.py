@@ -50,7 +50,7 @@ def test_graph_navigation_leads_from_a_topic_publisher_to_its_subscribers(
         canvas = studio.find("Graph of nodes")
         studio.says("nodes, 1 topic")
         left, top, wide, high = canvas["rect"]
-        studio.screen.click(left + wide / 2, top + high - 10)  # beside everything
+        studio.screen.click(left + wide / 2, top + high - 10)  # on the empty canvas
         studio.find("Graph of nodes", focus=True)
 
         def walked() -> bool:

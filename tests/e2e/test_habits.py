@@ -21,7 +21,7 @@ def chosen_first(studio: Studio, words: str) -> None:
 
 def test_command_palette_opened_from_the_page_finds_and_runs_commands(studio: Studio) -> None:
     studio.click("New behaviour")
-    studio.point(".blocklySvg", 300, 200)  # the keyboard is in the page now
+    studio.point(".blocklySvg", 300, 200)  # moves the keyboard focus into the page
     studio.screen.key("k", ["Ctrl"])
     studio.find(FIELD, focus=True)
     studio.screen.type("larger")
@@ -35,7 +35,7 @@ def test_command_palette_opened_from_the_page_finds_and_runs_commands(studio: St
     studio.find(FIELD, focus=True)
     studio.screen.type("smaller")
     chosen_first(studio, "Smaller text")
-    studio.screen.key("Return", ["Ctrl"])  # another key for it
+    studio.screen.key("Return", ["Ctrl"])  # assigns another shortcut
     studio.says("Press the new shortcut for “Smaller text”")
     studio.screen.key("F7")
     studio.says("The shortcut of “Smaller text” is now F7.")
@@ -59,6 +59,6 @@ def test_stop_key_works_while_the_palette_is_open(studio: Studio) -> None:
     middle = red[red.shape[0] // 2, 12]
     assert tuple(middle) == (0xC8, 0x28, 0x2D)  # the token "stop" of the light theme: not dimmed
     studio.click("Stop", kind="StopButton")
-    studio.find(FIELD, focus=True)  # a press on Stop takes the keyboard from nothing
+    studio.find(FIELD, focus=True)  # pressing Stop doesn't take the keyboard focus
     studio.screen.key("Escape")
     until(lambda: not studio.all(FIELD), "Esc leaves the palette")

@@ -66,7 +66,7 @@ def test_panels_are_restored_after_a_restart(start: Callable[..., Studio]) -> No
     left = settled(studio, lambda now: len(now["image"]) == 2)
     assert studio.quit() == 0
 
-    again = start()  # shows the layout that was left
+    again = start()  # restores the last layout
     settled(again, lambda now: set(now) == set(left) and all(close(now[name], left[name]) for name in left))
     again.choose("View", "Reset panels")
     settled(

@@ -65,6 +65,6 @@ def test_robot_is_found_in_the_window_and_driven_by_blocks(
     studio.open_category("Speech")
     studio.screen.key("Escape")
     studio.click("Run", kind="RunButton")
-    studio.click("Allow motion")  # it is no virtual robot, and its program walks
+    studio.click("Allow motion")  # not a virtual robot, and the program moves it
     heard(driver)
     studio.says("Turtle can't confirm")

@@ -72,6 +72,6 @@ def test_virtual_turtle_connects_and_moves_without_a_motion_permission(start: Ca
     studio.says("Turtle ready", 40)
     studio.choose("Robots", "Try what a robot can do")
     studio.find("Robots in their room")
-    press(studio, "Try turn")  # a virtual robot is not asked for
+    press(studio, "Try turn")  # virtual robots need no permission
     studio.says("done in ")
     assert not studio.all("Allow motion")

@@ -35,7 +35,7 @@ def lasts(studio: Studio) -> None:
     def grows() -> bool:
         told = re.search(r"Running, (\d+) s", studio.says("Running, "))
         seen.extend([int(told[1])] if told else [])
-        return bool(seen) and seen[-1] > min(seen)  # less than before: another run has begun
+        return bool(seen) and seen[-1] > min(seen)  # the seconds restart with another run
 
     until(grows, lambda: f"it lasts: {seen}")
 

@@ -102,7 +102,7 @@ def went_well(tried: Tried, *names: str) -> None:
     assert "Pepper stopped (" in steps["stop"]["said"]
     tried.nothing_is_left()
     assert {path.name for path in tried.folder.iterdir()} == {"report.json", "window.png"}
-    assert not tried.own.exists()  # it has left a person's settings alone
+    assert not tried.own.exists()  # the user's own settings are untouched
 
 
 def picture(tried: Tried) -> np.ndarray:
@@ -114,7 +114,7 @@ def test_self_test_with_editor_covers_all_of_studio_and_leaves_no_process(both: 
     tried, _other = both
     went_well(tried, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
     assert tried.report["first_paint_ms"] < tried.report["editor_ready_ms"] < tried.report["total_ms"]
-    blue = (picture(tried) == (182, 76, 41)).all(axis=2)  # what a robot does: those blocks have this colour
+    blue = (picture(tried) == (182, 76, 41)).all(axis=2)  # the colour of blocks of robot actions
     assert blue[200:700, 230:600].mean() > 0.1
 
 
@@ -138,6 +138,6 @@ def test_failed_step_is_reported_at_once_with_its_reason(screen: Screen, tmp_pat
     assert "the virtual robot: The virtual robot Pepper stopped unexpectedly." in report["why"]
     assert "app.robots.nobody" in report["why"]
     assert not robot["ok"]
-    assert robot["ms"] - robot["began_ms"] < robot["bound_s"] * 1000  # nobody waited for the rest of the time
+    assert robot["ms"] - robot["began_ms"] < robot["bound_s"] * 1000  # failed before the time limit
     assert picture(tried).shape == (900, 1440, 3)
     tried.nothing_is_left()

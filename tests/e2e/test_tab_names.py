@@ -35,7 +35,7 @@ def test_renaming_a_tab_renames_its_file_and_can_be_reverted(
     studio.screen.type(" for class")
     studio.screen.key("Return")
     studio.says("Renamed Greeting to Quiz for class")
-    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # it stays under the mouse
+    studio.screen.move(*middle(studio.find("Undo", kind="Button")["rect"]))  # the toast stays while hovered
     until(lambda: tabs(studio) == ["Quiz for class"], "its tab says so")
     assert not old.exists()
     assert (tmp_path / "Quiz for class.nepb").exists()

@@ -65,7 +65,7 @@ def test_tabs_are_restored_at_the_next_start(start: Callable[..., Studio], tmp_p
     until(lambda: tabs(studio) == ["One", "Two, not saved", "Three"], "it is open again")
     assert studio.quit() == 0
 
-    again = start()  # shows what was worked on last, not the start page
+    again = start()  # shows the last behaviours, not the start page
     until(lambda: tabs(again) == ["One", "Two, not saved", "Three"], "the tabs are there again", 30)
     assert not again.all("Restore"), "nothing is asked after an end in order"
     until(lambda: "say Three" in shown(again), "the one that showed", 30)

@@ -174,7 +174,7 @@ def touch(studio: Studio, film: Film, fingers: Fingers, ears: Ears) -> None:
         fingers.reword("Hello!", "That tickles")
     with film.step("F5, F6 to the room, Space: a touch on the head"):
         fingers.press("F5")
-        studio.says("Running, ")  # “Starting” before: it feels nothing yet
+        studio.says("Running, ")  # touches have no effect during “Starting”
         to_room(fingers)
         fingers.press(" ")
         ears.hear("That tickles")
@@ -319,7 +319,7 @@ def restore(studio: Studio, film: Film, fingers: Fingers) -> None:
         until(lambda: len(tabs(studio)) == 3, lambda: f"{tabs(studio)}")
         assert tabs(studio)[0].startswith("Quiz")
         until(lambda: len(kind_of(studio, "robot_pepper_do_turn")) == 2, "the one that was worked on shows")
-        studio.says("2 robots", 60)  # they come back, too
+        studio.says("2 robots", 60)  # the virtual robots are restarted, too
 
 
 def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:

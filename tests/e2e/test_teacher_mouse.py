@@ -36,7 +36,7 @@ from tests.e2e.x11 import RIGHT
 
 pytestmark = pytest.mark.timeout(900)
 MAX_CLICKS, MAX_DRAGS = 4, 2  # from the start to the first motion
-HEAD = 150  # how high Pepper's head is above the floor, in the units of its drawing
+HEAD = 150  # height of Pepper's head above the floor, in units of its drawing
 FIGHT = "both move Pepper at the same time"
 WHY = "document.querySelector('.nepWhy')?.textContent ?? ''"
 
@@ -184,7 +184,7 @@ def react_to_touch(hour: Hour) -> str:
         hand.press_button("Variables", "New variable")
         at = middle(studio.find("New variable", kind="QLineEdit")["rect"])
         hour.mouse.click(*at, RIGHT)
-        studio.pick("Copy")  # it becomes the name of a behaviour later
+        studio.pick("Copy")  # pasted later as the name of a behaviour
         studio.click("Create")
         change = hand.below(sound, "Variables", "variables_change")
     with film.step("A list, which nothing has set yet: Problems says so"):
@@ -311,7 +311,7 @@ def come_back_after_a_crash(hour: Hour, start: Callable[..., Studio]) -> None:
         studio.click("Restore")
         until(lambda: blocks_of(studio) == before, lambda: f"{blocks_of(studio)} is not {before}")
         assert tabs(studio) == names
-        studio.says("2 robots", 60)  # they come back, too
+        studio.says("2 robots", 60)  # the virtual robots are restarted, too
 
 
 def take_out_of_the_bin(hour: Hour) -> None:

@@ -18,7 +18,7 @@ CLOSED = "[...document.querySelectorAll('.blocklyFlyout')].every(e => e.style.di
 ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTryAnswer'))"
 
 
-@pytest.mark.parametrize("theme", ["dark"])  # the fights are looked at in the light one
+@pytest.mark.parametrize("theme", ["dark"])  # test_fights.py uses the light theme
 def test_single_blocks_can_be_tried_before_a_program_exists(
     start: Callable[..., Studio], tmp_path: Path, theme: str
 ) -> None:
@@ -44,7 +44,7 @@ def test_single_blocks_can_be_tried_before_a_program_exists(
         studio.says(value)
     with film.step("The round button runs from the selected block on"):
         left, top, width, height = studio.spot(".blocklySvg")
-        studio.screen.click(left + width - 120, top + height / 2)  # the toolbox closes
+        studio.screen.click(left + width - 120, top + height / 2)  # closes the flyout
         until(lambda: studio.page(CLOSED), "the toolbox is closed")
         studio.point("[data-id=turn] > .blocklyPath", dx=12, dy=12)
         studio.point(".nepTryHandle", dx=10, dy=10)

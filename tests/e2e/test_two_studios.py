@@ -37,7 +37,7 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     second.says("Pepper ready", 40)
     assert len(second.children("nep", "master")) == 1
     second.choose("Robots", "Use the virtual Pepper")
-    second.says("Pepper is connected")  # the blocks are shown: a menu that opens before would be closed
+    second.says("Pepper is connected")  # loading the blocks closes open menus
     second.choose("View", "Developer layout")
     second.find("Topics")
     second.screen.key("F12")
@@ -46,7 +46,7 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
         states = node.new_sub("/Pepper/state", "json")
         heard = [states.receive(30.0).payload for _ in range(3)]
     assert not any(state["moving"] for state in heard)
-    assert len(robots(first)) == 1  # the second uses the one that is there
+    assert len(robots(first)) == 1  # the second Studio uses the running robot
 
     second.choose("View", "Appearance")
     second.pick("Dark")
@@ -54,7 +54,7 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     first.process.terminate()
     assert first.process.wait(10) == 0
     until(lambda: firsts not in robots(second), "the first one's robot has ended with it")
-    # at once: the second may not have noticed that the robot has gone, "Pepper ready" may still stand there
+    # At once: the second Studio may not have noticed the exit and may still show “Pepper ready”.
     second.choose("Robots", "Use the virtual Pepper")
     until(lambda: robots(second), "another robot comes", 40)
     second.says("Pepper ready", 40)

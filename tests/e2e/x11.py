@@ -101,7 +101,7 @@ class Screen:
     def double_click(self, x: float, y: float) -> None:
         """Double-click with a delay of the X server, so that the clicks stay close on a busy computer."""
         self.click(x, y)
-        self._button(LEFT, down=True, after_ms=60)  # two of one millisecond are none
+        self._button(LEFT, down=True, after_ms=60)  # a click in the same millisecond isn't counted
         self.release()
 
     def _button(self, button: int, *, down: bool, after_ms: int = 0) -> None:

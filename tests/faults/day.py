@@ -72,7 +72,7 @@ class Day:
         began = now()
         self.address = f"{host.address}:7780"
         words = ("master", "--no-gateway", "--listen", host.address)
-        # `nep` names itself by the first word.
+        # `nep` takes its program name from argv[0].
         code = f"import sys; sys.argv[0] = 'nep'; {_MASTER}"
         program = self._stack.enter_context(running(code, *words, before=host.inside(), NEP_MASTER=""))
         assert program.process.stderr is not None

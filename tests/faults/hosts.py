@@ -125,7 +125,7 @@ class Network:
         stack.callback(self._switch.end)
         self._switch.run("ip", "link", "add", _SWITCH, "type", "bridge", "forward_delay", "0")
         self._switch.run("ip", "link", "set", _SWITCH, "up")
-        self._filter("lo", _PROGRAM.format(random=_RANDOM, below=0, pass_on=_EVER))  # can this kernel do it?
+        self._filter("lo", _PROGRAM.format(random=_RANDOM, below=0, pass_on=_EVER))  # checks kernel support
         self._hosts: list[Host] = []
         self._lock = Lock()
 
@@ -139,7 +139,7 @@ class Network:
             number = f"02:00:00:00:00:{len(self._hosts):02x}"
         port = _port_of(made)
         pid = str(made.pid)
-        # From outside, where this number is that of the host's first process.
+        # Run outside the host's PID namespace, where `pid` is the number of its first process.
         subprocess.run(
             [
                 *(*_entering(self._switch.pid), "--net", "ip", "link", "add", port),
@@ -152,8 +152,8 @@ class Network:
         self._switch.run("ip", "link", "set", port, "master", _SWITCH, "up")
         made.run("ip", "addr", "add", f"{made.address}/24", "dev", "eth0")
         made.run("ip", "link", "set", "eth0", "up")
-        # Announces its address as network services do; otherwise hosts that know the address by another
-        # card keep sending there for up to a minute. The kernel announces it when the card's number changes.
+        # Announce the address (gratuitous ARP), as network services do; hosts that cached another card's
+        # MAC address would use it for up to a minute. The kernel announces only changes of the MAC address.
         wait_s = _ARP_LOCK_S if address else 0
         made.run("sh", "-c", _ANNOUNCE.format(number=number, wait_s=wait_s))
         return made

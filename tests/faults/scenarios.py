@@ -78,8 +78,8 @@ def _cable(day: Day, publisher: Part, subscriber: Part, cut: Part, out_s: float)
     day.hosts.cable(cut.host, is_in=True)
     since = now()
     sent = publisher.ask("look")["sent"]
-    # All of it: a single packet that waited for the cable may be there long before the others. Until then two
-    # outages are one to the system, and a long one.
+    # Wait for all messages: one packet queued during the outage may arrive long before the others. Until
+    # all have arrived, TCP treats two outages as a single long one.
     eventually(lambda: subscriber.ask("look")["last"] >= sent, WAIT_S)
     back_s = now() - since
     day.hosts.cable(cut.host, is_in=False)
@@ -109,7 +109,7 @@ def address_of_subscriber(day: Day, _out_s: float) -> Measured:
     assert publisher.host.connections_to(before) == 1
     subscriber.host.change_address("10.88.0.201")
     back_s = _back_s(subscriber, now())
-    # Else all that is sent would be kept for it, until the system gives up.
+    # Otherwise the system buffers all later data for the old connection until it times out.
     eventually(lambda: publisher.host.connections_to(before) == 0, _SILENT_S)
     return {"back_s": back_s, "lost": _close(publisher, subscriber)["lost"]}
 
@@ -185,7 +185,7 @@ def _unheard(day: Day, sent: int, subscriber: Part, out_s: float) -> Measured:
     since = now()
     balance(sent, subscriber)
     told_s = now() - since
-    _wait(out_s)  # what the system still sends for a program that ended comes late, and is found again
+    _wait(out_s)  # data that the system delivers late for an ended program is no longer lost
     return {"told_s": told_s, "lost": balance(sent, subscriber)["lost"]}
 
 
@@ -209,7 +209,7 @@ def _lossy(day: Day, out_s: float, ratio: float) -> Measured:
 
     day.hosts.lose(subscriber.host, ratio)
     _wait(out_s)
-    eventually(lambda: resent() > 0, WAIT_S)  # else nothing was lost yet: of 100 packets a second 1 % are few
+    eventually(lambda: resent() > 0, WAIT_S)  # at 100 packets/s and 1 %, the first loss takes a while
     silent_s, count = subscriber.ask("look")["silent_s"], resent()
     return {"lost": _close(publisher, subscriber)["lost"], "silent_s": silent_s, "resent": count}
 

@@ -162,7 +162,7 @@ def subscriber() -> None:
     worker.go()
 
     def look() -> Answer:
-        # The counters first while nothing is read: what comes meanwhile is in neither.
+        # Counters first: while reading is paused, a message that arrives now is in neither.
         counted = {"received": sub.received, "lost": sub.lost, "refused": sub.refused}
         told = {name: value for name, value in vars(heard).items() if not name.startswith("_")}
         return {**counted, **told, "error": worker.error}

@@ -15,7 +15,7 @@ TARGETS = Targets()
 ROOT = Path(__file__).resolve().parents[2]
 IS_THERE = all(importlib.util.find_spec(each) for each in ("platformdirs", "jsonschema"))
 
-if IS_THERE:  # they are no needs of the library's own
+if IS_THERE:  # optional: not dependencies of the library
     from app.blocks.model.program import Program
     from app.blocks.model.workspace import parse_workspace
     from app.blocks.runtime.variables import VariableValue

@@ -31,7 +31,7 @@ TARGETS = Targets()
     NepError, EncodeError, seeds=lambda: [b'{"a":[1,2]}', b"hello", b"NaN"], words=(b'{"', b"\\u", b"1e999")
 )
 def payloads(data: bytes) -> None:
-    typed = text_of(data).replace("@", "a")  # which would read a file
+    typed = text_of(data).replace("@", "a")  # @ would read a file
     for msg_type in ("string", "bytes", "json"):
         try:
             made = CODECS[msg_type].encode(payload_of(typed, msg_type))
@@ -55,7 +55,7 @@ def field_paths(data: bytes) -> None:
         try:
             steps = parse_path(leaf)
         except NepError:
-            continue  # a name that is empty, say
+            continue  # for example an empty name
         value_at(value, steps)
     found = value_at(value, parse_path(text_of(path)))
     assert found is MISSING or found is not None or value is not None

@@ -44,7 +44,7 @@ def json_codec(data: bytes) -> None:
     find_nan(value)
     assert is_same(codec.decode(data, {}), value)
     made = codec.encode(value).data
-    # NaN and infinity are sent as null, however deep.
+    # NaN and infinity are sent as null at any depth.
     assert is_same(codec.decode(made, {}), value) or b"null" in made
 
 
@@ -64,7 +64,7 @@ def msgpack_codec(data: bytes) -> None:
     codec = CODECS["msgpack"]
     value = codec.decode(memoryview(data), {})
     again = codec.decode(codec.encode(value).data, {})
-    # A list that is a key comes as a tuple, and goes as a list.
+    # A list used as a map key is decoded as a tuple and encoded as a list.
     assert is_same(again, value)
 
 
@@ -119,7 +119,7 @@ def picture_files(data: bytes) -> None:
 def pictures_decoded(data: bytes) -> None:
     found = parse_header(data)
     if found.width * found.height > 1_000_000:
-        return  # it would be decoded, but it takes its time
+        return  # decoding would slow down the fuzzer
     picture = image_codec.decode(memoryview(data), {})
     assert picture.shape[:2] == (found.height, found.width)
 
@@ -208,7 +208,7 @@ def typed_messages_of_ros(data: bytes) -> None:
         assert isinstance(value, kind)
 
 
-# ---- what nep makes of payloads
+# ---- payloads of nep's own topics
 
 
 def records() -> Iterator[bytes]:

@@ -72,7 +72,7 @@ def ports_and_modes(data: bytes) -> None:
 )
 def addresses_of_ros(data: bytes) -> None:
     text = text_of(data)
-    if text:  # "" is what the environment says
+    if text:  # "" selects the address from the environment
         assert 0 < int(ros_master_address(text).rpartition(":")[2]) < 65536
 
 

@@ -104,7 +104,7 @@ def requests_of_browsers(data: bytes) -> None:
     found = respond(
         PageRequest("GET", path, (host,), "http://192.168.1.5:9090"), Access(token="a-long-token")
     )
-    given = unquote(re.sub("[\t\r\n]", "", path))  # as urllib reads a URL
+    given = unquote(re.sub("[\t\r\n]", "", path))  # as urllib parses a URL
     assert b"a-long-token" not in found.body or "a-long-token" in given
     for header in found.headers.values():
         assert header.isascii()

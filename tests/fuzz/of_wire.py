@@ -213,7 +213,7 @@ def requests_of_nodes(data: bytes) -> None:
         assert len(received.request.reason) < 2000
         return
     again = encoding.decode_request(encoding.encode_request(received.request, received.call))
-    # A number that msgpack has no form for cannot have come, a NaN is not equal to itself.
+    # `repr`, because NaN isn't equal to itself; integers beyond msgpack's range can't occur.
     assert repr(again) == repr(received)
     check_request(received.request)
 

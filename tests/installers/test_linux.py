@@ -75,7 +75,7 @@ def test_debian_package_has_its_version_and_dependencies(context: Context) -> No
 
 def test_packages_are_reproducible(context: Context) -> None:
     sums = []
-    for moment in (None, (1e9, 1e9), (2e9, 2e9)):  # as they are; before the packages' time, and after it
+    for moment in (None, (1e9, 1e9), (2e9, 2e9)):  # unchanged, before and after the packages' time
         for path in context.frozen.rglob("*"):
             os.utime(path, moment, follow_symlinks=False)
         made = [packer.debian_package(context), packer.archive(context)]
@@ -86,7 +86,7 @@ def test_packages_are_reproducible(context: Context) -> None:
 def test_checksum_file_is_accepted_by_sha256sum(context: Context) -> None:
     packer.archive(context)
     write_sums(context.dist)
-    write_sums(context.dist)  # its own file is not among them
+    write_sums(context.dist)  # the checksum file must not list itself
     done = subprocess.run(["sha256sum", "--check", "--strict", SUMS], cwd=context.dist, check=False)
     assert done.returncode == 0
 
@@ -133,7 +133,7 @@ def test_removal_keeps_a_foreign_nep_command(unpacked: Path, tmp_path: Path) -> 
 
 
 def test_minimum_glibc_version_is_determined(context: Context) -> None:
-    (context.frozen / "words.txt").write_text("GLIBC_9.99", "utf-8")  # no library
+    (context.frozen / "words.txt").write_text("GLIBC_9.99", "utf-8")  # not a library
     major, minor = map(int, libc_needed(context.frozen).split("."))
     assert (2, 2) <= (major, minor) < (2, 60)
 

@@ -28,7 +28,7 @@ def context(tmp_path: Path) -> Context:
     return frozen_program(tmp_path)
 
 
-# ---- what Windows gets of the pinned packages -----------------------------------------------------
+# ---- pinned packages on Windows -------------------------------------------------------------------
 
 
 def test_pinned_packages_are_selected_by_their_markers_for_windows() -> None:
@@ -60,7 +60,7 @@ def test_every_package_for_windows_has_a_hash() -> None:
     assert all("==" in line and "--hash=sha256:" in line for line in wanted)
 
 
-# ---- the version and the icon ---------------------------------------------------------------------
+# ---- version and icon -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_ico_file_holds_each_image_at_its_offset() -> None:
         assert made[at : at + size] == pictures[side]
 
 
-# ---- what NSIS is told ----------------------------------------------------------------------------
+# ---- NSIS script ----------------------------------------------------------------------------------
 
 
 def test_installer_script_unpacks_every_file_into_its_folder(context: Context) -> None:
@@ -125,7 +125,7 @@ def test_file_association_is_registered_and_unregistered() -> None:
     command = '"Software\\Classes\\NEPStudio.Behaviour\\shell\\open\\command" ""'
     assert f'WriteRegStr HKCU {command} "$\\"$INSTDIR\\nep-studio.exe$\\" $\\"%1$\\""' in put
     assert 'DeleteRegKey HKCU "Software\\Classes\\NEPStudio.Behaviour"\n' in take
-    # The suffix may be another program's, too: only our values go, and the key when nothing is left in it.
+    # Other programs may use the suffix: remove only our values, and the key only if it is empty.
     assert '${If} $0 == "NEPStudio.Behaviour"\n    DeleteRegValue HKCU "Software\\Classes\\.nepb" ""' in take
     assert 'DeleteRegKey HKCU "Software\\Classes\\.nepb"' not in take
     assert "Program Files" not in put + take
@@ -153,7 +153,7 @@ def test_setup_is_reproducible(context: Context) -> None:
     assert setup_of(context).read_bytes() == first
 
 
-# ---- the zip, and what may not be in a package ----------------------------------------------------
+# ---- zip and files forbidden in a package ---------------------------------------------------------
 
 
 def test_zip_is_sorted_and_reproducible(context: Context) -> None:

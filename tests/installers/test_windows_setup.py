@@ -178,7 +178,7 @@ def test_update_and_uninstall_are_rejected_while_studio_is_open(windows: Windows
 
 def test_failed_update_keeps_the_old_version_intact(windows: Windows) -> None:
     before = {path.name: path.read_bytes() for path in windows.folder.glob("*.*")}
-    last = windows.folder / "uninstall.exe"  # the others have been moved out of the way when its turn comes
+    last = windows.folder / "uninstall.exe"  # moved last, after the other files
     if subprocess.run(["chattr", "+i", last], check=False).returncode != 0:
         pytest.skip("only root can hold a file at its place, and not on every disk")
     try:
@@ -196,7 +196,7 @@ def test_failed_update_keeps_the_old_version_intact(windows: Windows) -> None:
 def test_interrupted_update_is_repaired_first(windows: Windows) -> None:
     (windows.folder / "old~").mkdir()
     (windows.folder / "new~").mkdir()
-    for name in ("_internal", "nep.exe"):  # the computer was switched off while these were moved
+    for name in ("_internal", "nep.exe"):  # simulates a power failure during these moves
         (windows.folder / name).rename(windows.folder / "old~" / name)
     assert windows.run(windows.setups["1.3.0"], "/S") == (0, "")
     assert sorted(path.name for path in windows.folder.iterdir()) == [
@@ -220,6 +220,6 @@ def test_command_folder_is_added_to_a_long_path_and_removed_again(computer: Wind
     assert computer.path().startswith(f"{LONG_PATH};C:\\users\\")
     assert computer.path().endswith(r"\AppData\Local\Programs\NEP Studio")
     assert computer.run(computer.setups["1.3.0"], "/S") == (0, "")
-    assert computer.path().count("NEP Studio") == 1  # an update keeps what was chosen, once
+    assert computer.path().count("NEP Studio") == 1  # the update keeps the PATH entry without a duplicate
     computer.uninstall()
     assert computer.path() == LONG_PATH

@@ -273,7 +273,7 @@ def _run_all(
     what = "what the test peers need" if version == SHARED else f"the test peer nep {version}"
     if version in JAVASCRIPT:
         what = f"the test peer {version}"
-    where = where or folder.parent  # not where we are: `import nep` would find our own
+    where = where or folder.parent  # not the current folder: `import nep` would find this repository
     where.mkdir(parents=True, exist_ok=True)
     for command in commands:
         try:

@@ -86,12 +86,12 @@ def listings(master, tmp_path: Path) -> Iterator[Programs]:
 def test_listings_exchange_messages_with_programs_of_the_original_csharp_library(
     peers, nep_home, listings, original, tmp_path
 ):
-    about = {"node": "original", "pid": str(os.getpid())}  # as text, as only Nep.dll sends it
+    about = {"node": "original", "pid": str(os.getpid())}  # pid as text, which only Nep.dll sends
     port = original.ask("test", "subscriber", **about)["port"]
     assert original.ask("test", "publisher", **about)["port"] == port
     with original.subscriber(port + 1, b"test") as subscriber, original.publisher(port) as publisher:
         original.publish_until(publisher, b'test {"message":"own"}', lambda: subscriber.poll(0))
-        eventually(lambda: len(view(nep_home).topics["test"].subscribers) == 2)  # itself and the gateway
+        eventually(lambda: len(view(nep_home).topics["test"].subscribers) == 2)  # original node and gateway
         for language, message in zip(LANGUAGES, ("hello", "hello world", "hello"), strict=True):
             listings.start(f"{language}_talker", listing(language, TALKERS, "Listing9", tmp_path))
             while (heard := read_by_nep_dll(subscriber.recv())) == {"message": "own"}:

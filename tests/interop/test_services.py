@@ -50,7 +50,7 @@ def test_original_client_receives_replies(originals: Peers, port: int, version: 
             client.tell(request)
             client.wait(lambda number=number: len(client.got) == number, "an answer", LONG_S)
         assert client.got == [{"heard": each} for each in asked]
-        client.tell({"fail": True})  # and it has to get an answer, else it waits for ever
+        client.tell({"fail": True})  # without an error reply the client would wait forever
         assert client.hears({"nep_error": "LookupError", "reason": "no such thing"})
         client.tell({"n": 2})
         assert client.hears({"heard": {"n": 2}})

@@ -63,7 +63,7 @@ def garbage_into(port: int) -> Callable[[], None]:
             with socket.create_connection(("127.0.0.1", port), 5) as connection:
                 connection.sendall(random.choice(GARBAGE))
         except OSError:
-            pass  # it was thrown out while it sent: that is what the port does
+            pass  # expected: the port disconnects senders of invalid data
 
     return attack
 
@@ -127,7 +127,7 @@ def test_originals_and_native_programs_exchange_messages_under_attack(
     native = peers.start("native", "subscriber", "t", name="native").wait_ready()
     answering = peers.start("native", "publisher", "back", name="answering").wait_ready()
     receiver = peers.start(kind, "subscriber", "back", name="receiver").wait_ready()
-    for _ in range(60):  # originals are slow joiners
+    for _ in range(60):  # original programs have the slow-joiner problem
         publisher.tell({"n": -1})
         answering.tell({"n": -1})
         if native.hears({"n": -1}, 0.5) and receiver.hears({"n": -1}, 0.5):
@@ -138,12 +138,12 @@ def test_originals_and_native_programs_exchange_messages_under_attack(
             flood.begin(f"garbage {port}", garbage_into(port))
             flood.begin(f"requests {port}", requests_to(port, context))
         for port in (9000, 9002):
-            if kind != "0.5.4.8":  # one that is no JSON ends it: docs/original-nep.md, Limits
+            if kind != "0.5.4.8":  # non-JSON ends that version: docs/original-nep.md, Limits
                 flood.begin(f"frames {port}", frames_into(port, context))
             flood.begin(f"deaf {port}", deaf_subscriber_of(port + 1, context))
             flood.begin(f"garbage {port}", garbage_into(port + 1))
         rounds = 0
-        while rounds < ROUNDS or not all(flood.rounds.values()):  # an attack may take its time
+        while rounds < ROUNDS or not all(flood.rounds.values()):  # until each attack ran at least once
             publisher.tell({"n": rounds})
             answering.tell({"n": rounds})
             assert native.hears({"n": rounds}), f"{rounds} of {kind} after {flood.rounds}"

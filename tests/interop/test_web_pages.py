@@ -115,7 +115,7 @@ def test_roslib_receives_a_close_frame_when_the_server_closes(
         page = started(clients, "roslib", first)
         page.tell(["listen", "/chatter", "std_msgs/String"])
         eventually(lambda: "/chatter" in node.graph().topics)
-    assert page.process.wait(30) == 0  # by a close frame, not a broken connection
+    assert page.process.wait(30) == 0  # by a close frame, not by a broken connection
     eventually(lambda: not node.graph().topics)
 
 

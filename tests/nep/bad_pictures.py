@@ -68,7 +68,7 @@ def gif(side: int) -> bytes:
     return b"GIF89a" + size + b"\0\0\0," + b"\0\0\0\0" + size + b"\0\x02\x02L\x01\0;" + b"\0" * 5
 
 
-HIDDEN = segment(0xFE, b"")[:2] + b"\x00\x15" + frame(8, 8)  # looks like a small head to who jumps wrongly
+HIDDEN = segment(0xFE, b"")[:2] + b"\x00\x15" + frame(8, 8)  # small header for a parser that skips wrongly
 
 BOMBS = {
     "bmp": bmp(SIDE),

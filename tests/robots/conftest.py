@@ -138,7 +138,7 @@ class Turtle:
         self.go_on.wait(60)
 
     def _let(self, call: Call) -> None:
-        # Not by the call's clock, which stands still: real drivers write call.until(...).
+        # Not the call's clock, which only tests advance; real drivers use call.until(...).
         while not self.go_on.wait(0.005):
             if call.canceled:
                 raise Canceled

@@ -163,7 +163,7 @@ class WhoseWordsCount:
                 if command["op"] == "stop":
                     forged.publish(answer(command["id"], "succeeded", "stop"))
 
-        # It only publishes its answers from another node, so that it serves nothing and is a stranger.
+        # Another node publishes the forged answers; it serves nothing and so isn't the robot's node.
         with nep.node("spy", master=evil._master) as spy:
             spy.new_sub("/Pepper/command", "robot/command", sink=forge)
             assert not side.stop(SHORT_S)

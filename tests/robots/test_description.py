@@ -173,7 +173,7 @@ def test_text_of_only_control_characters_is_reported_as_empty():
     assert validate(document) == ("properties.sees_ball.rb:block.category must not be empty",)
 
 
-# ---- whatever comes from the network, it is a robot or a sentence ----------------------------------
+# ---- untrusted input is validated, never crashes ---------------------------------------------------
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
@@ -233,7 +233,7 @@ def test_arbitrary_input_is_checked_without_crash(value):
         assert all(sentence.startswith(action.name) for sentence in action.check(value))
 
 
-# ---- lists and objects as people type them ---------------------------------------------------------
+# ---- lists and objects entered as text -------------------------------------------------------------
 
 
 def parameter(**data: object) -> Parameter:
@@ -268,7 +268,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}}
 def test_entered_text_is_parsed_to_a_list_or_object(described, words, value):
     made = parse_value(parameter(**described), words)
     assert made == value
-    assert repr(made) == repr(value)  # 1 is not 1.0, and not True
+    assert repr(made) == repr(value)  # repr distinguishes 1 from 1.0 and True
 
 
 @pytest.mark.parametrize("value", [["a", "b"], [1, 2.5], [["x"], []], {"a": {"b": 1}}, ["a, b"], [" "]])
@@ -298,7 +298,7 @@ def test_list_items_and_object_fields_are_validated(described, value, wrong):
     assert sentences == (() if wrong is None else (f"go: values {wrong}",))
 
 
-# ---- what is announced -----------------------------------------------------------------------------
+# ---- announced descriptions ------------------------------------------------------------------------
 
 
 def message_of(data: bytes, codec: str = "json") -> Message:

@@ -171,7 +171,7 @@ class Person:
         rows = ".blocklyToolboxCategoryContainer"
         self.ask("document.querySelector('[data-test=open]')?.removeAttribute('data-test')")
         self.ask(f"{shown}.querySelectorAll({rows!r})[{number}].setAttribute('data-test', 'open')")
-        row = self.box("[data-test=open]")  # a tile in a narrow page
+        row = self.box("[data-test=open]")  # the row is a tile on a narrow page
         self.click("[data-test=open]", dx=min(60, (row["right"] - row["left"]) / 2))
         self.box(".nepTab:not([hidden]) .blocklyFlyout .blocklyBlock")
 

@@ -32,7 +32,7 @@ def shown(root: QWidget) -> Iterator[QWidget]:
     """Yield every visible widget below `root`, including those outside of a scroll area's viewport."""
     behind = [dock for dock in root.findChildren(QDockWidget) if dock.x() < -dock.width() / 2]
     for widget in [root, *root.findChildren(QWidget)]:
-        hidden = any(dock.isAncestorOf(widget) for dock in behind)  # Qt moves what is behind a tab away
+        hidden = any(dock.isAncestorOf(widget) for dock in behind)  # Qt moves docks behind a tab off-screen
         if widget.isVisibleTo(root) and widget.width() > 0 and not hidden:
             yield widget
 

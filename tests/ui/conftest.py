@@ -27,10 +27,10 @@ from tests.ui.fakes import close_sessions
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_QUICK_BACKEND", "software")
 if hasattr(os, "geteuid") and os.geteuid() == 0:
-    # Chromium refuses to run as root with its sandbox. Never in the product.
+    # Chromium refuses to run as root with its sandbox. Not in the product.
     os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
 
-# Qt asks for it before the application exists, when a web view comes later.
+# Required by Qt before the application is created if a web view is created later.
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
 WAIT_MS = 30_000
@@ -64,7 +64,7 @@ def _garbage() -> Iterator[None]:
     gc.disable()
     yield
     gc.collect()
-    if left := QApplication.topLevelWidgets():  # held by references that pass through Qt
+    if left := QApplication.topLevelWidgets():  # kept alive by references through Qt
         for widget in left:
             widget.deleteLater()
         del widget, left
@@ -94,7 +94,7 @@ def _sessions_end() -> Iterator[None]:
 def _silent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Block Qt's sound modules: their connections to the sound system stay open until the process exits."""
     for module in ("PySide6.QtTextToSpeech", "PySide6.QtMultimedia"):
-        monkeypatch.setitem(sys.modules, module, None)  # what an import fails at
+        monkeypatch.setitem(sys.modules, module, None)  # makes the import fail
 
 
 @pytest.fixture(autouse=True)
@@ -126,8 +126,8 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object
             warnings.append(text)
 
     previous = qInstallMessageHandler(listen)
-    # Else pytest holds the windows of a file's last test until after `_garbage`, which would put them aside
-    # for good: each change of the theme would then style them, too.
+    # Otherwise pytest holds the windows of a file's last test until after `_garbage`, which would freeze
+    # them permanently: every theme change would then style them, too.
     item.funcargs.clear()  # type: ignore[attr-defined]
     try:
         result = yield
@@ -139,7 +139,7 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object
     left = [each for each in QApplication.topLevelWidgets() if each.isVisible()]
     if left:
         for each in left:
-            each.hide()  # one test fails, not all that follow
+            each.hide()  # fail only this test, not all later ones
         names = ", ".join(f"{type(each).__name__} “{each.accessibleName()}”" for each in left)
         pytest.fail(f"The test left open: {names}. Give them a parent or to qtbot.addWidget.", pytrace=False)
     return result

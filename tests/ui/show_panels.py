@@ -94,7 +94,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     dock.resize(width, height)
     dock.show()
-    wait(10)  # until it is exposed: a panel that nobody can see shows nothing new
+    wait(10)  # until exposed: hidden panels aren't updated
     dock.front = True
     prepare(name, widget)
     for _ in range(8):
@@ -117,7 +117,7 @@ def shown_panel(
     dock = Dock(theme, panel, widget, density)  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, height)
-    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+    with qtbot.waitExposed(dock):  # hidden panels aren't updated
         dock.show()
     dock.front = True
     qtbot.waitUntil(dock.is_displayed)

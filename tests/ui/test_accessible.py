@@ -20,7 +20,7 @@ from tests.ui.fakes import Session as FakeSession
 from tests.ui.show_panels import SIZES, shown_panel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
-MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client is a painted widget of ours
+MEANINGLESS = {QAccessible.Role.NoRole, QAccessible.Role.Whitespace}  # Client: our painted widgets
 OVER = (
     "palette.open",
     "help.shortcuts",
@@ -141,7 +141,7 @@ def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands:
     assert turned == sorted(turned, key=lambda place: (place.x(), place.y()))
 
 
-# -- what is said by itself -----------------------------------------------------------------------
+# -- announcements --------------------------------------------------------------------------------
 
 
 @pytest.fixture

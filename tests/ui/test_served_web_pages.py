@@ -44,7 +44,7 @@ class Browser(QWebEnginePage):
 def browser(qtbot: QtBot) -> Iterator[Browser]:
     profile = QWebEngineProfile()
     page = Browser(profile, qtbot)
-    view = QWebEngineView()  # a hidden page doesn't ask for topics
+    view = QWebEngineView()  # a hidden page subscribes to no topics
     view.setPage(page)
     view.show()
     yield page
@@ -83,7 +83,7 @@ def test_test_page_shows_topics_and_publishes(browser: Browser, server: WebServe
     assert heard.listen(timeout_s=30)[0]
     assert server.pages[0].title == browser.title()
     browser.evaluate("window.isBeforeReload = true")
-    browser.triggerAction(QWebEnginePage.WebAction.Reload)  # without the token in its address
+    browser.triggerAction(QWebEnginePage.WebAction.Reload)  # the reloaded address contains no token
     browser.wait("!window.isBeforeReload && document.querySelectorAll('#topics li').length >= 2")
     assert browser.said == []
     server.set_access(Access(token="another-token-of-letters"))

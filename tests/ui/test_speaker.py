@@ -90,7 +90,7 @@ def test_slow_engine_does_not_block_the_caller_and_stop_cancels_pending_speech(
     engine.may_begin.clear()
     speaker.speak("Hello", "en", 0.5)
     speaker.play(((440.0, 0.1),), 0.5)
-    assert engine.begins.wait(20)  # the window goes on while it begins
+    assert engine.begins.wait(20)  # the caller isn't blocked while the engine starts
     assert speaker.is_busy
     speaker.stop()
     assert not speaker.is_busy

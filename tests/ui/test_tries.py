@@ -23,7 +23,7 @@ def session() -> fakes.Session:
 
 def tried(session: fakes.Session, stack: Stack) -> str:
     """Try a stack and return the title of the permission question, or "" if the stack ran without one."""
-    session.tick()  # takes over that robots have come
+    session.tick()  # registers the joined robots
     session.runs.try_stack(stack)
     question = session.fleet.permission.question
     if question is None:
@@ -36,7 +36,7 @@ def ends(session: fakes.Session) -> None:
     assert session.runner is not None
     session.runner.ends()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    session.runs.confirm_stopped()  # the robot of the test does not answer a stop
+    session.runs.confirm_stopped()  # the fake robot doesn't reply to a stop
 
 
 def test_permission_is_requested_once_before_a_tried_block_moves_a_real_robot(session: fakes.Session) -> None:
@@ -45,7 +45,7 @@ def test_permission_is_requested_once_before_a_tried_block_moves_a_real_robot(se
     assert tried(session, TURN) == "Allow Rover to move?"
     assert not session.runs.active
     session.fleet.permission.answer(let=True)
-    ends(session)  # the answer has begun what was tried
+    ends(session)  # the answer started the pending try
     assert tried(session, TURN) == ""
 
 

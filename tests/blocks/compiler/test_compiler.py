@@ -68,7 +68,7 @@ def picture() -> dict[str, object]:
 def test_generated_program_is_readable():
     program = compile_behaviour(picture(), [robot()], absent=[nao()], name="Greeting")
     imports, _, rest = program.source.partition("\n\n\n")
-    rest = rest.replace("lambda :", "lambda:")  # as Python 3.10 writes it
+    rest = rest.replace("lambda :", "lambda:")  # Python 3.10 writes `lambda :`
     assert imports.startswith("from app.blocks.commands import newest, on_message, on_start, ")
     assert (
         rest

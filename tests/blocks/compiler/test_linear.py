@@ -71,7 +71,7 @@ def strangers(count: int) -> Saved:
 @pytest.mark.parametrize("make", [scripts, variables, functions, strangers])
 def test_compile_time_is_linear_in_number_of_blocks(make: Callable[[int], Saved]) -> None:
     robots = (robot(),)
-    compile_behaviour(make(2), robots)  # what is made once is made
+    compile_behaviour(make(2), robots)  # warm-up: fills the caches
     few, many = (steps(partial(compile_behaviour, make(count), robots)) for count in (FEW, 4 * FEW))
     assert many < 5 * few
 

@@ -67,8 +67,8 @@ def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master)
         with nep.node("program", master=master.address) as node:
             network = Network(node, "program-1", [PEPPER])
             network.guard = PublishGuard(guarded_topics([PEPPER]), ["Pepper"])
-            network.publish("/Pepper/command", {})  # a person was asked
-            network.publish("/Rover/command", {"op": "alive"})  # it was not there yet
+            network.publish("/Pepper/command", {})  # allowed: Pepper has permission
+            network.publish("/Rover/command", {"op": "alive"})  # allowed: the guard doesn't know Rover yet
             network.guard.set_topics(guarded_topics([PEPPER, rover.described]))
             with pytest.raises(BehaviourError, match="publish on /Rover/command: this would move Rover"):
                 network.publish("/Rover/command", {"id": "1", "op": "invoke", "action": "turn", "input": {}})

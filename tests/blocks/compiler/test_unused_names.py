@@ -61,7 +61,7 @@ def test_number_never_set_is_reported():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.message, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")
-    fixed = fix(saved, problem.fix_action or "")  # nothing is started yet: it gets a script of its own
+    fixed = fix(saved, problem.fix_action or "")  # there is no start script, so the fix adds one
     assert fixed is not None
     assert compile_behaviour(fixed, []).problems == ()
     assert compile_behaviour(fixed, []).starts == 2

@@ -143,7 +143,7 @@ def test_stop_other_scripts_ends_other_scripts_and_cancels_robot_tasks():
 
 
 def test_stop_other_scripts_ends_script_not_yet_started():
-    for _ in range(20):  # whichever of the two gets the turn first, nothing of the other is left
+    for _ in range(20):  # the result must not depend on which script runs first
         run = play(
             workspace(
                 started(block("control_stop_others"), write(text("one"))),

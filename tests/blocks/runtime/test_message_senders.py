@@ -139,7 +139,7 @@ def test_forged_stop_reply_from_foreign_node_is_ignored(
     forged = evil.new_pub("/Pepper/answer", "robot/answer")
     forged.publish(answer("somebody's", "succeeded", "stop"))
     told = nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=forged._spec.id)
-    until(lambda: network._senders.node_of(told) == evil.id)  # the master has been asked
+    until(lambda: network._senders.node_of(told) == evil.id)  # wait for the master's reply
     pepper.slow = {"say"}
     call = network.invoke("Pepper", "say", {"text": "Hi"})
     until(lambda: call.state == "accepted")

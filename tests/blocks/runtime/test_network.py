@@ -98,7 +98,7 @@ def test_sensors_events_and_topics_are_received(network, pepper, node):
     until(lambda: network.sensor("Pepper", "battery") == 84 and events == [{"place": "head"}])
     assert network.sensor("Pepper", "pose") is None  # subscribed at first use
 
-    def told_again() -> bool:  # as a robot does, several times a second
+    def told_again() -> bool:  # robots publish sensors several times per second
         pepper.tell("pose", {"x": 1.0, "y": 2.0})
         return network.sensor("Pepper", "pose") == {"x": 1.0, "y": 2.0}
 
@@ -170,7 +170,7 @@ def test_rize_robot_receives_commands_in_rize_format(master, node):
         assert (command["node"], command["robots"], command["state"]) == ("action", "Rosie", "idle")
         assert command["primitives"]["primitive"] == "say"
         assert command["primitives"]["input"] == "hello"
-        assert network.stop_robots(0.05) == ()  # it can't answer, so nobody waits for it
+        assert network.stop_robots(0.05) == ()  # this robot can't confirm, so the stop doesn't wait for it
     finally:
         network.close()
         rosie.close()

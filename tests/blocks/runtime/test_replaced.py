@@ -49,7 +49,7 @@ def test_replaced_command_is_reported_at_its_block_and_script_continues(fight: F
     fight.link.answer(winner, "succeeded")
     play.end()
     (news,) = play.runtime.replacements.take_new()
-    assert news.block in {"t", "t2"}  # whichever script began first
+    assert news.block in {"t", "t2"}  # depends on which script starts first
     assert news.message == "“turn” was replaced by “turn”"
     assert news.count == 1
     assert fight.link.invoked[2] == ("Pepper", "say", {"text": "on"})
@@ -102,7 +102,7 @@ def test_restarted_event_script_does_not_replace_itself(fight: Fight) -> None:
     play = fight.begin({**hat, "next": {"block": turn("t")}})
     fight.link.happen(("Pepper", "touched"), {"place": "head", "down": True})
     for count in (1, 2):
-        fight.asked(count)  # touched again while it still turns
+        fight.asked(count)  # touched again during the turn
         fight.link.happen(("Pepper", "touched"), {"place": "head", "down": True})
         fight.link.answer(fight.link.calls[count - 1], "canceled")
     fight.asked(3)

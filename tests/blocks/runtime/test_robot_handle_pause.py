@@ -62,10 +62,10 @@ def test_driving_action_without_progress_feedback_is_not_resumed() -> None:
     ("name", "given", "feedback", "unknown"),
     [
         ("walk", {"distance": 1.0}, {"to_go": 0.4}, False),
-        ("walk", {"distance": 1.0}, {"to_go": 0.0}, False),  # it was done
+        ("walk", {"distance": 1.0}, {"to_go": 0.0}, False),  # already completed
         ("walk", {"distance": 1.0}, {}, True),
         ("walk", {"distance": 1.0}, {"to_go": True}, True),
-        ("wave", {"hand": "left"}, {}, False),  # it begins again
+        ("wave", {"hand": "left"}, {}, False),  # restarts from the beginning
     ],
 )
 def test_unknown_remainder_of_paused_action_is_detected(name, given, feedback, unknown) -> None:

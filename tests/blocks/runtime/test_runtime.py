@@ -62,7 +62,7 @@ def test_running_robot_action_is_described_until_done(running):
     other = block("robot_pepper_do_light", "l", ROBOT="Pepper", WHERE="eyes", COLOUR="#37b6ff")
     run = running(workspace(started(say(words) | {"id": "x"}), started(other)), link)
     until(lambda: len(link.calls) == 2)
-    # The other script's block is done meanwhile, and takes nothing away.
+    # The other script ends in the meantime and must not clear the status text.
     until(lambda: run.runtime.scheduler.snapshot().blocks == ("x",))
     assert run.runtime.status_text.text(["x"]) == "Pepper says “Touch my head.”"
     link.answer(link.calls[0], "succeeded")
@@ -176,7 +176,7 @@ def test_program_ends_when_another_program_stops_the_robot(running):
     assert len(link.calls) == 1
 
 
-# ---- what starts scripts
+# ---- event blocks
 
 
 def test_matching_event_starts_its_script_each_time(running):
@@ -229,7 +229,7 @@ def test_condition_starts_script_only_on_change_to_true(running):
         run.link.topics["/level"] = value
         until(lambda lines=lines: len(run.lines) == lines)
         seen = len(run.lines)
-        # two more looks at the condition, and nothing more has happened
+        # After more checks of the condition, the script must not have run again.
         waited = [0]
         run.runtime.scheduler.wake_scripts()
         until(lambda waited=waited: waited.__setitem__(0, waited[0] + 1) or waited[0] > 25)

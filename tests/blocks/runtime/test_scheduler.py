@@ -47,7 +47,7 @@ def stage():
 
 
 def test_scripts_take_turns_block_by_block(stage):
-    stage.scheduler.pause()  # so that all are there before one begins
+    stage.scheduler.pause()  # until both scripts wait at their first block
     stage.script("a", stage.steps("a1", "a2", "a3"))
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
     stage.script("b", stage.steps("b1", "b2", "b3"))
@@ -277,7 +277,7 @@ def test_slow_motion_ends_immediately_when_disabled(stage):
     stage.scheduler.pause()
     until(lambda: stage.scheduler.snapshot().is_paused)
     assert stage.did == []
-    stage.scheduler.step_once()  # a step does not wait for the rest of the minute
+    stage.scheduler.step_once()  # a step doesn't wait for the remaining delay of a minute
     until(lambda: stage.scheduler.snapshot().is_paused and stage.did == ["a1"])
     stage.scheduler.resume()
     stage.join()

@@ -93,7 +93,7 @@ def test_only_changed_variables_are_reported() -> None:
         ("id words", "[c, b]"),
         ("id inner", "[[1, 2]]"),
     ]
-    names["score"] = 1.0  # looks the same
+    names["score"] = 1.0  # the displayed text is unchanged
     assert watched.changes() == []
 
 

@@ -27,14 +27,14 @@ class Queued(FakeLink):
 
 
 def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.5)  # the limit: half a second
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.5)  # time limit of 0.5 s
     link = Queued()
     run = begin(link)
     until(lambda: bool(link.calls))
     said = lambda: run.runtime.status_text.text(("x",))  # noqa: E731
     until(lambda: said() == "Pepper is waiting for “look”")
     begun = time.monotonic()
-    until(lambda: time.monotonic() > begun + 0.7)  # longer than its limit, which has not begun
+    until(lambda: time.monotonic() > begun + 0.7)  # longer than the time limit, which hasn't started
     assert not run.runtime.finished.is_set()
     link.calls[0].has_started = True
     link.calls[0].state = "running"
@@ -50,7 +50,7 @@ def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
     run = begin(link, beat_s=0.05)
     until(lambda: bool(link.calls))
     heard_until = time.monotonic() + 0.8
-    while time.monotonic() < heard_until:  # it beats: nothing is wrong
+    while time.monotonic() < heard_until:  # heartbeats arrive, so there is no error
         link.calls[0].last_reply_s = time.monotonic()
         assert not run.runtime.finished.wait(0.02)
     run.end(3.0)
@@ -60,4 +60,4 @@ def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
         "x",
         "Pepper stopped responding. Start the virtual robot again.",
     )
-    assert link.canceled == link.calls  # should it wake up
+    assert link.canceled == link.calls  # in case the robot responds again

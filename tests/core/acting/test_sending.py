@@ -163,7 +163,7 @@ def test_late_repetition_skips_missed_sends_without_a_burst(bench, monkeypatch) 
     monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
     each = RepeatedMessage(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
     assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.1)
-    now[0] = 100.55  # 100.1 is due; those of 100.2 to 100.5 have gone by
+    now[0] = 100.55  # 100.1 is due; 100.2 to 100.5 were missed
     assert Outbox._schedule_next(each) == 4
     assert round(each.due_s, 6) == 100.6
     now[0] = 100.6

@@ -42,7 +42,7 @@ def test_backpack_is_restored_at_next_start_newest_first(tmp_path: Path) -> None
 def test_two_studios_share_backpack_without_loss(tmp_path: Path) -> None:
     one, other = Backpack(tmp_path), Backpack(tmp_path)
     one.add([WAIT])
-    other.add([SAY])  # has not looked since
+    other.add([SAY])  # not reloaded since the first change
     one.reload_if_changed()
     assert types(one) == types(other) == ["robot_pepper_do_say", "control_wait"]
     before = one.revision
@@ -118,7 +118,7 @@ def test_backpack_limits_reject_new_items_without_loss(
     again.reload_if_changed()
     assert types(again) == ["control_wait"] * 2
     monkeypatch.setattr(module, "MAX_STACKS", 1)
-    backpack.remove([backpack.items[0].id])  # less than it holds is always possible
+    backpack.remove([backpack.items[0].id])  # removing is allowed even above the limit
     assert len(backpack.items) == 1
 
 

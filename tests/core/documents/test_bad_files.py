@@ -67,7 +67,7 @@ def test_full_disk_keeps_old_file_and_unsaved_work(tmp_path: Path) -> None:
 
 def test_truncated_file_is_rejected_with_reason(tmp_path: Path) -> None:
     example = json.loads((resources.path("examples") / "1-greeting.nepb").read_bytes())
-    example["robots"] = {"Päpper": {"title": "long"}}  # a long one would be JSON like the rest
+    example["robots"] = {"Päpper": {"title": "long"}}  # short, because every prefix of the file is parsed
     whole = json.dumps(example, ensure_ascii=False).encode()
     assert parse_file(whole, Path("x.nepb")).name == "Greeting"
     for length in range(len(whole)):
@@ -91,7 +91,7 @@ def test_corrupted_file_opens_or_is_rejected_with_reason(tmp_path: Path) -> None
             document.open(path)
         except DocumentError:
             continue
-        document.program()  # whatever came through: problems, never a traceback
+        document.program()  # a file that opens may have problems, but must not raise an exception
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-32"])

@@ -377,7 +377,7 @@ def test_robot_description_is_parsed_once_until_it_changes(
     document.set_connected([])
     assert [robot.name for robot in document.absent_robots] == ["Pepper"]
     with monkeypatch.context() as patched:
-        patched.setattr("app.core.documents.document.parse", None)  # reading it now would fail
+        patched.setattr("app.core.documents.document.parse", None)  # a second parse would fail
         document.apply_edit({"blocks": {"blocks": [{**block, "x": 9}]}})
         assert [robot.name for robot in document.absent_robots] == ["Pepper"]
     document.robots["Pepper"] = {**pepper.source, "title": "Salt"}
@@ -389,7 +389,7 @@ def test_robot_description_is_parsed_once_until_it_changes(
     assert document.absent_robots == ()
     document.robots["Pepper"] = {"deep": deep}
     assert document.absent_robots == ()
-    while deep:  # from the outside: Python takes such a thing apart in levels, too
+    while deep:  # from the outside in, because deallocating nested dicts recurses, too
         deep = deep.popitem()[1]  # type: ignore[assignment]
 
 

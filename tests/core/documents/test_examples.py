@@ -134,7 +134,7 @@ def test_robot_speaks_spanish_in_translated_example(language: str) -> None:
                          indirect=["language"])  # fmt: skip
 def test_quiz_comparison_works_in_every_language(language: str, last: str) -> None:
     link = FakeLink()
-    link.sensors[("Pepper", "head_touched")] = True  # always yes
+    link.sensors[("Pepper", "head_touched")] = True  # always true
     play = run("4-a-quiz", link)
     play.end()
     assert play.runtime.error is None

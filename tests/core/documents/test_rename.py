@@ -80,7 +80,7 @@ def test_rename_never_overwrites_another_file(opened: Documents, tmp_path: Path)
     with pytest.raises(DocumentError, match="A file named “Quiz” already exists in "):
         opened.rename(document, "Quiz")
     with pytest.raises(DocumentError, match="can't rename "):
-        rename_file(tmp_path / "Greeting.nepb", other)  # one that came there just now
+        rename_file(tmp_path / "Greeting.nepb", other)  # a target that was created in the meantime
     assert other.read_bytes() == content
     assert document.path is not None
     assert document.path.exists()

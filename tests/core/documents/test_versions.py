@@ -158,7 +158,7 @@ def test_total_size_of_versions_is_limited(
     assert [each.copy.read_bytes()[-1:] for each in versions_of(path, folder)] == [b"3", b"2"]
 
 
-# ---- where they are --------------------------------------------------------------------------------
+# ---- storage location ------------------------------------------------------------------------------
 
 
 def test_versions_are_migrated_once_to_data_folder(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_workspace_text_is_kept_unchanged_and_parsed_once(parsed: list[str]) -> 
 def test_texts_are_compared_without_parsing(parsed: list[str]) -> None:
     text = json.dumps(ONE)
     one, same, other = WorkspaceJson(text), WorkspaceJson(text), WorkspaceJson("{}")
-    assert one.blocks  # the compiler has looked into it
+    assert one.blocks  # parses the text, as the compiler does
     del parsed[:]
     assert one.is_equal_to(same)
     assert not one.is_equal_to(other)

@@ -78,9 +78,9 @@ def test_call_rate_is_averaged_over_a_minute() -> None:
     assert rates.rates_hz() == {}
     rates.update(facts(calls=0), 0.0)
     assert rates.rates_hz() == {}
-    rates.update(facts(calls=5), 0.5)  # too early: adds nothing
+    rates.update(facts(calls=5), 0.5)  # interval too short: ignored
     for second in range(1, 121):
         rates.update(facts(calls=2 * second), float(second))
     assert rates.rates_hz() == {"s": 2.0}
-    rates.update(facts(calls=0), 121.0)  # another server, which has answered nothing
+    rates.update(facts(calls=0), 121.0)  # a restarted server, whose count starts at 0
     assert rates.rates_hz() == {}

@@ -157,7 +157,7 @@ def test_larger_text_enlarges_the_layout() -> None:
     assert overlapping(large) == []
 
 
-# -- the thread ----------------------------------------------------------------------------------------------
+# -- layout thread -------------------------------------------------------------------------------------------
 
 
 def test_layout_thread_processes_only_the_newest_graph() -> None:

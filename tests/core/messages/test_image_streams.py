@@ -205,7 +205,7 @@ def test_displayed_rate_equals_arrival_rate_when_painting_lags() -> None:
     arriving, shown = ImageRateMeter(), ImageRateMeter()
     for number in range(90):
         arriving.add(number / 30)
-        if number < 85:  # the newest wait for their turn
+        if number < 85:  # the newest images are still queued
             shown.add(number / 30)
     assert arriving.rate_hz(3.0) == shown.rate_hz(3.0)
 
@@ -228,7 +228,7 @@ def test_image_is_decoded_at_display_size_and_again_when_enlarged(images: Images
     stream.set_size(None)
     until(lambda: stream.picture is not None and stream.picture.is_full_resolution)
     assert stream.picture.seq == 1
-    stream.set_size((100, 80))  # the next one is smaller; this one is good enough
+    stream.set_size((100, 80))  # the next image is smaller; the current one is kept
     assert stream.picture.is_full_resolution
     images.offer([large(2)])
     until(lambda: stream.picture is not None and stream.picture.seq == 2)

@@ -41,7 +41,7 @@ def index(text: str) -> JsonIndex:
 def test_lazy_json_equals_full_decoding(value: object, indent: int | None, chunk: int) -> None:
     text = json.dumps([value], indent=indent, ensure_ascii=False)
     before = lazy_json.CHUNK_BYTES
-    lazy_json.CHUNK_BYTES = chunk  # texts and backslashes reach over the edges of chunks
+    lazy_json.CHUNK_BYTES = chunk  # texts and escapes cross the chunk boundaries
     try:
         found = index(text).root
     finally:

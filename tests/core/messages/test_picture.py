@@ -64,7 +64,7 @@ def test_small_view_gets_downscaled_image(kind: str) -> None:
     assert (picture.width, picture.height) == (640, 480)
     assert picture.bgra.shape == (120, 160, 4)
     assert not picture.is_full_resolution
-    assert picture.pixel(3, 3) is None  # nobody decoded it
+    assert picture.pixel(3, 3) is None  # full resolution wasn't decoded
     red = (200, 20, 10) if kind == "rgb8" else (10, 20, 200)
     assert np.abs(picture.bgra[60, 10, :3].astype(int) - red).max() < 6
     assert picture.bgra[60, 10, 3] == 255
@@ -132,7 +132,7 @@ def test_signed_and_float_values_are_scaled_for_display_and_kept_for_reading(val
     assert picture is not None
     assert picture.pixel(high[1], high[0]) == values[high]
     darkest, brightest = picture.bgra[low].tolist(), picture.bgra[high].tolist()
-    assert (darkest, brightest) == ([84, 1, 68, 255], [37, 231, 253, 255])  # the ends of its colours
+    assert (darkest, brightest) == ([84, 1, 68, 255], [37, 231, 253, 255])  # the ends of the colour scale
     for place in np.argwhere(~np.isfinite(values)):
         assert picture.bgra[tuple(place)].tolist() == [0, 0, 0, 255], "no number is black"
 
@@ -184,7 +184,7 @@ def test_oversized_image_is_rejected_without_allocating_memory() -> None:
 
 def test_header_with_huge_dimensions_is_rejected() -> None:
     jpeg = bytearray(cv2.imencode(".jpg", scene(8, 8))[1].tobytes())
-    at = jpeg.index(b"\xff\xc0") + 5  # height and width in the frame's head
+    at = jpeg.index(b"\xff\xc0") + 5  # height and width in the frame header
     jpeg[at : at + 4] = (65_000).to_bytes(2, "big") * 2
     for huge in (png_of_size(60_000), message(bytes(jpeg))):
         picture, error = decode(huge, 0.0)
@@ -242,7 +242,7 @@ SENT = (
 )
 @settings(max_examples=400, deadline=None)
 def test_arbitrary_data_is_decoded_or_rejected_with_error_message(data, extension, fit) -> None:
-    with patch.object(image_files, "MAX_PIXELS", 1_000_000):  # one byte makes 100 million: seconds
+    with patch.object(image_files, "MAX_PIXELS", 1_000_000):  # one byte can give 100 million pixels: slow
         look_at_a_picture(data, extension, fit)
 
 

@@ -86,7 +86,7 @@ def test_decoded_image_reports_its_appearance_and_colour_scale() -> None:
     assert shown is not None
     assert shown.scale is not None
     assert (shown.scale.low, shown.scale.high, shown.look) == (0.0, 255.0, look)
-    assert shown.pixel(1, 0) == 255  # the number, whatever its colour
+    assert shown.pixel(1, 0) == 255  # the value, regardless of its colour
     colours, _error = decode(message(np.zeros((2, 2, 3), np.uint8)), 0.0, None, PictureLook(brightness=1.0))
     assert colours is not None
     assert colours.scale is None

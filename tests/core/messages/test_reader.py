@@ -13,7 +13,7 @@ from app.core.messages.lazy_json import LazyObject
 from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult, read
 from nep.messages.message import Message
 
-WAIT_S = 30.0  # a busy computer may take long; the test ends as soon as it is there
+WAIT_S = 30.0  # for busy computers; the test ends as soon as the result arrives
 
 
 def message(data: bytes, codec: str = "json", seq: int = 1) -> Message:
@@ -121,6 +121,6 @@ def test_low_priority_reads_are_throttled_and_skipped_while_busy(reader: Message
     assert not reader.submit_throttled(message(b"[1]", seq=2), 10.9)
     assert reader.submit_throttled(message(b"[1]", seq=3), 11.0)
     assert taken(reader).message.seq == 3
-    reader.clear()  # another topic is shown
+    reader.clear()  # as when another topic is selected
     assert reader.submit_throttled(message(b"[1]", seq=4), 11.1)
     assert not reader.submit_throttled(message(b"[1]", seq=5), 11.1)

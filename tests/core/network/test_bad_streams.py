@@ -72,7 +72,7 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
         assert session.topics["/bad"].displayed_and_sent_counts == (
             MAX_MESSAGES_PER_TOPIC,
             sent,
-        )  # the ring was full, and yet
+        )  # although the ring buffer was full
 
 
 def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int) -> float:
@@ -98,7 +98,7 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
         topic = session.topics["/bad"]
 
         def all_told() -> bool:
-            publisher.publish_bytes(BAD)  # what was lost is known by what comes behind it
+            publisher.publish_bytes(BAD)  # a loss is detected by the next message that arrives
             session.traffic.count_lost(session.source.lost_counts(), time.monotonic())
             return topic.received + topic.missed >= sent
 
@@ -108,7 +108,7 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
         health = session._health._bad_topics["/bad"]
         assert alert.count == health.count
         assert health.count + health.unchecked_count == topic.received
-        assert bad_s < 3 * good_s  # a tick of the window takes hardly longer because of them
+        assert bad_s < 3 * good_s  # malformed messages hardly slow down a tick
 
 
 def test_topic_can_change_its_type(session: Session, talker: nep.Node) -> None:
@@ -206,7 +206,7 @@ def test_session_closes_during_a_message_flood(session: Session, master: Master)
             session, lambda: "/flood" in session.topics and session.topics["/flood"].dropped > 1000, 20
         )
         session.close()
-        assert flood.poll() is None  # it went on all the time
+        assert flood.poll() is None  # the publisher was still running
     finally:
         flood.kill()
         flood.communicate()

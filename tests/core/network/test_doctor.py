@@ -23,7 +23,7 @@ def test_doctor_runs_in_background_and_keeps_its_findings() -> None:
     doctor = Doctor(look, lambda: 7.0)
     assert (doctor.is_running, doctor.finished_s, doctor.findings) == (False, None, ())
     doctor.start()
-    doctor.start()  # it looks already
+    doctor.start()  # already running
     assert doctor.is_running
     go_on.set()
     doctor.close()

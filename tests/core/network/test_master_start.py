@@ -74,7 +74,7 @@ def the_one_started(address: str) -> None:
     told: list[str] = []
     start = MasterStarter(address, told.append)
     start.ensure()
-    start.ensure()  # one start at a time
+    start.ensure()  # must not start a second master
     eventually(lambda: start.has_started)
     assert start.first
     assert nep.is_running(address, 5)

@@ -107,7 +107,7 @@ def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make)
 
 def test_unsaved_remote_access_setting_is_applied_and_reported(world, make, tmp_path):
     reach, alerts = make()
-    (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
+    (tmp_path / "settings.json").mkdir()  # stands for a full disk: the settings can't be written
     for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
         reach.listen_on(hosts)
         world.answer(reach)
@@ -125,7 +125,7 @@ def test_unsaved_remote_access_setting_is_applied_and_reported(world, make, tmp_
 
 def test_remote_access_setting_is_not_sent_to_master_of_another_computer(make, world):
     near, _alerts = make()
-    near.listen_on(["192.168.1.20"])  # kept, for the master of this computer
+    near.listen_on(["192.168.1.20"])  # saved for the master of this computer
     world.answer(near)
     world.asked.clear()
     near.close()

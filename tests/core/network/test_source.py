@@ -74,9 +74,9 @@ def test_missed_messages_are_counted_from_start_of_watch(
         publisher.publish(1)
         until(lambda: source.lost_counts().get("/a") == 0, "nothing was lost")
         _, subscriber = source._subscribers["/a"]
-        subscriber._transport._readable.sources.lost += 5  # as libzmq does when nobody reads for long
+        subscriber._transport._readable.sources.lost += 5  # as after an overrun in libzmq
         assert source.lost_counts()["/a"] == 5
-        source.watch("/a")  # somebody looks anew
+        source.watch("/a")  # a new watch counts losses from zero
         assert source.lost_counts()["/a"] == 0
         source.unwatch("/a")
         until(lambda: "/a" not in source.lost_counts(), "nobody looks")

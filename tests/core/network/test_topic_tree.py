@@ -50,7 +50,7 @@ def test_folder_sums_known_stats_of_live_topics() -> None:
     unknown = tree["/c/*"].stats
     assert (unknown.rate_hz, unknown.bandwidth_Bps, unknown.age_s, unknown.lost) == (None,) * 4
     topics[0].rate_hz = 20.0
-    assert tree["/a/*"].stats.rate_hz == 15.5  # nothing is added up twice for one painting
+    assert tree["/a/*"].stats.rate_hz == 15.5  # stats are cached until the next repaint
     tree.invalidate_stats()
     assert tree["/a/*"].stats.rate_hz == 25.5
 

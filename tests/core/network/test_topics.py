@@ -259,7 +259,7 @@ def test_message_ages_are_corrected_by_clock_offset() -> None:
     far = replace(NODE, clock_offset_ns=-hour, clock_uncertainty_ns=5)
     seen = replace(view(info("/a")), nodes={"n1": far, "me": mine})
     topics.update(seen, 0)
-    # Its clock is three hours ahead of ours.
+    # The publisher's clock is three hours ahead of ours.
     topics.update_ages(0, 1_000_000_000 - 3 * hour + 500_000_000)
     assert topics["/a"].age_s == 0.5
     newest = message(1, stamp_ns=1_200_000_000)

@@ -86,7 +86,7 @@ def test_stats_of_many_topics_are_summed_twice_a_second_including_the_last_updat
         traffic.update_graph(view, number / 20)
         traffic.add({}, number / 20)
     went = sum(view.topics.times for view in views if isinstance(view.topics, Counted))
-    assert 4 <= went <= 6  # each time for what was lost and for the rates
+    assert 4 <= went <= 6  # each update takes one pass for losses and one for rates
     traffic.add({}, 2.0)
     assert traffic.messages_per_s == 2.0 * (MAX_TOPICS_PER_UPDATE + 1)
     assert traffic.lost_30s == 19 * (MAX_TOPICS_PER_UPDATE + 1)
@@ -94,7 +94,7 @@ def test_stats_of_many_topics_are_summed_twice_a_second_including_the_last_updat
 
 def test_only_recent_losses_are_counted() -> None:
     losses = RecentLosses()
-    assert losses.count(100, 0.0) == 0  # lost before we looked
+    assert losses.count(100, 0.0) == 0  # lost before the first count
     assert losses.count(103, 1.0) == 3
     assert losses.count(105, 20.0) == 5
     assert losses.count(105, 1.5 + WINDOW_S) == 2

@@ -72,7 +72,7 @@ def test_10_000_short_lived_topics_and_their_nodes_are_removed_without_alerts(
         quiet.tick()
         clocks.go_on(0.5)
         most = max(most, len(quiet.topics))
-    assert most <= 100 * (10 / 0.5 + 3)  # what vanished is shown for ten seconds, no longer
+    assert most <= 100 * (10 / 0.5 + 3)  # removed topics are shown for only ten seconds
     post(GraphReceived(graph(1000, {}, 0), 0.001))
     quiet.tick()
     for _ in range(4):

@@ -178,7 +178,7 @@ def test_watch_before_network_is_selected_takes_effect_later(world: World) -> No
     world.networks.watch("ros /a")
     world.networks.watch("ros /b")
     world.networks.unwatch("ros /b")
-    world.networks.add("ros /a", Batch([message()]), 0.0)  # of a network that was left
+    world.networks.add("ros /a", Batch([message()]), 0.0)  # from a network that isn't selected
     world.networks.select("ros", "")
     assert world.made[0].wanted == {"/a"}
     world.networks.add("ros /a", Batch([message(), message()], dropped=3), 1.0)

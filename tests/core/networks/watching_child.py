@@ -85,7 +85,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
     tick_until(session, lambda: topic(keys[0]).gone_s is not None)
     seen["gone"] = [topic(key).gone_s is not None for key in keys]
     if kind == "ros":
-        ends.close()  # kills the master
+        ends.close()  # also kills the master
         tick_until(session, lambda: network.state == "lost")
         seen["lost"] = network.sentence
     session.networks.deselect(kind)
@@ -95,7 +95,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
 
 if __name__ == "__main__":
     OtherSource.poll_interval_s = 0.1
-    networks.COUNT_INTERVAL_S, source.POLL_INTERVAL_S = 0.3, 0.5  # quicker than for a person
+    networks.COUNT_INTERVAL_S, source.POLL_INTERVAL_S = 0.3, 0.5  # shorter than in the window
     with tempfile.TemporaryDirectory() as made:
         sys.stdout.write(json.dumps(look(sys.argv[1], Path(made))))
     threads = [each.name for each in threading.enumerate() if each.name.startswith("studio-")]

@@ -115,7 +115,7 @@ def test_events_are_sent_only_while_recording(made):
     client.write_entry("runs", {"id": "3"})
     client.set_ring(RingChoice(Path("ring")))
     client.write_entry("runs", {"id": "3"}, "recording")
-    made.lines[0].is_full = True  # it is told again in a second: nothing is wrong
+    made.lines[0].is_full = True  # the event is sent again after a second, so this is no error
     client.write_entry("alarms", {"id": "4"})
     said = [(each["role"], each["value"]) for each in made.lines[0].orders if each["op"] == "say"]
     assert said == [("runs", {"id": "2"}), ("alarms", {"id": "4"})]
@@ -156,7 +156,7 @@ def test_dead_recorder_is_reported_and_replaced(made):
     assert made.alerts.active[0].detail == "killed"
     assert "Everything up to a second before that is saved" in made.told()["recorder:ended"][1]
     assert made.client.record(Path("b.mcap"))
-    made.client.on_event(RecorderEvent(1, {"event": "ended", "status": status()}))  # of the first one
+    made.client.on_event(RecorderEvent(1, {"event": "ended", "status": status()}))  # of the first process
     assert (len(made.lines), made.client.state.phase) == (2, "starting")
 
 
@@ -232,7 +232,7 @@ def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
         until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)
         assert client.save_last(tmp_path / "kept.mcap", 60.0, "it fell")
         until(lambda: not client.state.pending_saves)
-        client.close(30.0)  # as Studio's end: the recording is finished
+        client.close(30.0)  # as when Studio exits: the recording is finished
     assert not [each.title for each in client._alerts.active]
     with Recording(tmp_path / "a.mcap") as recording, Recording(tmp_path / "kept.mcap") as kept:
         assert recording.is_complete

@@ -130,7 +130,7 @@ def test_many_alarms_are_recorded_once_each_and_active_alarms_are_limited(told, 
     told.events.resend("recording")
     assert len(told.said) == 3
     told.events.on_alarm(event("off", "/4"))
-    assert len(told.said) == 3  # its end is not known, and nothing goes wrong
+    assert len(told.said) == 3  # not tracked above the limit, so its end isn't sent
 
 
 def test_session_sends_events_to_its_recorder(tmp_path, monkeypatch):

@@ -81,7 +81,7 @@ def test_topic_sizes_are_exact_and_part_size_is_proportional(look):
 
 def test_sizes_of_recording_without_statistics_are_sampled(tmp_path):
     path = tmp_path / "theirs.mcap"
-    with path.open("wb") as file:  # by another program: without figures
+    with path.open("wb") as file:  # by another program: without statistics
         writer = Writer(file)
         writer.start()
         channels = [writer.register_channel(topic, "json", 0) for topic in ("/few", "/many", "/none")]

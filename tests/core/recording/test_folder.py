@@ -53,7 +53,7 @@ def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
     assert found["fixed.mcap"].is_repaired
     assert "not an MCAP file" in found["none.mcap"].problem
     monkeypatch.setattr(folder_module, "read_info", pytest.fail)
-    assert {each.path.name: each for each in look(folder).files} == found  # nothing is opened again
+    assert {each.path.name: each for each in look(folder).files} == found  # no file is opened again
 
 
 def test_active_recording_is_not_opened_and_files_are_read_incrementally(folder, tmp_path, monkeypatch):

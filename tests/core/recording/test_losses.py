@@ -13,7 +13,7 @@ from nep.recordings.reader import Recording
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits
 
-PIECES, EACH = 128, 60  # with figures after each
+PIECES, EACH = 128, 60  # statistics follow each piece
 
 
 def numbers(gaps: dict[int, int]) -> Iterator[int]:
@@ -65,7 +65,7 @@ def test_few_losses_are_found_by_reading_a_small_part_of_the_file(tmp_path, read
     few = sum(read_bytes)
     assert 0 < few < path.stat().st_size // 4
     with Recording(path) as made:
-        made.is_complete = False  # then all of it is read
+        made.is_complete = False  # forces a full read
         assert losses_of(made) == found
     assert sum(read_bytes) - few > 3 * few
 
@@ -75,7 +75,7 @@ def test_late_messages_are_not_lost(tmp_path, is_complete) -> None:
     path = tmp_path / "a.mcap"
     order = [*range(200), 205, *range(206, 400), 200, 201, *range(400, 600), 603, *range(604, 800)]
     with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.0)) as writer:
-        for number in order:  # 200 to 204 are missing until 200 and 201 come; then 600 to 602
+        for number in order:  # 200 to 204 count as lost until 200 and 201 arrive; 600 to 602 stay lost
             writer.post([json_message(number, "/a")])
             assert writer.flush()
     with Recording(path) as made:

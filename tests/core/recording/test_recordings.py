@@ -182,7 +182,7 @@ def test_alarm_is_notified_of_the_reason_for_not_saving(made):
     assert told == [(False, "nothing saved: the flight recorder is off")]
     made.recordings.set_ring_settings(RingSettings(is_on=True))
     made.say("ring")
-    for _each in range(3):  # within one second: three names
+    for _each in range(3):  # three file names within one second
         made.recordings.save_for_alarm(*alarm(), done)
     paths = [order["path"] for order in made.lines[0].orders if order["op"] == "keep"]
     assert len(set(paths)) == 3

@@ -185,7 +185,7 @@ def test_loop_start_and_end_are_set_at_the_playhead(shown, whole):
     replay.set_loop_edge(is_start=False)
     shown.tick()
     assert replay.player.loop == (whole[20][0], whole[40][0])
-    replay.loop(whole[30][0], whole[30][0])  # no length
+    replay.loop(whole[30][0], whole[30][0])  # an empty range is ignored
     shown.tick()
     assert replay.player.loop == (whole[20][0], whole[40][0])
     replay.toggle_loop()

@@ -100,7 +100,7 @@ def some(whole, *topics: str, begin: int = 0, end: int = COUNT):
 
 def test_selected_topics_are_sent_completely_and_panels_receive_watched_topics(played, whole):
     sender = played("/a", "/camera", watched="/b")
-    assert sender.taken() == []  # what a panel shows at the beginning is not sent
+    assert sender.taken() == []  # messages read for the initial display aren't sent
     sender.do(Playback.play)
     sender.pass_time(2.0)
     assert sender.taken() == some(whole, "/a", "/camera")
@@ -147,7 +147,7 @@ def test_late_replay_sends_no_burst_and_follows_replay_speed(played):
     sender.do(Playback.play)
     sender.pass_time(0.1)
     sender.taken(), sender.late.clear()
-    sender.clock.now += 20.0  # a computer that slept
+    sender.clock.now += 20.0  # as after the computer was suspended
     sender.source.process()
     assert max(sender.late) > MAX_DELAY_S
     assert 0 < sum(late <= MAX_DELAY_S for late in sender.late) <= round(MAX_DELAY_S / 0.01) + 1
@@ -232,7 +232,7 @@ def test_outbox_sends_only_allowed_messages_and_counts_skipped_messages():
     (sent,) = outbox.active_topics
     messages = [json_message(1, "/a"), json_message(2, "/b"), json_message(3, "/a")]
     outbox.offer(messages, [0.0] * 3)
-    assert (sent.count, sent.dropped_count) == (0, 0)  # its publisher is not there yet: nothing has begun
+    assert (sent.count, sent.dropped_count) == (0, 0)  # nothing is counted before the publisher exists
     jobs.pop()(node)
     outbox.offer(messages, [0.0, 0.0, MAX_DELAY_S + 0.01])
     assert (sent.count, sent.dropped_count, sent.subscriber_count) == (1, 1, 2)
@@ -249,7 +249,7 @@ def test_outbox_sends_only_allowed_messages_and_counts_skipped_messages():
     outbox.offer(messages, [0.0] * 3)
     arming.arm()
     arming.allow(Target("topic", "/test"))
-    outbox.offer(messages, [0.0] * 3)  # another turn: what a person ended stays so
+    outbox.offer(messages, [0.0] * 3)  # arming again doesn't resume sending that has ended
     assert sent.count == 2
     assert outbox.stop("/a") is sent
     assert outbox.stop("/a") is None
@@ -263,7 +263,7 @@ def test_outbox_sends_only_allowed_messages_and_counts_skipped_messages():
 def open_and_know(session: Session, path: Path):
     replay = session.open_recording(path)
     tick_until(session, lambda: replay.opened is not None)
-    session.tick()  # another source shows: what was armed before has ended
+    session.tick()  # the source has changed, which disarms
     sending = replay.sending
     assert sending is not None
     sending.analyze()
@@ -302,7 +302,7 @@ def test_replayed_topic_is_received_under_its_new_name_until_stop(
         left = iter([(m.msg_type, bytes(m.data)) for m in expected])
         came = [(m.msg_type, bytes(m.data)) for m in heard_of(heard)]
         assert came
-        assert all(each in left for each in came)  # in their order; a computer that is slow leaves some out
+        assert all(each in left for each in came)  # in order; a slow computer may skip some
         assert not [m for m in heard if m.topic in ("/a", "/b")]
         session.runs.stop()
         assert not acting.arming.is_on
@@ -334,7 +334,7 @@ def test_motion_commands_need_confirmation_even_under_another_name(session: Sess
     assert [sent.route.name for sent in sending.outbox.active_topics] == ["/a", "/arm/command"]
     assert acting.question is None
     session.tick()
-    assert acting.question is None  # the one that was not wanted is not asked for again
+    assert acting.question is None  # the denied question isn't repeated
     acting.forbid(Target("topic", "/a"))
     session.tick()
     assert [sent.route.name for sent in sending.outbox.active_topics] == ["/arm/command"]
@@ -342,7 +342,7 @@ def test_motion_commands_need_confirmation_even_under_another_name(session: Sess
         sending.select("/a", None), sending.select("/a", f"/x{place}")
     assert len(sending.routes) == 3
     assert sending.arm() == ""
-    assert acting.question is not None  # of what was chosen and not wanted before
+    assert acting.question is not None  # arming again repeats the denied question
     session.return_to_live()
     assert not acting.arming.is_on
     assert sending.outbox.active_topics == ()

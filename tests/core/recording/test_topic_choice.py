@@ -73,7 +73,7 @@ def test_recording_choice_and_flight_recorder_settings_round_trip():
         ((1.0, 1e-6), (10.0, 100.0, 100.0), (19.0, 1000.0)),
         ((None, 1.0), (10.0, 100.0, 0.0), None),
         ((1.0, 1.0), (10.0, 100.0, 0.0), (60.0, 100.0)),
-        ((0.1, None), (10.0, 100.0, 10.0), (10.0, 100.0)),  # it is about to end
+        ((0.1, None), (10.0, 100.0, 10.0), (10.0, 100.0)),  # almost finished
     ],
 )
 def test_final_recording_duration_and_size_are_estimated(ends, so_far, end):

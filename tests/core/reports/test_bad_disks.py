@@ -99,5 +99,5 @@ BEFORE = (
 
 def test_read_only_disk_is_logged_once_and_not_reported_as_crash(disk: SmallDisk) -> None:
     told = disk.run(READ_ONLY, BEFORE.format(disk.folder))
-    # the mark and the report of before stay, as nothing can be taken away: neither is told at each start
+    # The run mark and the old report can't be deleted; neither is reported at each start.
     assert told == {"noted": False, "left": 0, "lines": 1, "new": 0, "all": 1}

@@ -130,7 +130,7 @@ def test_only_crash_log_records_become_reports(reports: CrashReports) -> None:
         log.error("another crashed", extra=crash_extra("robot", "by signal 6"))
     finally:
         log.removeHandler(handler)
-    # of what comes again and again: the first, and the tenth
+    # Only the first and the tenth of repeated crashes are reported.
     assert sorted(each.part for each in reports.all()) == ["behaviour", "behaviour", "robot"]
 
 

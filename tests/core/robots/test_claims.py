@@ -98,7 +98,7 @@ class Studio:
         self._link = the_link(self.session, described.name)
         assert self.link.identity.node_id == node_id
         self._before = (self.link.robot, self.link.identity)
-        self.until(lambda: _subscribers(self.session, "/Pepper/answer") == 2)  # also the stop's
+        self.until(lambda: _subscribers(self.session, "/Pepper/answer") == 2)  # also the stopper's
 
     def invoke(self, action: str, input: Mapping[str, object]) -> Invocation:
         return self.session.fleet.invoke("Pepper", action, input)
@@ -215,21 +215,21 @@ def test_new_program_with_name_of_a_moving_robot_does_not_confirm_its_stop(
     link = the_link(session)
     session.document.apply_edit(workspace(started(block("control_wait", SECONDS=number(600)))))
     session.runs.run()
-    session.fleet.moved.record_command(["Pepper"], "behaviour")  # as if the program had used it
+    session.fleet.moved.record_command(["Pepper"], "behaviour")  # as if the program had sent a command
     before = link.identity
     pepper._node.close()
     thief = WireRobot(master.address)
     try:
         tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-        # the second that it has for its answer is not to go by while the new connection is made
+        # connect first, because the robot has only one second to reply
         tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
         assert session.runs.view().title == "Pepper (“Pepper”) didn't reply"
         assert thief.heard("stop")
         session.runs.confirm_stopped()
-        session.tick()  # 33 ms later nobody waits for the old one any more
+        session.tick()  # the next tick no longer waits for the old program
         stop_is_proven(session)
     finally:
         thief.close()
@@ -249,7 +249,7 @@ def test_new_program_does_not_confirm_stop_of_a_robot_moved_by_hand(
     try:
         tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-        # the second that it has for its answer is not to go by while the new connection is made
+        # connect first, because the robot has only one second to reply
         tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
@@ -288,13 +288,13 @@ def test_changed_description_redirects_commands_to_the_new_topic(session: Sessio
     tick_until(session, lambda: any(command["op"] == "invoke" for command in new))
     assert not any(command["op"] == "invoke" for command in old)
     tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
-    session.runs.stop()  # goes to both
+    session.runs.stop()  # sent to both topics
     tick_until(session, lambda: any(command["op"] == "stop" for command in old))
     tick_until(session, lambda: any(command["op"] == "stop" for command in new))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
 
 
-# ---- the tables have bounds ----------------------------------------------------------------------------
+# ---- limits of the tables ------------------------------------------------------------------------------
 
 
 def _view(topics: Mapping[str, int]) -> GraphView:
@@ -362,11 +362,11 @@ def test_invalid_description_of_one_program_does_not_block_the_next() -> None:
     opened: list[str] = []
     announcements = Announcements(Watches(opened.append, opened.remove), Senders())
     announcements.update(_two_programs("first"))
-    payload = json.dumps(described("Turtle")).encode()  # on the topic of Pepper
+    payload = json.dumps(described("Turtle")).encode()  # another robot, on the topic of Pepper
     wrong = nep.Message("/Pepper/description", payload, "json", DESCRIPTION_TYPE, publisher=1)
     announcements.add({"/Pepper/description": Batch([wrong])})
     assert "/Pepper/description" in announcements.claims
-    announcements.update(_two_programs("second"))  # it has said nothing yet
+    announcements.update(_two_programs("second"))  # the second program has published nothing yet
     assert not announcements.claims
 
 
@@ -415,7 +415,7 @@ def test_parsing_repeated_descriptions_uses_at_most_a_fifth_of_main_thread_time(
         announcements._topics[topic].parsed_message = newest
         clock.now += 0.5
 
-    announcements._parse = parse  # the real one takes as long as the machine likes
+    announcements._parse = parse  # with a fixed duration, unlike the real parser
     for tick in range(1000):
         again = nep.Message("/Again/description", b"x", "json", DESCRIPTION_TYPE, publisher=2)
         announcements.add({"/Again/description": Batch([again])})
@@ -438,5 +438,5 @@ def test_reused_publisher_id_is_not_trusted() -> None:
     )
     assert senders.node_of(message) == "n"
     senders.update(GraphView(1, 3, {"thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"])
-    assert senders.node_of(message) == "thief"  # it is the only one that there is
+    assert senders.node_of(message) == "thief"  # the only program left
     assert senders.node_of(nep.Message("/x", b"{}", "json", "json")) is None

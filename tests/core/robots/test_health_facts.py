@@ -166,7 +166,7 @@ def test_silent_camera_is_an_error(case: Case) -> None:
 
 def test_silent_periodic_sensors_are_a_warning(case: Case) -> None:
     case.topics["/Pepper/distance"].silent_s = 8.0
-    case.topics["/Pepper/heard_word"].silent_s = 8.0  # tells only when there is something
+    case.topics["/Pepper/heard_word"].silent_s = 8.0  # publishes only when there is an event
     assert case.says("Sensors") == ("warn", "distance silent for 8 s")
     case.topics["/Pepper/sees_ball"].silent_s = 9.0
     assert case.says("Sensors") == ("warn", "distance and 1 more silent for 9 s")

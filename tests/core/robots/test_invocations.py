@@ -84,7 +84,7 @@ def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
     assert made.is_running
     bench.pass_time(0.2)
     assert (made.state, made.error) == ("failed", "Turtle isn't responding. Check that it is switched on.")
-    assert bench.sent[-1]["op"] == "cancel"  # should it wake up
+    assert bench.sent[-1]["op"] == "cancel"  # in case the robot responds again
     assert (bench.link.state, bench.link.chip_text) == ("silent", "virtual, not responding")
     bench.tries.apply_reply(bench.link, {"op": "alive", "id": ""})
     assert bench.link.state == "ready"
@@ -95,7 +95,7 @@ def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
     bench.answer(made, "accepted")
     bench.answer(made, "running")
     for _ in range(20):
-        bench.pass_time(0.5, alive=True)  # it lives, and goes on
+        bench.pass_time(0.5, alive=True)  # heartbeats arrive and the action continues
     assert made.is_running
     bench.pass_time(2.1)
     assert made.state == "failed"
@@ -111,12 +111,12 @@ def test_trial_on_robot_without_heartbeat_waits_until_the_time_limit(bench) -> N
     bench.pass_time(59.0)
     assert made.is_running
     bench.pass_time(1.0 + GRACE_S / 2)
-    assert made.is_running  # the robot may say so itself
+    assert made.is_running  # grace period in which the robot may report the timeout itself
     bench.pass_time(GRACE_S)
     assert (made.state, made.error) == ("failed", "move took longer than 60 s")
     assert bench.sent[-1]["op"] == "cancel"
     bench.answer(made, "succeeded")
-    assert made.state == "failed"  # what comes later changes nothing
+    assert made.state == "failed"  # late replies are ignored
 
 
 def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
@@ -176,7 +176,7 @@ def test_two_trials_of_one_action_both_end(bench) -> None:
     bench.answer(second, "accepted", replaces=["move"])
     bench.answer(first, "canceled", error="replaced by move")
     assert (first.state, second.state) == ("canceled", "accepted")
-    assert bench.rested == []  # the second one still keeps the robot awake
+    assert bench.rested == []  # the second trial keeps the robot awake
     bench.answer(second, "succeeded")
     assert bench.rested == ["Turtle"]
 

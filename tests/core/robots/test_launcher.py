@@ -60,7 +60,7 @@ def test_missing_virtual_robot_is_started_at_once(world: World) -> None:
     assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
     world.processes[0].die(b"", 1)
     world.after(0.1)
-    assert len(world.started) == 1  # that it ended is another matter: it is told, not started again
+    assert len(world.started) == 1  # its exit is reported, but doesn't start another
 
 
 def test_virtual_robot_is_started_after_the_existing_robot_has_ended(world: World) -> None:
@@ -137,7 +137,7 @@ def test_second_studio_uses_the_running_pepper(master: Master, tmp_path: Path) -
         )
         second.start()
         try:
-            second.launcher.start_virtual_robot()  # in its first moment: it knows nobody yet
+            second.launcher.start_virtual_robot()  # before the first graph, when no robot is known
             assert second.graph is None
             tick_until(second, lambda: second.fleet.connected)
             assert second.launcher._robots == {}
@@ -151,7 +151,7 @@ def test_running_robots_are_known_after_the_first_graph() -> None:
     fleet.update(GraphView(1, 1))
     assert fleet.is_present("Pepper") is False
     fleet.update(GraphView(1, 2, topics={"/Pepper/description": _described()}))
-    assert fleet.is_present("Pepper") is True  # it has not told yet what it can do, but it will
+    assert fleet.is_present("Pepper") is True  # announced, although its description hasn't arrived yet
     assert fleet.is_present("Turtle") is False
     fleet.update(GraphView(1, 3))
     assert fleet.is_present("Pepper") is False

@@ -99,7 +99,7 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     assert permission.question.title == "Allow Rover to move?"
     permission.answer(let=True)
     assert gate.is_permitted(TOPIC)
-    robots.come(rover)  # its description was read: the yes was for whoever had this name
+    robots.come(rover)  # now described: it needs a permission of its own
     assert not gate.is_permitted(TOPIC)
     robots.come()
     assert not gate.request_permission("/Fido/go", lambda: None, "robot/command")
@@ -118,7 +118,7 @@ def test_shelf_message_needs_permission_and_repetition_ends_when_a_real_robot_co
     tick_until(session, lambda: acting.outbox.repeated_messages)
     with real_robot(session, master.address) as told:
         tick_until(session, lambda: not acting.outbox.repeated_messages)
-        if acting.question is None:  # its thread saw the robot before the window did
+        if acting.question is None:  # the sender's thread saw the robot before the window did
             assert acting.send(ORDER) == ""
         acting.answer(let=True)
         assert acting.send(ORDER) == ""
@@ -126,14 +126,14 @@ def test_shelf_message_needs_permission_and_repetition_ends_when_a_real_robot_co
         session.tick()
         assert moved == []
         before = len(told)
-        assert before <= 1  # what was on its way when the robot subscribed
+        assert before <= 1  # a message in flight when the robot subscribed
         permission.answer(let=True)
         tick_until(session, lambda: len(told) == before + 1)
         assert moved == [(("Rover",), "shelf")]
         permission.revoke_all()
         acting.outbox.send(
             SendOrder("a", "Go", TOPIC, "json", lambda: {"op": "invoke"})
-        )  # as if it had waited for the network
+        )  # as if queued before the permission was revoked
         tick_until(session, lambda: acting.last["a"].kind == "failed")
         assert "which isn't allowed" in acting.last["a"].message
         assert len(told) == before + 1

@@ -50,12 +50,12 @@ def test_granted_permission_continues_once_and_lasts_for_the_session(rover) -> N
     moving, done = MotionPermission(), []
     moving.request_permission([(rover, ["move"])], lambda: done.append(1))
     moving.answer(let=True)
-    moving.answer(let=True)  # a second press
+    moving.answer(let=True)  # a second click
     assert done == [1]
     assert moving.request_permission([(rover, ["turn"])], pytest.fail)
     other = replace(rover, name="Other")
-    assert not moving.request_permission([(other, ["turn"])], lambda: None)  # each robot for itself
-    assert not MotionPermission().request_permission([(rover, ["move"])], lambda: None)  # and each session
+    assert not moving.request_permission([(other, ["turn"])], lambda: None)  # permission is per robot
+    assert not MotionPermission().request_permission([(rover, ["move"])], lambda: None)  # and per session
 
 
 def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None:
@@ -66,7 +66,7 @@ def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None
     assert not moving.request_permission([(rover, ["move"])], pytest.fail)
     moving.withdraw()
     assert moving.question is None
-    moving.answer(let=True)  # the question has gone: this answers nothing
+    moving.answer(let=True)  # no question is open, so the answer is ignored
     assert not moving.is_allowed(rover)
 
 

@@ -54,7 +54,7 @@ def test_final_reply_ends_only_its_own_motion(ledger: Ledger) -> None:
 
 
 def test_final_reply_does_not_end_continuous_motion(ledger: Ledger) -> None:
-    ledger.record_command(["Pepper"], "form")  # a speed: no id
+    ledger.record_command(["Pepper"], "form")  # velocity commands have no id
     ledger.end_motion("Pepper", "")
     assert "Pepper" in ledger
 

@@ -24,9 +24,9 @@ from tests.blocks.samples import block, number, started, workspace
 from tests.core.run.test_runner import Heard
 
 pytestmark = pytest.mark.timeout(240)
-WAY_M = 0.7  # somebody stands 0.9 m ahead
+WAY_M = 0.7  # a person stands 0.9 m ahead
 LONG_S = 30.0
-HELD_S = 1.6  # longer than the robot's patience with a program that says nothing (1 s)
+HELD_S = 1.6  # longer than the robot's watchdog timeout (1 s)
 
 
 class Pose:
@@ -102,7 +102,7 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
         pose.until_still()
         before = pose.far()
         assert before < WAY_M - 0.05, "it stands still before it has arrived"
-        threading.Event().wait(HELD_S)  # what must not happen here is a movement
+        threading.Event().wait(HELD_S)  # the robot must not move during this time
         assert pose.far() == pytest.approx(before, abs=0.002), "it stands still"
         runner.resume()
         ended = heard.until("ended")

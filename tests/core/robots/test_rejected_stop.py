@@ -89,7 +89,7 @@ def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
     assert any("the brake does not answer" in record.text for record in session.console.records)
     arm.body.stuck = False  # type: ignore[attr-defined]
     session.runs.stop()
-    assert session.runs.view().title == "Stopping"  # at once: it was not "Ready" before
+    assert session.runs.view().title == "Stopping"  # at once, without “Ready” in between
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert link.chip_text.removeprefix("virtual, ") == "ready"
     assert not session.alerts.has("stop")
@@ -225,7 +225,7 @@ def test_later_stop_includes_robots_that_did_not_reply_to_an_earlier_stop(
     tick_until(patient, lambda: link.state == "ready", LONG_S)
 
 
-# ---- what a robot says later, and of itself ------------------------------------------------------------
+# ---- late and unsolicited replies ----------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -254,7 +254,7 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     tick_until(session, lambda: session.alerts.has("moving:Pepper"))
     pepper._say = say_  # type: ignore[method-assign]
     lives(pepper)
-    tick_until(session, lambda: session.runs.view().state == "proven")  # it was asked again
+    tick_until(session, lambda: session.runs.view().state == "proven")  # Stop was sent again
     stop_ids = {each["id"] for each in pepper.heard("stop")}  # a stop is repeated until it is answered
     assert len(stop_ids) == 2
     assert link.state == "ready"
@@ -268,7 +268,7 @@ def test_stop_is_repeated_only_once_for_a_robot_whose_stop_is_always_late(
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", SAID)  # type: ignore[method-assign]
     session.runs.stop()
-    for stops in (1, 2, 2, 2):  # it is late, says so, and ends at last
+    for stops in (1, 2, 2, 2):  # replies late, reports the stop as not ended, then ends
         tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
         lives(pepper, "the stop function")
         tick_until(session, lambda: link.unended_actions, LONG_S)
@@ -279,7 +279,7 @@ def test_stop_is_repeated_only_once_for_a_robot_whose_stop_is_always_late(
         tick_until(session, lambda: not link.unended_actions, LONG_S)
         session.tick()
     assert (link.state, session.runs.view().confirm_label) == ("not stopped", "Pepper isn't moving")
-    session.runs.stop()  # a person asks: it is given another chance
+    session.runs.stop()  # Stop by a person gives the robot another chance
     tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
 

@@ -50,7 +50,7 @@ def test_counts_are_read_only_from_heartbeats_of_the_robot_program(lab: Simulate
     def send_alive(node: SimulatedNode = pepper.node, **counts: object) -> None:
         alive = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": [], "error": None}
         publisher = node.new_pub("/Pepper/answer", "robot/answer")
-        lab.advance(GRAPH_POLL_S)  # its publisher is listed and connected
+        lab.advance(GRAPH_POLL_S)  # until the publisher is listed and connected
         publisher.publish({**alive, **counts})
         lab.settle()
 

@@ -28,7 +28,7 @@ from tests.core.waiting import tick_until
 
 ROOT = Path(__file__).parents[3]
 FOUND_S = 60.0
-SAID_S = 60.0  # silence is noticed after 2 s; the rest is for a machine with much to do
+SAID_S = 60.0  # silence is detected after 2 s; the rest is for busy computers
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes are frozen by signals of POSIX")
 
@@ -84,7 +84,7 @@ def runs(session: Session, turtles: Turtles) -> None:
         answers = node.new_sub("/Turtle/answer", "robot/answer")
         session.runs.run()
         tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
-        tick_until(session, lambda: answers.listen()[0])  # one that never did "does not answer"
+        tick_until(session, lambda: answers.listen()[0])  # without a first reply, the error message differs
     moving = lambda: "turns 360" in session.runs.view().detail  # noqa: E731
     tick_until(session, moving)
 
@@ -110,7 +110,7 @@ def test_robot_killed_during_an_action_is_reported(session: Session, turtles: Tu
     runs(session, turtles)
     process.kill()
     says_so_at_the_block(session)
-    # a virtual robot is its program: when that has ended there is nothing to switch off
+    # A virtual robot is only a process: once it has ended, there is nothing to switch off.
     tick_until(session, lambda: session.runs.view().state == "ready", SAID_S)
     tick_until(session, lambda: not session.fleet.connected, FOUND_S)
     turtles.start()
@@ -124,20 +124,20 @@ def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles
     process.send_signal(signal.SIGSTOP)
     says_so_at_the_block(session)
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
-    tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
+    tried = session.fleet.invoke("Turtle", "light", {})  # an action from the panel fails, too
     tick_until(session, lambda: not tried.is_running, SAID_S)
-    told = ("not responding", "disconnected", "can't be reached")  # as soon as the master knows, it is away
+    told = ("not responding", "disconnected", "can't be reached")  # depends on when the master notices
     assert any(words in (tried.error or "") for words in told)
     if link.is_connected:
         assert link.chip_text == "virtual, not responding"
     process.send_signal(signal.SIGCONT)
     tick_until(session, lambda: there(session).state == "ready", FOUND_S)
-    with session.fleet.watch_sensors("Turtle"):  # what it was doing does not go on: it was told to stop
+    with session.fleet.watch_sensors("Turtle"):  # the robot was stopped, so its action isn't resumed
         tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
     well_again(session, turtles)
 
 
-# ---- a robot that lies -----------------------------------------------------------------------------
+# ---- robot that sends wrong replies ----------------------------------------------------------------
 
 
 class Liar:
@@ -192,7 +192,7 @@ def test_duplicate_and_foreign_replies_are_ignored(session: Session, liar: Liar,
     tick_until(session, lambda: not tried.is_running)
     again = session.fleet.invoke("Turtle", "light", {})
     liar.say(again, "succeeded")
-    tick_until(session, lambda: again.state == "succeeded")  # so the second answer has been read
+    tick_until(session, lambda: again.state == "succeeded")  # in order, so the earlier replies were read
     assert (tried.state, tried.error, tried.output) == ("succeeded", None, {"moved": 0.5})
 
 

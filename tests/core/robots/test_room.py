@@ -83,7 +83,7 @@ def test_room_is_restored_at_next_start(studio: Studio, tmp_path: Path) -> None:
     studio.room.move("table", 0.5, 0.5, {})
     studio.room.add("person", 1.5, 1.5)
     studio.later(SAVE_DELAY_S / 2)
-    assert Studio(tmp_path).room.room == Room()  # not with every step of a drag
+    assert Studio(tmp_path).room.room == Room()  # saving is debounced during a drag
     studio.later(SAVE_DELAY_S)
     studio.later(SAVE_DELAY_S)
     again = Studio(tmp_path)
@@ -111,7 +111,7 @@ def test_furniture_and_people_cannot_be_placed_on_a_robot(studio: Studio) -> Non
     assert not studio.room.move("Aiko", 0.1, 0.1, robots)
     assert studio.room.room == before
     assert studio.room.move("table", 1.5, 1.5, robots)
-    assert studio.room.move("ball", 0.1, 0.1, robots)  # it rolls away
+    assert studio.room.move("ball", 0.1, 0.1, robots)  # a ball rolls away from the robot
 
 
 @pytest.mark.parametrize("kept", [None, [], {"things": 3}, {"things": [{"name": "ball"}]}])

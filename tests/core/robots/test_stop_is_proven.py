@@ -22,7 +22,7 @@ from tests.blocks.wire_robot import WireRobot
 
 pytestmark = pytest.mark.usefixtures("patient")
 LONG_S = 30.0
-SHORT_S = 1.5  # long enough for the others to answer on a busy computer
+SHORT_S = 1.5  # long enough for the other robots to reply on a busy computer
 
 
 @pytest.fixture
@@ -204,7 +204,7 @@ def test_failed_connection_is_named_and_does_not_affect_other_robots(master, bro
         report = stopper.stop_all(timeout_s=LONG_S)
         assert (report.is_confirmed, report.unconfirmed_names) == (False, ("Pepper",))
         assert report.robots[0].message.startswith("Stop can't be sent to Pepper: ")
-        assert broken.tried == 2  # once more at the stop
+        assert broken.tried == 2  # retried once at the stop
     finally:
         stopper.close()
         turtle.close()

@@ -59,20 +59,18 @@ class StopModel(RuleBasedStateMachine):
         self.bridge = SimulatedBridge(self.network)
         self.told: dict[
             SimulatedRobot, dict[str, int]
-        ] = {}  # ids of commands that moved it -> when it was sent
-        self.press = self.press_of_all = 0  # the newest Stop, and the newest of all robots
-        self.pressed_at = 0  # how many messages had been sent then
-        self.stops: dict[
-            str, tuple[int, int]
-        ] = {}  # id of a stop -> the press that it belongs to, when it was sent
-        self.answered: dict[int, set[str]] = defaultdict(set)  # press -> robots whose answer reached Studio
+        ] = {}  # ids of motion commands -> index in network.sent
+        self.press = self.press_of_all = 0  # the newest Stop, and the newest Stop for all robots
+        self.pressed_at = 0  # number of messages sent before that Stop
+        self.stops: dict[str, tuple[int, int]] = {}  # id of a stop -> its press, index in network.sent
+        self.answered: dict[int, set[str]] = defaultdict(set)  # press -> robots whose reply reached Studio
         self.pressed_s = 0.0
         self.undisturbed: set[str] = set()  # robots that were reachable ever since Stop was pressed
         self._read_sent = self._read_delivered = 0
         self._seen_report: object = None
         lab.before_delivery, lab.after_step = self._follow_network, self._check
 
-    # -- what is on the network
+    # -- network traffic
 
     def _follow_network(self) -> None:
         """Read from the network which robots received commands and stops and which replies were delivered."""
@@ -117,7 +115,7 @@ class StopModel(RuleBasedStateMachine):
         ):
             told.pop(id, None)
 
-    # -- robots come, freeze, die and come back
+    # -- robots start, freeze, die and return
 
     @initialize(both=st.booleans())
     def start(self, both: bool) -> None:
@@ -174,7 +172,7 @@ class StopModel(RuleBasedStateMachine):
         if fails:
             self.undisturbed.discard(robot.id)
 
-    # -- people and programs move them
+    # -- motion commands from users and programs
 
     @rule(name=names, action=st.sampled_from(["drive", "turn"]), wait_s=waits)
     def move_by_form(self, name: str, action: str, wait_s: float) -> None:
@@ -192,7 +190,7 @@ class StopModel(RuleBasedStateMachine):
     @rule(name=names, way=st.sampled_from(["shelf", "alarm", "replay", "bridge"]), wait_s=waits)
     def move_by_message(self, name: str, way: str, wait_s: float) -> None:
         if self.studio.session.fleet.link(name) is None:
-            return  # nobody knows yet that there is a robot of this name
+            return  # Studio doesn't know a robot of this name yet
         match way:
             case "shelf":
                 self.studio.send_from_shelf(name)
@@ -203,11 +201,11 @@ class StopModel(RuleBasedStateMachine):
             case _:
                 self.bridge.carry(name)
                 self.lab.settle()
-                self.studio.see()  # the bridge renewed its lease, with its counts
+                self.studio.see()  # as after the bridge renewed its lease with its counts
         self.lab.settle()
         self.lab.advance(wait_s)
 
-    # -- strangers
+    # -- foreign programs
 
     @rule(name=names, times=st.sampled_from([1, 40]))
     def forge_answers(self, name: str, times: int) -> None:
@@ -274,7 +272,7 @@ class StopModel(RuleBasedStateMachine):
     def let_time_pass(self, seconds: float) -> None:
         self.lab.advance(seconds)
 
-    # -- what must hold
+    # -- invariants
 
     @invariant()
     def check(self) -> None:

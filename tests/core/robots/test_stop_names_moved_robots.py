@@ -15,7 +15,7 @@ from tests.core.robots.stop_model.network import LEASE_S
 from tests.core.robots.stop_model.robots import TURN_S, SimulatedRobot, Stranger
 from tests.core.robots.stop_model.studio import GRAPH_POLL_S
 
-FIRST_UNKNOWN_PUBLISHER = 1 << 20  # no node has one of this id
+FIRST_UNKNOWN_PUBLISHER = 1 << 20  # no node has a publisher with this id
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def connect(lab: SimulatedLab, robot: SimulatedRobot) -> None:
 
 def silence(robot: SimulatedRobot, how: str) -> None:
     match how:
-        case "hung":  # the thread that renews its lease goes on
+        case "hung":  # the thread that renews its lease keeps running
             robot.node.is_held = True
         case "frozen":
             robot.node.halt(is_dead=False)
@@ -69,7 +69,7 @@ def test_robot_lost_while_moving_is_named_until_it_replies_or_the_user_confirms(
     if how == "replaced":
         lab.start_robot("Pepper")
         lab.wait_for_link("Pepper")
-    elif how != "hung":  # a hung one is listed: it is "busy" as long as its action may take
+    elif how != "hung":  # a hung robot stays listed, and “busy” for as long as its action may take
         assert link.state == "not stopped", "it stays red without any Stop"
     for _press in range(2):
         lab.stop()
@@ -157,7 +157,7 @@ def test_stop_is_not_delivered_late_after_the_user_confirmed(lab: SimulatedLab) 
     assert runs.view().can_run
 
 
-# ---- strangers -----------------------------------------------------------------------------------------
+# ---- foreign programs ----------------------------------------------------------------------------------
 
 
 def flood(lab: SimulatedLab, topic: str) -> None:
@@ -197,7 +197,7 @@ def test_stopper_does_not_decode_foreign_replies(lab: SimulatedLab, sender: str)
     topic = "/Pepper/answer"
     stranger = lab.stranger.node.new_pub(topic, "robot/answer")
     pepper = start_unreachable_robot(lab)
-    lab.stop()  # it goes on waiting for the robot
+    lab.stop()  # the stop waits until the robot is connected
     publisher = stranger.id if sender == "known" else FIRST_UNKNOWN_PUBLISHER
     foreign = Undecodable(topic, b"{}", "json", "json", publisher=publisher)
     lab.studio.hand_to_stopper(topic, [foreign] * 100)
@@ -237,7 +237,7 @@ def test_robot_whose_lease_expired_after_its_reply_still_receives_stop(lab: Simu
     pepper = lab.start_robot("Pepper")
     lab.wait_for_link("Pepper")
     lab.stop()
-    pepper.node.unlist()  # it still hears
+    pepper.node.unlist()  # still receives messages
     lab.advance(GRAPH_POLL_S)
     lab.stop()
     assert lab.stops_received(pepper) == 2
@@ -258,7 +258,7 @@ def test_reply_of_another_program_does_not_confirm_a_stop(lab: SimulatedLab) -> 
 
 def test_robot_known_only_by_its_command_topic_receives_stop_and_is_named(lab: SimulatedLab) -> None:
     unknown, runs = lab.start_robot("X"), lab.studio.session.runs
-    unknown.node.unlist()  # it announces nothing
+    unknown.node.unlist()  # not listed by the master
     lab.studio.session.fleet.moved.record_command(["/X/command"], "shelf")
     lab.advance(GRAPH_POLL_S)
     lab.stop()

@@ -70,7 +70,7 @@ def test_robot_lost_during_a_program_is_named_until_it_replies(session: Session)
             pass
         tick_until(session, lambda: not session.fleet.connected)
         tick_until(session, lambda: is_needed(session))
-        for _ in range(2):  # "Stop again" is no proof either
+        for _ in range(2):  # “Stop again” without a reply proves nothing, either
             session.runs.stop()
             tick_until(session, lambda: session.runs.view().state == "stopping")
             tick_until(session, lambda: session.runs.view().state != "stopping")
@@ -106,7 +106,7 @@ def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(session:
         tick_until(session, lambda: within_reach(session))
         driver.close()
         graph = session.graph
-        session.source.close()  # from here on the test tells what the masters say
+        session.source.close()  # from here on, the test passes the graphs in
         assert graph is not None
         empty = replace(graph, epoch=graph.epoch + 1, nodes={}, topics={})
         now = time.monotonic()

@@ -75,7 +75,7 @@ def test_panels_show_the_selected_robot_or_the_first_connected_robot(
             session.fleet.select("Turtle")
             assert session.fleet.current is session.fleet.link("Turtle")
         tick_until(session, lambda: len(session.fleet.connected) == 1, FOUND_S)
-        assert session.fleet.current is session.fleet.link("Pepper")  # the chosen one has gone
+        assert session.fleet.current is session.fleet.link("Pepper")  # fallback after a disconnect
 
 
 REAL = replace(turtle.ROBOT, virtual=False)
@@ -94,10 +94,10 @@ def test_real_robot_does_not_move_before_permission(session: Session, node: nep.
             press()
             assert session.runs.view().state == "ready"
             assert moving.question.title == "Allow Turtle to move?"
-        lit = session.fleet.invoke("Turtle", "light", {})  # that moves nothing
+        lit = session.fleet.invoke("Turtle", "light", {})  # an action without motion
         tick_until(session, lambda: lit.state == "succeeded")
         assert wheels.still()
-        session.runs.stop()  # Stop asks nobody, and takes the question away
+        session.runs.stop()  # Stop needs no permission and closes the question
         assert moving.question is None
         tick_until(session, lambda: session.runs.view().state == "proven")
         assert session.runs.view().result_status == "ok"
@@ -138,7 +138,7 @@ def test_robot_that_connects_during_a_run_is_not_moved_by_published_messages(
         "control_repeat", TIMES=number(10_000), BODY=[publish, block("control_wait", SECONDS=number(0.05))]
     )
     session.document.apply_edit(workspace(started(again)))
-    session.runs.run()  # nobody is there: nothing to ask about
+    session.runs.run()  # no robot is connected, so no permission is needed
     tick_until(session, lambda: session.runs.running_blocks, FOUND_S)
     with Driver(REAL, "Turtle", node):
         tick_until(session, lambda: session.runs.block_errors, FOUND_S)
@@ -235,4 +235,4 @@ def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node)
         tick_until(session, wheels.still)
         tick_until(session, lambda: not session.runs.active, FOUND_S)
         way = math.dist(first, wheels.pose()[:2])
-        assert 0.05 < way < 0.2  # 0.1 m; at both stays it would be 0.4 m or more
+        assert 0.05 < way < 0.2  # 0.1 m; driving on during the pauses would give at least 0.4 m

@@ -80,7 +80,7 @@ def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(mast
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
-        until(lambda: bool(psutil.Process(made.pid).cmdline()))  # the system knows it a moment after it began
+        until(lambda: bool(psutil.Process(made.pid).cmdline()))  # empty until the process has called exec
         assert VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
         assert not VirtualProcesses(("app.robots.simulated",)).is_started_by_studio(
             Identity("n", "Turtle", HERE, made.pid)
@@ -103,7 +103,7 @@ def test_process_end_is_detected_only_on_this_computer(
     assert not known.has_ended(replace(identity, pid=None))
 
 
-# ---- the question --------------------------------------------------------------------------------------
+# ---- permission question -------------------------------------------------------------------------------
 
 STRANGE = Identity("1", "rover driver", "lab-2", 7)
 
@@ -180,7 +180,7 @@ def test_permission_applies_to_this_program_and_permanent_permission_to_its_comp
     assert asks(fleet)
     fleet.permission.answer(let=True)
     assert not asks(fleet)
-    fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # started anew
+    fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # restarted
     assert asks(fleet)
     fleet.permission.answer(let=True, always=True)
     fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))

@@ -71,12 +71,12 @@ def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
     for spoken in (0.0, 0.3, 0.95):
         case.tell("Pepper", "Hello", spoken)
     case.tell("Pepper", None)
-    assert case.speaker.did == [("Hello", "en", 0.4)]  # its voice may take a little longer than the bubble
+    assert case.speaker.did == [("Hello", "en", 0.4)]  # speech may take a little longer than its bubble
     case.speaker.is_busy = False
     case.tell("Pepper", "Hello", 0.0)
     case.tell("Pepper", "Hello", 0.9)
     case.speaker.is_busy = False
-    case.tell("Pepper", "Hello", 0.0)  # the same words at once again
+    case.tell("Pepper", "Hello", 0.0)  # the same text again at once
     assert case.said == ["Hello", "Hello", "Hello"]
 
 
@@ -147,7 +147,7 @@ def test_stop_silences_all_speech_including_queued(case) -> None:
     case.session.fleet.mark_stopping(["Pepper", "Ginger"])
     words = {"Pepper": ("answered", "ok"), "Ginger": ("answered", "ok")}
     case.session.fleet.apply_stop(words, StopReport((), 0.0))
-    case.tell("Pepper", "A long story", 0.3)  # it says so for one more moment
+    case.tell("Pepper", "A long story", 0.3)  # the state contains the speech for one more moment
     assert case.speaker.did[-1] == "stop"
     case.speaker.is_busy = False
     case.session.tick()

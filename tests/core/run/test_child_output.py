@@ -105,7 +105,7 @@ def test_reader_below_its_rate_does_not_pause() -> None:
     steps = itertools.count()
     slow = (
         1.0 / MAX_LINES_PER_S
-    )  # the clock goes on with each look at it: fewer lines than may come in a second
+    )  # the clock advances with each reading: fewer lines than the limit per second
     assert rested([LINE] * (5 * MAX_LINES_PER_S), lambda: next(steps) * slow).count == 0
 
 
@@ -113,7 +113,7 @@ def test_rate_limit_reopens_after_a_second() -> None:
     now = [0.0]
     gate = RateLimiter(3, lambda: now[0])
     assert [gate.try_acquire() for _ in range(5)] == [True, True, True, False, False]
-    assert gate.take_rejected_count() == 0  # not while it is shut
+    assert gate.take_rejected_count() == 0  # reported only after the limiter reopens
     now[0] = 1.1
     assert gate.try_acquire()
     assert gate.take_rejected_count() == 2

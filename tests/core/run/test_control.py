@@ -117,7 +117,7 @@ def test_empty_behaviour_shows_run_hint_until_an_edit(session: Session) -> None:
     assert (runs.view().state, runs.view().title) == ("ready", "Nothing to run yet")
     assert "when started" in runs.view().detail
     session.document.apply_edit({"blocks": {"blocks": [{"type": "events_started", "id": "a"}]}})
-    until(lambda: title_at_next_tick(session) == "Ready")  # on a busy computer it is compiled beside
+    until(lambda: title_at_next_tick(session) == "Ready")  # compiled in the background on a busy computer
 
 
 def test_new_behaviour_clears_run_hint(session: Session) -> None:

@@ -39,9 +39,9 @@ def test_topics_of_robots_with_unreadable_descriptions_are_sent_to_the_program_o
     fleet.moving_topics = MovingTopics([ROVER])
     robots.update()
     robots.update()
-    fleet.moving_topics = MovingTopics([ROVER])  # another graph, the same robots
+    fleet.moving_topics = MovingTopics([ROVER])  # a new graph with the same robots
     robots.update()
     assert program.told == [{"/Rover/command": ("Rover",), "robot_action": ("Rover",)}]
     robots.start(program, (), {})  # type: ignore[arg-type]
     robots.update()
-    assert len(program.told) == 2  # it was started with the connected robots only
+    assert len(program.told) == 2  # a new program knows only the connected robots at first

@@ -73,7 +73,7 @@ def test_file_runs_to_end_and_robot_is_stopped(pepper, saved):
     assert "done" in out.splitlines()
     assert "Pepper stopped (" in out
     told = [command["op"] for command in pepper.commands]
-    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a heartbeat may arrive in between
 
 
 def test_failing_block_is_reported(pepper, saved):
@@ -155,7 +155,7 @@ def test_file_that_cannot_be_run_and_missing_master_are_reported_as_unusable(mas
     assert run(tmp_path / "x.nepb")[0] == UNUSABLE
     code, out = run(saved(workspace(started(say("Hi")))), master="127.0.0.1:1")
     assert (code, "no master" in out) == (UNUSABLE, True)
-    assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs nobody
+    assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs no robot
 
 
 def test_rize_robot_is_controlled(master, tmp_path):
@@ -330,7 +330,7 @@ def test_generated_program_runs_as_a_python_file(master, pepper, tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
     told = [command["op"] for command in pepper.commands]
-    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a heartbeat may arrive in between
 
 
 class Lost(io.StringIO):
@@ -358,7 +358,7 @@ def test_closed_output_stops_the_behaviour_and_its_robots(pepper, saved, capsys,
     assert run_file(path, out=Lost(number, 1)) == FAILED
     assert capsys.readouterr().err == said
     told = [command["op"] for command in pepper.commands]
-    assert [op for op in told if op != "alive"][-1] == "stop"  # a sign of life may come between
+    assert [op for op in told if op != "alive"][-1] == "stop"  # a heartbeat may arrive in between
     assert "never" not in [each.get("input") for each in pepper.commands]
 
 

@@ -20,7 +20,7 @@ from tests.blocks.samples import block, get, list_of, number, say, started, text
 from tests.blocks.wire_robot import WireRobot
 
 LONG_S = 30.0
-STOP_WITHIN_S = 15.0  # `stopping_s` makes all that a stop could wait for take longer
+STOP_WITHIN_S = 15.0  # below the minute to which `stopping_s` raises every timeout
 
 HANGS = (sys.executable, "-c", "import time, sys; print('{}'); sys.stdout.flush(); time.sleep(60)")
 IGNORES_TEXT = """
@@ -216,12 +216,12 @@ def test_stop_interrupts_a_block_in_an_infinite_computation(runner, heard, maste
         def begin() -> Runner:
             made = runner()
             made.start(program(first, write(power)), [], master.address)
-            # Nothing else can be heard of it: such a number keeps all its threads from running.
+            # No further message can arrive: computing such a number blocks all threads of the child.
             assert subscriber.receive(LONG_S) is not None
             return made
 
         assert stopping_s(begin) < STOP_WITHIN_S
-    assert heard.until("ended").is_ok  # it was stopped: that is no failure of its own
+    assert heard.until("ended").is_ok  # a stop is not an error
 
 
 @pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
@@ -245,7 +245,7 @@ def test_crashed_child_is_reported(runner, heard):
     ended = heard.until("ended")
     assert not ended.is_ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
-    assert stopping_s(lambda: made) < STOP_WITHIN_S  # there is nothing to wait for
+    assert stopping_s(lambda: made) < STOP_WITHIN_S  # no timeout is waited for
 
 
 def test_failed_child_is_reported_with_reason(runner, heard):
@@ -269,7 +269,7 @@ def test_child_ignores_ctrl_c_of_the_terminal(runner, heard, master):
     heard.until("running")
     os.kill(made.pid, signal.SIGINT)
     made.pause()
-    assert heard.until("paused").blocks  # it lives
+    assert heard.until("paused").blocks  # the child still responds
     made.stop()
     assert heard.until("ended").is_ok
 
@@ -305,7 +305,7 @@ def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pe
     wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])
     made.start(wanted, [pepper.described.source], master.address)
     heard.until("running", description="Pepper says “Hi”")
-    made._commands.put(None)  # what the operating system does with a dead parent's pipe
+    made._commands.put(None)  # as when the operating system closes the pipe of a dead parent
     assert heard.until("ended").is_ok
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)

@@ -88,21 +88,21 @@ def test_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) ->
     def begin() -> Runner:
         runner, pause = started(GIGABYTE), threading.Event()
         began, worked = time.monotonic(), time.process_time()
-        for _ in range(100):  # as a window's timer
+        for _ in range(100):  # stands for the timer of the window
             pause.wait(0.01)
         shares.append((time.process_time() - worked) / (time.monotonic() - began))
-        assert runner.state == "running"  # it is not through: its pipe makes it wait
+        assert runner.state == "running"  # not finished: the full pipe blocks the child
         return runner
 
     began = time.monotonic()
     assert stopping_s(begin) < STOP_WITHIN_S
     seconds = time.monotonic() - began
     assert heard.until("ended").is_ok
-    assert shares[0] < 0.5  # reading the flood leaves the window more than half of a processor
+    assert shares[0] < 0.5  # reading the flood takes less than half of a processor
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
     assert told.endswith(" MB of unexpected output were discarded")
-    assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB: at 20 a second it waits for its turn
+    assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB; reading is throttled to 20 MB/s
 
 
 def test_line_flood_is_throttled_and_counted(started, heard) -> None:
@@ -121,7 +121,7 @@ def test_line_flood_is_throttled_and_counted(started, heard) -> None:
     assert printed(heard).count("x") <= MAX_EVENTS_PER_S * (seconds + 1)
     left_out = [text for text in printed(heard) if text.endswith("lines were dropped: too many at once")]
     assert left_out
-    assert len(left_out) <= seconds + 2  # one in a second, and one at the end
+    assert len(left_out) <= seconds + 2  # one per second, and one at the end
 
 
 def test_endless_line_is_discarded_and_later_lines_are_read(started, heard) -> None:
@@ -181,7 +181,7 @@ def test_child_processes_end_with_stop(started, heard, new) -> None:
         return runner
 
     assert stopping_s(begin) < STOP_WITHIN_S
-    heard.until("ended")  # although its child holds the pipe
+    heard.until("ended")  # although the child process holds the pipe open
     assert all(gone(each) for each in left)
 
 

@@ -16,7 +16,7 @@ from tests.blocks.wire_robot import RizeRobot, WireRobot
 
 pytestmark = pytest.mark.usefixtures("patient")
 LONG_S = 30.0
-SILENT_S = 1.5  # how long the silent are waited for: long enough for the others on a busy computer
+SILENT_S = 1.5  # time limit for silent robots, long enough for the others on a busy computer
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_robot_that_does_not_reply_to_stop_is_named(stopper, robots):
     assert [robot.name for robot in answered] == [
         "Pepper",
         "Turtle",
-    ]  # the answer first, the silence at the end
+    ]  # replies first, missing replies last
 
 
 def test_only_named_robots_are_stopped(stopper, robots):
@@ -123,7 +123,7 @@ def test_rize_robot_cannot_confirm_stop(master, stopper):
         report = stopper.stop_all(timeout_s=LONG_S)
         assert report.robots[0].message == "Rosie: Stop sent; this robot can't confirm"
         assert (report.is_confirmed, report.unconfirmed_names) == (True, ())
-        assert report.elapsed_ms < LONG_S * 1000  # nobody is waited for
+        assert report.elapsed_ms < LONG_S * 1000  # without waiting for a reply
         until(lambda: bool(rosie.commands))
         assert rosie.commands[0]["node"] == "cancel"
     finally:
@@ -171,7 +171,7 @@ def test_robots_stay_stopped_regardless_of_the_program(master, stopper, robots, 
     with robots[0].changed:
         assert robots[0].changed.wait_for(lambda: bool(robots[0].heard("invoke")), LONG_S)
     if how == "was killed":
-        psutil.Process(runner.pid).kill()  # on Windows, too
+        psutil.Process(runner.pid).kill()  # kill() works on Windows, too
     stopper.send_stop()
     runner.stop()
     report = stopper.stop_all()

@@ -125,7 +125,7 @@ def test_self_test_has_its_own_home_and_master(tmp_path: Path) -> None:
 def test_unwritable_folder_is_reported_without_opening_a_window(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Where there are no alarms pytest-timeout has a thread, for which the end of a process would not wait.
+    # Without SIGALRM, pytest-timeout uses a thread, which the end of a process must not wait for.
     monkeypatch.setattr("app.__main__.join_threads", lambda within_s: ())
     (tmp_path / "file").write_text("", "utf-8")
     before = dict(os.environ)
@@ -152,7 +152,7 @@ def test_hanging_process_is_ended_with_its_children(tmp_path: Path) -> None:
     assert not whole["ok"]
     assert whole["why"] == "Studio didn't respond in time and was stopped. It was waiting for: the window"
     assert not whole["steps"][0]["ok"]
-    assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
+    assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # the function in which Studio hung
     assert not psutil.pid_exists(int(done.stdout))
 
 
@@ -192,5 +192,5 @@ def test_windows_system_processes_are_excluded_from_the_self_test() -> None:
     for program in (studio, r"C:\Windows of mine\a.exe"):
         assert not is_windows_program(ItsProgram(program), r"C:\Windows")
         assert not is_windows_program(ItsProgram("", (program, r"C:\Windows\a.exe")), r"C:\Windows")
-    assert not is_windows_program(ItsProgram(""), r"C:\Windows")  # it has ended
+    assert not is_windows_program(ItsProgram(""), r"C:\Windows")  # the process has ended
     assert not is_windows_program(ItsProgram("/usr/bin/python3"), "")

@@ -216,7 +216,7 @@ def test_curves_stay_sorted_and_finite_for_any_input(rows) -> None:
     )
 
 
-# -- calculated ---------------------------------------------------------------------------------------
+# -- calculated curves --------------------------------------------------------------------------------
 
 
 def test_calculated_curves_have_correct_values() -> None:
@@ -224,7 +224,7 @@ def test_calculated_curves_have_correct_values() -> None:
     names = ("difference(/a.x)", "derivative(/a.x)", "integral(/a.x)", "mean(/a.x, 0.25 s)", "/a.x * 10")
     difference, derivative, integral, mean, times = (case.curve(name) for name in names)
     rows = [(0.0, 0), (0.1, 1), (0.2, 3), (0.3, 6)]
-    for row in rows:  # one a tick: nothing depends on how they come together
+    for row in rows:  # one row per tick; batching must not matter
         case.send("/a", (row[0], {"x": row[1]}))
     assert points(difference) == [(0.1, 1, False), (0.2, 2, False), (0.3, 3, False)]
     assert [v for _t, v, _g in points(derivative)] == pytest.approx([10, 20, 30])
@@ -306,7 +306,7 @@ def test_calculated_curves_follow_a_clock_set_back() -> None:
     assert points(mean)[-1][1] == -2
 
 
-# -- the plot's curves ------------------------------------------------------------------------------------
+# -- curves of the plot -----------------------------------------------------------------------------------
 
 
 def test_topic_is_watched_while_a_curve_needs_it() -> None:

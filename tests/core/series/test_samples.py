@@ -242,11 +242,11 @@ def test_incremental_drawing_equals_full_drawing(seed, limit, columns) -> None:
             samples.add(now_s - random.uniform(0, MAX_LATENESS_S), 50.0 * random.normal())  # late
         if random.random() < 0.15:
             now_s -= 2 * MAX_LATENESS_S + random.exponential(5)
-            samples.add(now_s, 1.0)  # a clock was set back
+            samples.add(now_s, 1.0)  # the clock was set back
         span_s = float(random.choice([10.0, 10.0, 3.0, 1e-40]))
         fresh = Samples()
         fresh.extend(samples.times.copy(), samples.values.copy(), samples.gaps.copy())
-        # a person looks back, or another curve is further on
+        # The view is scrolled back, or another curve has newer samples.
         end_s = now_s - float(random.choice([0.0, random.uniform(0, 5), -random.uniform(0, 3)]))
         one, two = (each.line(end_s - span_s, end_s, columns) for each in (samples, fresh))
         assert np.array_equal(one.times, two.times)
@@ -273,7 +273,7 @@ def test_oldest_samples_are_evicted_and_counted_with_correct_stats() -> None:
         values = random.normal(size=500)
         samples.extend(np.arange(begin, begin + 500) / 10, values, np.zeros(500, dtype=bool))
         rows += values.tolist()
-        samples.line(0, 4000, 3)  # builds the pyramid meanwhile
+        samples.line(0, 4000, 3)  # builds the pyramid in between
     assert len(samples) <= 8192
     assert samples.begun + len(samples) == 40_000
     assert samples.values.tolist() == rows[samples.begun :]

@@ -66,7 +66,7 @@ def test_failed_write_over_a_folder_keeps_its_content_and_leaves_no_temporary_fi
     path = tmp_path / "a"
     path.mkdir()
     (path / "inside").write_text("kept")
-    said = "irectory" if os.name == "posix" else "has the file open"  # Windows only says that it may not
+    said = "irectory" if os.name == "posix" else "has the file open"  # Windows reports only denied access
     with pytest.raises(OSError, match=said):
         write_atomically(path, b"data")
     assert (path / "inside").read_text() == "kept"
@@ -110,14 +110,14 @@ def test_stale_temporary_files_are_deleted_but_not_those_in_use(tmp_path: Path) 
     assert (old.exists(), young.exists(), other.exists()) == (False, True, True)
 
 
-# ---- what is read ----------------------------------------------------------------------------------
+# ---- reading files ---------------------------------------------------------------------------------
 
 
 def test_regular_file_is_read_completely(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"x" * 1000)
     assert read_regular_file(path, 1000) == b"x" * 1000
-    if os.name == "posix":  # Windows lets not everybody make links
+    if os.name == "posix":  # on Windows, creating symbolic links needs a privilege
         (tmp_path / "link").symlink_to(path)
         assert read_regular_file(tmp_path / "link", 1000) == b"x" * 1000
     with pytest.raises(OSError, match=r"the limit is 0 MB"):
@@ -159,7 +159,7 @@ def test_pipe_in_place_of_a_file_does_not_block(tmp_path: Path) -> None:
         read_file(tmp_path / "Round.nepb")
 
 
-# ---- who may read it -------------------------------------------------------------------------------
+# ---- file permissions ------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -188,7 +188,7 @@ def test_user_data_files_are_private_regardless_of_umask(tmp_path: Path) -> None
     assert set(modes(home / "journal").values()) == {0o700, 0o600}
     assert modes(home / "earlier") == {".": 0o700, kept.copy.name: 0o600}
     kept.restore()
-    assert document.stat().st_mode & 0o777 == 0o666  # a behaviour stays as shared as it was
+    assert document.stat().st_mode & 0o777 == 0o666  # a behaviour file keeps its permissions
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
@@ -224,7 +224,7 @@ def test_permissions_of_files_from_earlier_versions_are_tightened_at_start(tmp_p
         assert {mode for name, mode in found.items() if "." in name} == {0o600}
 
 
-# ---- a file that another program has open ----------------------------------------------------------
+# ---- files in use by another program ---------------------------------------------------------------
 
 
 def busy(code: int) -> PermissionError:

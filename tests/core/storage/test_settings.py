@@ -106,7 +106,7 @@ def test_unsaved_changes_are_tracked_until_the_file_is_writable(tmp_path: Path) 
     settings.set("theme", "light")
     assert settings.not_kept is None
     settings.path.unlink()
-    settings.path.mkdir()  # as a disk that can't be written
+    settings.path.mkdir()  # stands for a disk that can't be written
     with pytest.raises(SettingsError):
         settings.set("theme", "dark")
     with pytest.raises(SettingsError):
@@ -114,7 +114,7 @@ def test_unsaved_changes_are_tracked_until_the_file_is_writable(tmp_path: Path) 
     assert settings.not_kept is not None
     assert (settings.get("theme", ""), settings.get("text_percent", 0)) == ("dark", 125)
     settings.path.rmdir()
-    Settings(tmp_path).set("layout", "developer")  # another Studio, when the disk is there again
+    Settings(tmp_path).set("layout", "developer")  # another Studio, once the disk can be written again
     settings.set("text_percent", 125)
     assert settings.not_kept is None
     again = Settings(tmp_path)

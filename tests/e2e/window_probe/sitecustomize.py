@@ -15,11 +15,11 @@ import time
 from functools import cached_property
 from typing import NamedTuple
 
-CELL_ROLE = 0x0100  # Qt.UserRole: what a cell of our tables shows
+CELL_ROLE = 0x0100  # Qt.UserRole: the value that a table cell shows
 TABLE_ROWS = 200
 
 
-_looked = [0.0, 0.0]  # the seconds that these eyes took, and their work in them
+_looked = [0.0, 0.0]  # elapsed and CPU seconds that the probe itself has used
 
 
 def _spent() -> tuple[float, float]:
@@ -124,7 +124,7 @@ def _reactions(application):
         def eventFilter(self, watched, event) -> bool:
             if event.type() in inputs and event.spontaneous():
                 late = Painted(event.timestamp(), event.type().name)
-                # Asked for after what the handling asks for: a repaint has the same, low priority.
+                # Below the priority of repaints, so that this event comes after those of the handler.
                 QCoreApplication.postEvent(self, late, Qt.EventPriority.LowEventPriority.value - 1)
             return False
 
@@ -152,7 +152,7 @@ def _script(request, reply) -> None:
     view.page().runJavaScript(f"JSON.stringify({request['script']})", lambda got: reply(request["n"], got))
 
 
-_known: list = []  # the view that showed the last time: looking for it takes longer than most scripts
+_known: list = []  # cache of the visible view, because searching takes longer than most scripts
 
 
 def _web_view_that_shows():
@@ -176,8 +176,8 @@ class _Wanted(NamedTuple):
     """Filter for the widgets of a request; without values, every widget matches."""
 
     kind: str = ""
-    named: str = ""  # its name or its text
-    says: str = ""  # words in its name, its text or its description
+    named: str = ""  # name or text
+    says: str = ""  # words in the name, text or description
     is_menu: bool = False
 
     def has(self, widget) -> bool:

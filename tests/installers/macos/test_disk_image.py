@@ -66,7 +66,7 @@ def test_image_contains_the_application_with_its_symlinks_and_the_finder_layout(
             assert copy.readlink() == path.readlink(), path
         elif path.is_file():
             assert copy.read_bytes() == path.read_bytes(), path
-    # 7z makes absolute links point below where it unpacks
+    # 7z rewrites absolute links to paths below the output folder
     assert (volume / "Applications").readlink() == out / "Applications"
     assert (volume / ".background.png").read_bytes() == b"picture"
     with store.open(str(volume / ".DS_Store"), "r") as finder:

@@ -31,7 +31,7 @@ def test_every_entitlement_is_documented_by_apple(allowed: dict[str, str], tmp_p
 
 
 def test_documented_keys_match_the_hardened_runtime_page_of_apple() -> None:
-    # The page's two groups, as they stood in November 2026: six exceptions and seven resources.
+    # The page's two groups as of November 2026: six exceptions and seven resources.
     groups = {
         CS: "allow-jit allow-unsigned-executable-memory allow-dyld-environment-variables debugger "
         "disable-library-validation disable-executable-page-protection",

@@ -61,7 +61,7 @@ def test_every_plist_key_is_documented_by_apple(machine: str) -> None:
 def test_declared_types_conform_to_public_data() -> None:
     told = information(__version__, "arm64")
     kinds = (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"])
-    data = {"public.json", "public.data"}  # uttypejson: it conforms to text, and that to data
+    data = {"public.json", "public.data"}  # public.json conforms to public.text, and that to public.data
     assert [kind["UTTypeIdentifier"] for kind in kinds if not data & set(kind["UTTypeConformsTo"])] == []
 
 

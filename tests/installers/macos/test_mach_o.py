@@ -30,7 +30,7 @@ def test_universal_library_is_recognised(tmp_path: Path) -> None:
         b"#!/bin/sh\nexit 0\n",
         b"\x7fELF" + bytes(60),
         b"MZ" + bytes(60),
-        b"\xca\xfe\xba\xbe\x00\x00\x00\x41" + bytes(400),  # a class of Java 21
+        b"\xca\xfe\xba\xbe\x00\x00\x00\x41" + bytes(400),  # Java 21 class file, same magic number
         header()[:20],
         header()[:40],
         fat(header())[:4100],

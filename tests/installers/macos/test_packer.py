@@ -55,7 +55,7 @@ def test_inputs_of_pyinstaller_are_generated_before_freezing(tmp_path: Path) -> 
     icon, plist = (Path(told[name]) for name in MADE)
     content = plistlib.loads(plist.read_bytes())
     assert content == information(VERSION, "arm64")
-    assert icon.name == content["CFBundleIconFile"]  # PyInstaller keeps its name
+    assert icon.name == content["CFBundleIconFile"]  # PyInstaller keeps the name of the icon file
     assert icon.read_bytes()[:4] == b"icns"
     for word in told:
         assert word in (ROOT / "installers" / "nep-studio.spec").read_text("utf-8")
@@ -106,7 +106,7 @@ def test_application_is_frozen_then_signed_then_put_into_the_image(
         "xcrun stapler staple",
         "xcrun stapler validate",
         "spctl --assess --type",
-    ]  # of the image
+    ]  # on the disk image
     resources = packer.application(made) / "Contents" / "Resources"
     assert (resources / "NOTICE.txt").is_file()
     assert (resources / "behaviour.icns").read_bytes() == ICON

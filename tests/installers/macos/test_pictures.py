@@ -68,7 +68,7 @@ def test_icon_has_all_sizes_including_retina(pictures: Path, name: str) -> None:
             channels = raw(found[kind])
             assert len(channels) == 4 * side * side
             opaque, rest = channels[: side * side], channels[side * side :]
-            assert opaque[0] == 0  # the corner is seen through
+            assert opaque[0] == 0  # the corner is transparent
             assert max(opaque) == 255
             assert len(set(rest)) > 10
             continue

@@ -96,7 +96,7 @@ def test_signing_identity_enables_hardened_runtime_and_timestamp(tmp_path: Path,
     for name, *words in calls(tools):
         if name == "codesign" and "--sign" in words:
             assert words[:6] == ["--force", "--sign", NAME, "--options", "runtime", "--timestamp"]
-            assert "--deep" not in words  # it would give Studio's entitlements to everything
+            assert "--deep" not in words  # --deep would give Studio's entitlements to all nested code
 
 
 def test_ad_hoc_signing_without_identity_is_reported(

@@ -90,5 +90,5 @@ def test_abandoned_topic_keeps_its_port_but_closes_its_sockets(gateway, original
         native.wait(lambda: native.subscribed)
     native.wait(lambda: not native.programs)
     original.ask("other")
-    eventually(lambda: not is_open(port))  # libzmq closes in a thread of its own
+    eventually(lambda: not is_open(port))  # libzmq closes sockets in its own thread
     assert original.ask("t")["port"] == port

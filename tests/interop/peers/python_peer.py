@@ -39,7 +39,7 @@ def seen(value):
 
 
 node = nep.node(name)
-pause = threading.Event()  # nep's "image" never waits by itself
+pause = threading.Event()  # `listen` never blocks for "image" in the original nep
 if role == "publisher":
     pub = node.new_pub(topic, msg_type, node.hybrid(mode=mode))
     say("ready")

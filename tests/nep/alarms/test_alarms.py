@@ -48,7 +48,7 @@ def test_actions_run_once_in_order_and_are_recorded() -> None:
     assert hands.done == [("on", "stop"), ("on", "banner")]
     (record,) = scene.alarms.history
     assert [deed.kind for deed in record.action_results] == ["stop", "banner", "sound"]
-    assert record.action_results[-1].text == "this action isn't available here"  # nobody carries out a sound
+    assert record.action_results[-1].text == "this action isn't available here"  # no handler for sounds
     assert record.cause == "r of /d is 0, below 1"
     assert not scene.alarms.is_busy
 
@@ -105,7 +105,7 @@ def test_snoozed_alarm_is_recorded_and_runs_its_actions_once_the_snooze_ends() -
     near(scene)
     assert hands.done == []
     assert [record.was_snoozed for record in scene.alarms.history] == [True]
-    scene.wait(11)  # the snooze ends, and it is still so
+    scene.wait(11)  # the snooze ends while the condition still holds
     assert hands.done == [("still", "banner")]
     assert len(scene.alarms.history) == 1
     scene.wait(60)

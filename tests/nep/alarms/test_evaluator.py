@@ -173,7 +173,7 @@ def test_node_left_alarm_requires_a_known_node_and_a_complete_graph() -> None:
     assert scene.state() == "waits"
     scene.graph(nodes=("lidar",))
     assert scene.state() == "well"
-    scene.graph(nodes=(), epoch=2)  # a new master, who does not know it yet
+    scene.graph(nodes=(), epoch=2)  # a new master that doesn't know the node yet
     assert scene.wait(2) == []
     scene.graph(nodes=("lidar",), epoch=2)
     scene.alarms.evaluator.update_graph(None)
@@ -255,7 +255,7 @@ def test_unchanged_rules_keep_their_state_and_a_removed_rule_clears_its_alarm() 
     assert scene.state() == "on"
     scene.alarms.set_rule(rule("below", "/d", path="other", limit=1))
     assert [kind for kind, _ in scene.happened()] == ["off"]
-    assert scene.state() == "well"  # it was heard
+    assert scene.state() == "well"  # the topic was received before
 
 
 def test_disabled_or_invalid_rule_is_not_watched() -> None:

@@ -15,7 +15,7 @@ class String:
     data: str
 
 
-String.__name__ = "std_msgs::msg::dds_::String_"  # its name in DDS
+String.__name__ = "std_msgs::msg::dds_::String_"  # its DDS type name
 WAIT = dust_dds.Duration(sec=60, nanosec=0)
 KEPT = dust_dds.HistoryQosPolicy(dust_dds.HistoryQosPolicyKind.KeepLast(100))
 """History depth; with the default, readers keep one message and writers wait for acknowledgements."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import dust_dds
 from dust_dds import TypeKind
 
-# dust-dds reads no numbers of 64 bits in Python: each is its two halves, the lower one first.
+# dust-dds can't read 64-bit integers in Python: each is sent as two halves, the lower one first.
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Response:
     sum_high: TypeKind.uint32
 
 
-Request.__name__ = "example_interfaces::srv::dds_::AddTwoInts_Request_"  # their names in DDS
+Request.__name__ = "example_interfaces::srv::dds_::AddTwoInts_Request_"  # their DDS type names
 Response.__name__ = "example_interfaces::srv::dds_::AddTwoInts_Response_"
 GUID = 0xFEDCBA9876543210
 WAIT = dust_dds.Duration(sec=60, nanosec=0)

@@ -194,7 +194,7 @@ def test_unresponsive_subscriber_is_named_and_waited_for_only_until_the_timeout(
         assert other.line() == "later"
 
 
-# ---- what ROS 2 is told
+# ---- graph of ROS 2
 
 
 def test_graph_has_nodes_topics_and_ids_of_another_program(make: Make) -> None:
@@ -299,7 +299,7 @@ def test_ros_discovery_info_lists_nodes_with_their_readers_and_writers(make: Mak
     assert info.at == len(info.data)
 
 
-# ---- who may be met
+# ---- discovery range
 
 
 def udp_sockets() -> dict[int, tuple[str, bytes]]:
@@ -360,7 +360,7 @@ def test_discovery_range_off_isolates_the_node(make: Make, monkeypatch: pytest.M
         assert {each.name for each in node.graph().nodes.values()} == {"a"}
 
 
-# ---- qualities, and what is wrong
+# ---- quality of service and alerts
 
 
 def test_reliable_subscriber_does_not_receive_from_a_best_effort_publisher(make: Make) -> None:

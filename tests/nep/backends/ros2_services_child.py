@@ -65,7 +65,7 @@ def registered(make: Make) -> Make:
     return make
 
 
-# ---- types of ROS
+# ---- ROS types
 
 
 LONG_S = 60.0
@@ -89,7 +89,7 @@ def test_common_service_types_are_exchanged_as_dicts(make: Make) -> None:
     assert switch.call({}) == {"success": False, "message": "grüß"}
     add = other.new_client("/add", msg_type="example_interfaces/AddTwoInts", timeout_s=LONG_S)
     assert add.call({"a": 2**63 - 1, "b": -1}) == {"sum": 2**63 - 2}
-    # Who is not told a type takes that of the server.
+    # A client without a type uses the server's type.
     for service, answer in (("/go", {"success": True, "message": ""}), ("rest", {})):
         assert other.new_client(service, timeout_s=LONG_S).call({}) == answer
     assert make("plain").new_client("/add", timeout_s=LONG_S).call({"a": 1, "b": 2}) == {"sum": 3}
@@ -167,7 +167,7 @@ def peer(request: pytest.FixtureRequest):
 def test_nep_calls_a_server_that_uses_plain_dds(make: Make, peer, request, kind, asked, heard, said) -> None:
     last = kind.rpartition("/")[2]
     service = f"/to/{last}/{request.node.callspec.params['peer']}"
-    with peer("serve", f"to/{last}", last) as other:  # one that was killed is there for ten seconds more
+    with peer("serve", f"to/{last}", last) as other:  # a killed peer stays visible for ten more seconds
         assert other.line() == "ready"
         client = make("client").new_client(service, msg_type=kind, timeout_s=LONG_S)
         for _ in range(3):
@@ -202,7 +202,7 @@ def test_client_that_uses_plain_dds_calls_nep(
             other.say(json.dumps(given))
             assert json.loads(other.line()) == said
         eventually(lambda: len(make("viewer").graph().services[service].clients) == 1)
-        other.end()  # it leaves: else the server would wait for it to confirm the last answer
+        other.end()  # leaves before the server has to wait for its last acknowledgement
     assert seen == [asked] * 3
     assert (server.calls, server.errors, server.refused) == (3, 0, 0)
 
@@ -233,7 +233,7 @@ def test_server_that_dies_during_a_call_is_reported(make: Make) -> None:
         program.kill()
         with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
-    with running(SERVER) as program:  # and the next one is found
+    with running(SERVER) as program:  # the client finds the restarted server
         program.line()
         assert client.call({}) == {"pid": program.process.pid}
 

@@ -26,7 +26,7 @@ from tests.nep.backends import test_contract_async as contract_async
 from tests.nep.backends.ros_programs import ros_master
 from tests.nep.meeting import Make
 
-pytestmark = [  # rospy's own ways
+pytestmark = [  # raised inside rospy
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
 ]
@@ -117,7 +117,7 @@ PAYLOADS: dict[str, tuple[str, object]] = {
     "geometry_msgs/Twist": ("geometry_msgs/Twist", TWIST),
     "std_msgs/Empty": ("std_msgs/Empty", {}),
 }
-if importlib.util.find_spec("cv2") is None:  # which makes and reads the files
+if importlib.util.find_spec("cv2") is None:  # needed to encode and decode the image files
     PAYLOADS = {key: each for key, each in PAYLOADS.items() if each[0] not in {"image", COMPRESSED}}
 
 
@@ -127,7 +127,7 @@ def is_same(one: object, other: object) -> bool:
     return one == other
 
 
-# The publishers come first: ROS's master takes a tenth of a second to tell of one that comes later.
+# Publishers are created first: the ROS master takes 0.1 s to announce one that is created later.
 
 
 def listened(make: Make, kind: str, payload: object) -> object:
@@ -239,7 +239,7 @@ def test_header_has_sequence_numbers_and_time_stamps(make: Make) -> None:
     seqs = [message.seq for message in messages if message is not None]
     assert seqs == [1, 2, 3]
     assert (sub.lost, messages[0].stamp_ns >= before) == (0, True)  # type: ignore[union-attr,operator]
-    pub._transport.process._seqs["/stamped"] += 4  # as if four had not come
+    pub._transport.process._seqs["/stamped"] += 4  # simulates four lost messages
     pub.publish({})
     assert sub.receive(30.0) is not None
     assert sub.lost == 4

@@ -16,7 +16,7 @@ from tests.nep.services.test_calls import spin
 
 __all__ = ["_nothing_is_left", "make", "ros", "spin"]
 
-pytestmark = [  # rospy's own ways
+pytestmark = [  # raised inside rospy
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
 ]

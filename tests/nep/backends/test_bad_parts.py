@@ -126,9 +126,9 @@ def test_subscriber_receives_valid_messages_between_invalid_ones(
                 if message.publisher == 42:
                     heard.append(bytes(message.data))
             assert heard == expected
-            assert sub.refused - refused >= bad  # what is short and then long again may be two
+            assert sub.refused - refused >= bad  # one malformed message may be counted twice
 
-        rogue.socket.recv()  # it is connected
+        rogue.socket.recv()  # wait for the subscription
         rogue.socket.recv()
         attack()
         rogue.socket.send_multipart([TOPIC, b"short"])
@@ -148,7 +148,7 @@ def test_single_part_with_a_wrong_length_is_rejected(
     with nep.node("victim") as node:
         direct = node.direct(port=rogue.port, mode="one2many", wire="native")
         sub = node.new_sub("bad", "bytes", direct, sink=heard.extend if in_batches else None)
-        rogue.socket.recv()  # it is connected
+        rogue.socket.recv()  # wait for the subscription
         rogue.socket.recv()
         good: list[bytes] = []
         for _ in range(20):
@@ -196,12 +196,12 @@ def test_publisher_disconnects_a_subscriber_that_sends_an_oversized_subscription
         (info,) = node.graph().topics["book"].publishers
         for size in (wire.MAX_SUBSCRIPTION_BYTES + 1, 4_000_000, 2**62):
             with shake_hands(int(info.endpoints[0].rpartition(":")[2])) as rogue:
-                with contextlib.suppress(OSError):  # it does not even read all of it
+                with contextlib.suppress(OSError):  # the publisher closes before reading everything
                     rogue.sendall(b"\x02" + struct.pack(">Q", size) + b"\x01")
                     rogue.sendall(b"a" * min(size - 1, 4_000_000))
                 with contextlib.suppress(ConnectionResetError):
                     while rogue.recv(1000):
-                        pass  # until it is left
+                        pass  # until the publisher disconnects
         pub.publish(b"still here")
         message = sub.receive(30.0)
         assert message is not None
@@ -226,7 +226,7 @@ def test_publisher_survives_invalid_subscriptions(
                 rogue.send_multipart(parts)
             own = wire.hello_part(next(ids), "victim")
             rogue.send(b"\x01" + own)
-            while True:  # the answer to a proper hello, behind all of the others
+            while True:  # wait for the echo to the valid hello, after all others
                 assert rogue.poll(5000), "a proper subscriber is not greeted any more"
                 first, *_rest = rogue.recv_multipart()
                 if first == own:
@@ -310,7 +310,7 @@ def test_master_replies_to_every_request_and_keeps_serving(
                 answers += 1
                 if isinstance(answer, RejectedReply):
                     assert answer.reason
-            assert answers == len(messages)  # every sender is told what was wrong
+            assert answers == len(messages)  # each request is answered
 
         attack()
         view = node.graph()

@@ -50,7 +50,7 @@ def stranger(node: nep.Node) -> Iterator[Callable[..., zmq.Socket[bytes]]]:
         socket.subscribe(wire.topic_part(topic))
         socket.subscribe(hello)
         socket.connect(node.graph().topics[topic].publishers[0].endpoints[0])
-        assert socket.recv_multipart()[0] == hello  # its echo
+        assert socket.recv_multipart()[0] == hello  # the publisher's echo
         return socket
 
     yield made
@@ -94,7 +94,7 @@ def all_of(subscriber: nep.Subscriber, count: int) -> list[nep.Message]:
     return got
 
 
-# ---- what arrives
+# ---- delivery
 
 
 def test_burst_arrives_in_order_with_every_message_intact(node: nep.Node) -> None:
@@ -105,7 +105,7 @@ def test_burst_arrives_in_order_with_every_message_intact(node: nep.Node) -> Non
     assert [each.seq for each in got] == list(range(1, 2001))
     stamps = [each.stamp_ns or 0 for each in got]
     assert stamps == sorted(stamps)
-    assert len(set(stamps)) > 1000  # each has its own
+    assert len(set(stamps)) > 1000  # each message keeps its own stamp
     assert (sub.received, sub.lost, sub.refused, pub.count) == (2000, 0, 0, 2000)
 
 
@@ -127,14 +127,14 @@ def test_subscribers_that_support_batches_receive_batches(
         before = pub.count
         burst(pub, 500)
         said = heard(socket, 500)
-        assert said[0] == (1, before + 1)  # the first never waits
+        assert said[0] == (1, before + 1)  # the first message is never delayed
         assert [seq for _many, seq in said] == [
             before + 1 + sum(each for each, _seq in said[:place]) for place in range(len(said))
         ]
         assert max(many for many, _seq in said) <= MAX_PENDING_MESSAGES
         return len(said) < 250
 
-    eventually(comes_together)  # a computer with much else to do may let 20 microseconds pass each time
+    eventually(comes_together)  # on a busy computer, each gap may exceed the window of 20 µs
 
 
 @pytest.mark.parametrize("other", ["an older nep", "a debugger"])
@@ -237,7 +237,7 @@ def test_reader_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=2)
     sub._transport.ready.extend(
         nep.Message("t", bytes([number]), "bytes", "bytes") for number in range(5)
-    )  # as if they came in one part
+    )  # as if received in one batch
     message = sub.receive(0.0)
     assert message is not None
     bounded = sub._transport._drop_excess_locked(sub._transport.ready.popleft())
@@ -246,7 +246,7 @@ def test_reader_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
     assert sub.lost == 2
 
 
-# ---- the waiting
+# ---- batching window
 
 
 def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
@@ -257,7 +257,7 @@ def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
 def test_batching_requires_a_permitting_publisher_and_supporting_readers() -> None:
     batch = PendingBatch(may_wait=True)
     batch.open_window(1000)
-    assert batch.until_ns == 0  # nobody has said that he reads batches
+    assert batch.until_ns == 0  # no subscriber accepts batches yet
     batch.set_allowed(reads_batches=True)
     batch.open_window(1000)
     assert batch.until_ns == 1000 + BATCH_WINDOW_NS
@@ -275,12 +275,12 @@ def test_next_flush_check_is_scheduled_by_the_maximum_delay() -> None:
     assert batch.next_check_s(10_000 + MAX_DELAY_NS) == 0.0
     assert batch.pop_batch() == [(b"x", 10_000), (b"x", 12_000)]
     assert (batch.burst_check_s, batch.is_flush_scheduled) == (0.0, False)
-    batch.is_flush_scheduled = batch.has_sent_full = True  # it sends batch after batch itself
+    batch.is_flush_scheduled = batch.has_sent_full = True  # the publisher sends full batches itself
     waiting(batch, 200_000)
     assert batch.next_check_s(200_001) > MAX_DELAY_NS / 1e9
     assert batch.next_check_s(10**9) == 0.0
     batch.pop_batch()
-    assert batch.burst_check_s == 0.0  # nothing went since
+    assert batch.burst_check_s == 0.0  # nothing was sent since
 
 
 def test_clock_set_back_does_not_delay_a_flush() -> None:
@@ -289,7 +289,7 @@ def test_clock_set_back_does_not_delay_a_flush() -> None:
     assert batch.next_check_s(5 * 10**17) == 0.0
 
 
-# ---- the form
+# ---- encoding
 
 
 @given(

@@ -99,11 +99,11 @@ def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publis
     with running(SUBSCRIBER, master.address, "busy") as busy:
         subscribed(busy)
         before = rss(busy.process.pid)
-        for _ in range(100):  # fewer than its socket takes: the huge ones go there, too
+        for _ in range(100):  # below the socket's message limit, so huge messages are queued there too
             publisher.publish(b"small")
         grown = []
 
-        def has_settled() -> bool:  # a second without growing
+        def has_settled() -> bool:  # no growth for a second
             grown.append(rss(busy.process.pid) - before)
             return len(grown) > 100 and max(grown[-100:]) - min(grown[-100:]) < MB
 
@@ -133,7 +133,7 @@ def test_stopped_subscriber_does_not_affect_other_subscribers(
         assert told(quick) == (80, 0)
         stopped.signal(signal.SIGCONT)
         eventually(lambda: is_all_counted(stopped, 80))
-        assert told(stopped)[1] >= 80 - WINDOW_BYTES // HUGE - 1  # its own were bounded
+        assert told(stopped)[1] >= 80 - WINDOW_BYTES // HUGE - 1  # the stopped one's queue was bounded
         publisher.publish(b"for both again")
         for each in (quick, stopped):
             eventually(lambda each=each: is_all_counted(each, 81))  # type: ignore[misc]
@@ -144,7 +144,7 @@ def test_burst_of_thirty_images_is_not_lost_with_a_late_reader(
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as late:
         subscribed(late)
-        publisher.publish(b"x" * 8_000_000)  # what came first decides nothing
+        publisher.publish(b"x" * 8_000_000)  # the size of the first message has no effect
         eventually(lambda: is_all_counted(late, 1))
         late.stop()
         publish_huge(publisher, 30)

@@ -54,7 +54,7 @@ def test_forged_reply_is_dropped_and_replies_of_the_publisher_arrive(
         honest.publish({"from": "Pepper", "number": 1})
         eventually(lambda: len(heard) == 1)
         forge(own, honest.id, 5000, {"from": "forged"}, in_parts=in_parts)
-        own.publish({"from": "liar"})  # behind it on the same connection
+        own.publish({"from": "liar"})  # follows the forged message on the same connection
         eventually(lambda: {"from": "liar"} in heard)
         for number in (2, 3):
             honest.publish({"from": "Pepper", "number": number, "long": "x" * 100_000})

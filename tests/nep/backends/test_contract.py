@@ -198,7 +198,7 @@ def test_payload_of_a_wrong_type_raises_with_and_without_a_subscriber(
     pub = make("a").new_pub("topic", msg_type, latched=latched)
     if is_heard:
         make("b").new_sub("topic", msg_type)
-    for _ in range(3):  # each of them, not only now and then
+    for _ in range(3):  # every publish raises, not only some of them
         with pytest.raises(nep.EncodeError, match=re.escape(sentence)):
             pub.publish(payload)
     assert (pub.count, pub.refused) == (0, 0)
@@ -251,7 +251,7 @@ def test_strict_publisher_raises_with_and_without_a_subscriber(make: Make, is_he
         ({Treacherous(): Treacherous()}, "can't encode a 'dict' as 'json'"),
         (nep.Encoded(b"1", {"a": object()}), "can't encode a 'Encoded' as 'json'"),
     ):
-        for _ in range(2):  # each of them, not only now and then
+        for _ in range(2):  # every publish raises, not only some of them
             with pytest.raises(nep.EncodeError, match=re.escape(sentence)):
                 pub.publish(payload, strict=True)
     assert (pub.count, pub.refused, pub.problem) == (0, 0, "")
@@ -275,7 +275,7 @@ def test_keep_latest_delivers_only_the_newest_message(make: Make) -> None:
     while other.listen(timeout_s=30.0)[1] != 99:
         pass
     last: object = None
-    while last != 99:  # the two connections are not in step
+    while last != 99:  # the two connections are not synchronized
         ok, last = sub.listen(timeout_s=30.0)
         assert ok
     assert sub.listen() == (False, {})
@@ -290,7 +290,7 @@ def test_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
         pub.publish(n)
     while other.listen(timeout_s=30.0)[1] != 99:
         pass
-    # Nobody reads: the node's thread moves messages into the inbox.
+    # Without a reader, the node's thread moves messages into the inbox.
     deadline = threading.Event()
     while sub.received + (sub.lost or 0) < 100 and not deadline.wait(0.01):
         pass
@@ -325,7 +325,7 @@ def test_slow_callback_with_keep_latest_skips_to_the_newest_message(make: Make) 
         if payload == 99:
             node.stop_spin()
             return
-        if len(got) == 1:  # meanwhile a hundred are published, and come
+        if len(got) == 1:  # 100 messages arrive while the callback runs
             for n in range(100):
                 pub.publish(n)
             eventually(lambda: sub.received == 101)

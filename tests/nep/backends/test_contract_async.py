@@ -129,7 +129,7 @@ def test_cancelled_receive_consumes_no_message(make: Make) -> None:
         first = asyncio.create_task(sub.receive_async())
         await armed(sub)
         pub.publish(1)
-        # The thread has told the loop, and the loop has not told the coroutine yet.
+        # The thread has notified the loop, which hasn't resumed the coroutine yet.
         eventually(lambda: sub._transport not in loop_wait()._shared_wait._armed)
         first.cancel()
         with pytest.raises(asyncio.CancelledError):

@@ -98,12 +98,12 @@ def test_history_has_no_duplicates_or_gaps_during_continuous_publishing(make: Ma
         for _ in range(15):
             with others.new_sub("topic") as sub:
                 got = [number(sub)]
-                # The publisher knows of a subscriber when it answers, some time after there is one.
+                # The publisher knows a subscriber only after the handshake, some time after its creation.
                 count = pub.count
                 while got[-1] < count + 100:
                     got.append(number(sub))
                 assert got == list(range(got[0], got[0] + len(got)))
-                assert got[0] <= max(0, count - 49)  # a message may go out before it is counted
+                assert got[0] <= max(0, count - 49)  # a message may be sent before it is counted
                 assert sub.lost == 0
     finally:
         is_over.set()
@@ -212,7 +212,7 @@ def test_history_ends_with_a_killed_program_and_its_successor_has_its_own(master
             assert got == [[which, n] for which in ("first", "second") for n in range(5)]
 
 
-# ---- its parts
+# ---- history
 
 
 def test_history_evicts_the_oldest_beyond_its_limits() -> None:

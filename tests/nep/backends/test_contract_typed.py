@@ -184,7 +184,7 @@ def test_invalid_field_is_rejected_with_its_path(make: Make) -> None:
     pub.publish(Pose())
     assert sub.listen(timeout_s=30.0) == (True, Pose())
     assert (pub.refused, pub.problem) == (1, "")
-    pub.publish(nep.Encoded(b'{"position":{"x":1}}'))  # sent as it is
+    pub.publish(nep.Encoded(b'{"position":{"x":1}}'))  # sent without validation
     assert sub.listen(timeout_s=30.0)[1].position.x == 1.0
     pub.publish_bytes(b'{"position":{"y":1}}')
     assert sub.listen(timeout_s=30.0)[1].position.y == 1.0

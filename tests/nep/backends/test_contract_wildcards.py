@@ -286,7 +286,7 @@ def test_older_master_without_wildcards_is_reported(
     real = Graph.apply
 
     def apply(self: Graph, request: object, *args: object, **named: object) -> object:
-        if isinstance(request, AddSubscriber):  # it knows nothing of the field
+        if isinstance(request, AddSubscriber):  # an older master ignores this field
             request = replace(request, subscriber=replace(request.subscriber, pattern=False))
         return real(self, request, *args, **named)  # type: ignore[arg-type]
 
@@ -332,7 +332,7 @@ def test_subscriber_is_closed_in_a_forked_child(master: Master, backend: str) ->
         assert program.end()[1] == ""
 
 
-# ---- its parts
+# ---- pattern matching and limits
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
     with nep.node("peer") as node, running(code) as program:
         assert program.line() == "(True, 1)"
         assert program.line() == "ready"
-        with node.new_sub("own", keep="latest") as late:  # it cannot be accepted now: half a second is waited
+        with node.new_sub("own", keep="latest") as late:  # not accepted now; waits half a second
             program.say("go on")
             assert program.line() == "True"
             assert program.line() == "(False, {}) ['own']"

@@ -156,7 +156,7 @@ def test_many_to_many_connects_to_both_ports_of_a_proxy(node: nep.Node, port: in
         xsub.send(xpub.recv())
         pub = node.new_pub("t", "json", conf)
         while not pub.subscribers:
-            assert not xsub.poll(10)  # a proxy always looks at both sockets
+            assert not xsub.poll(10)  # poll both sockets, as a proxy does
         pub.publish(1)
         assert xsub.poll(2000)
         xpub.send(xsub.recv())

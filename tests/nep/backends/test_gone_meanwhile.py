@@ -31,7 +31,7 @@ def test_publisher_that_closes_before_its_subscriber_connects_does_not_delay_sub
             told.append(known(self, record, made, wait_s))
             closing.close(0.0)
             eventually(lambda: not comes.graph().topics["topic"].publishers)
-            comes.graph()  # its answer is read after what came before the last one has been obeyed
+            comes.graph()  # returns after the master's earlier messages have been processed
             return told[-1]
 
         known = MasterSession.add_subscriber

@@ -36,7 +36,7 @@ def test_received_payload_can_be_forwarded_and_stays_readable(node: nep.Node, ma
         message = there.receive(30.0)
         assert message is not None
         back.publish_bytes(message.data)
-        back.publish_bytes(message.data[1000:])  # a part of it is not the message
+        back.publish_bytes(message.data[1000:])  # a slice isn't forwarded as the whole message
         whole, part = sub.receive(30.0), sub.receive(30.0)
         assert whole is not None
         assert part is not None
@@ -61,7 +61,7 @@ def test_subscriber_that_joins_a_stream_completes_its_handshake(node: nep.Node, 
     is_over = threading.Event()
 
     def stream() -> None:
-        while not is_over.wait(0.0001):  # more often than a publisher looks for subscriptions
+        while not is_over.wait(0.0001):  # faster than a publisher polls for subscriptions
             for _ in range(3):
                 pub.publish(b"x" * 100)
 
@@ -72,7 +72,7 @@ def test_subscriber_that_joins_a_stream_completes_its_handshake(node: nep.Node, 
             for number in range(1, 6):
                 started = monotonic()
                 sub = late.new_sub("stream", "bytes")
-                assert monotonic() - started < GREETINGS_S  # it did not have to give up waiting
+                assert monotonic() - started < GREETINGS_S  # the handshake did not time out
                 assert sub.receive(30.0) is not None
                 assert pub.subscribers == number
     finally:
@@ -131,7 +131,7 @@ def test_blocking_reader_does_not_delay_a_new_publisher(node: nep.Node, master: 
 
 def test_unread_messages_are_moved_to_the_inbox_by_the_node(node: nep.Node) -> None:
     sub, pub = node.new_sub("left", "bytes"), node.new_pub("left", "bytes")
-    for _ in range(3):  # a reader that gets one message after the other
+    for _ in range(3):  # a reader that takes one message at a time
         pub.publish(b"x")
         assert sub.receive(30.0) is not None
     for _ in range(3000):
@@ -233,7 +233,7 @@ def test_subscription_without_hello_receives_three_part_messages(
         topic, header, payload = other.recv_multipart()
     assert (topic, payload) == (b"open\0", b"x")
     assert wire.read_header(header).publisher == pub.id
-    assert pub.subscribers == 0  # nobody who said hello
+    assert pub.subscribers == 0  # no subscriber sent a hello
 
 
 def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.Socket[bytes]]) -> None:
@@ -245,7 +245,7 @@ def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.S
         port = there.bind_to_random_port("tcp://127.0.0.1")
         record = PublisherRecord(7, "t", "bytes", "bytes", (f"tcp://127.0.0.1:{port}",))
         for _ in range(2):
-            sub.connect(RemotePublisher(record, "n", "N"))  # twice is once
+            sub.connect(RemotePublisher(record, "n", "N"))  # connecting twice has no effect
         said = []
         while len(said) < 2:
             assert there.poll(5000), "it does not come to the new port"
@@ -265,7 +265,7 @@ def test_message_after_a_rejected_batch_is_read_immediately(context: zmq.Context
     there.bind("inproc://there")
     socket.connect("inproc://there")
     assert there.recv() == b"\1t\0"
-    batch = wire.Header(3, wire.BATCH, 1, 1, 7, 4).pack() + bytes(4)  # a batch of 0 messages
+    batch = wire.Header(3, wire.BATCH, 1, 1, 7, 4).pack() + bytes(4)  # an empty batch
     for _number in range(3):
         there.send(b"t\0" + batch)
     there.send_multipart(wire.join("t", wire.Header(3, 0, 1, 1, 7), b"good"))

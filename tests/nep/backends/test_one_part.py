@@ -55,7 +55,7 @@ def heard(pub: nep.Publisher, socket: zmq.Socket[bytes], payload: bytes, parts: 
         while socket.poll(50):
             got = socket.recv_multipart()
             if got[0].startswith(b"\xff"):
-                continue  # its echo
+                continue  # the publisher's echo
             if wire.split(got).payload == payload and len(got) == parts:
                 return True
         return False
@@ -69,16 +69,16 @@ def test_capable_subscriber_receives_single_part_messages_while_no_other_subscri
     pub = node.new_pub("t", "bytes")
     hello = wire.hello_part(next(IDS), "t", one_part=True)
     able = stranger("t", b"t\0", hello)
-    assert able.recv_multipart()[0] == hello  # its echo
+    assert able.recv_multipart()[0] == hello  # the publisher's echo
     heard(pub, able, b"small", 1)
-    heard(pub, able, b"x" * 100_000, 3)  # what is large is not copied together
+    heard(pub, able, b"x" * 100_000, 3)  # large payloads are not copied into a single part
 
     own = wire.hello_part(next(IDS), "t")
     other = stranger("t", b"t\0", own)
     assert other.recv_multipart()[0] == own
     heard(pub, other, b"for both", 3)
     heard(pub, able, b"for both again", 3)
-    for _ in range(3):  # from its echo on it never gets what it did not ask for
+    for _ in range(3):  # after the echo, a subscriber never gets a form it didn't request
         pub.publish(b"in parts")
     assert [len(other.recv_multipart()) for _ in range(3)] == [3, 3, 3]
 
@@ -112,7 +112,7 @@ def test_other_subscribers_and_topics_do_not_change_single_part_delivery_afterwa
         with node.new_sub("t", "bytes"):
             assert pub.subscribers == 2
         eventually(lambda: pub.subscribers == 1)
-    lost = stranger("t", b"other\0", wire.hello_part(next(IDS), "other"))  # an old publisher's port
+    lost = stranger("t", b"other\0", wire.hello_part(next(IDS), "other"))  # another publisher's endpoint
     heard(pub, able, b"in the end", 1)
     assert not lost.poll(50)
 

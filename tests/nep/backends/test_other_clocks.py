@@ -98,7 +98,7 @@ def test_clock_of_another_computer_is_compared_and_corrected() -> None:
             assert far.clock_offset_ns == pytest.approx(-shift_s * 1e9, abs=0.5e9)
             assert far.clock_uncertainty_ns is not None
             assert far.clock_uncertainty_ns > 0
-            # Somebody sets the other clock: what was known is forgotten, and it is compared anew.
+            # The other clock is set: the known offset is discarded and measured again.
             program.say("3.7")
             assert program.line() == "set"
             check_corrected(heard(sub, is_near), 3.7)

@@ -118,7 +118,7 @@ def test_ros2_back_end_passes_the_contract_in_an_isolated_network(file: str, cho
 def test_topic_and_service_names_round_trip_to_dds_names() -> None:
     assert dds_topic("chatter") == dds_topic("/chatter") == "rt/chatter"
     for node_id in ("0123456789abcdef", "f123456789abcde0"):
-        place = f"/nep/parameters/{node_id}"  # ROS 2 has no names with a digit behind a "/"
+        place = f"/nep/parameters/{node_id}"  # ROS 2 doesn't allow a digit after a "/" in a name
         assert ros_topic(dds_topic(place)) == place
         assert ros_service(dds_service(place)[0]) == place
         assert dds_topic(place).rpartition("/")[2].isidentifier()
@@ -181,7 +181,7 @@ def test_discovery_is_loopback_only_unless_configured() -> None:
         cyclonedds_config({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"})
 
 
-# ---- what is missing, and other back ends
+# ---- missing packages and other back ends
 
 
 def test_missing_packages_are_reported_with_the_install_command(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -214,7 +214,7 @@ def test_back_end_name_is_case_insensitive() -> None:
     assert find_backend("ROS2") is find_backend("ros2")
 
 
-# ---- who does not hear whom
+# ---- incompatible endpoints
 
 
 def party(
@@ -373,7 +373,7 @@ def test_truncated_bytes_raise_decode_error(types: MessageTypes, cut: int) -> No
 
 def test_invalid_definitions_are_rejected(types: MessageTypes, tmp_path: Path) -> None:
     types.add("mine/Arm", "float64[2] joints\n")
-    types.add("mine/msg/Arm", "float64[2] joints\n")  # the same again
+    types.add("mine/msg/Arm", "float64[2] joints\n")  # the same definition again
     with pytest.raises(nep.NepError, match=r"'mine/msg/Arm' .*other fields"):
         types.add("mine/Arm", "float64[3] joints\n")
     with pytest.raises(nep.NepError, match="the definition of 'mine/msg/Leg' can't be read"):

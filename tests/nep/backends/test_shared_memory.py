@@ -118,7 +118,7 @@ def test_burst_of_thirty_images_arrives_completely(master: Master, node: nep.Nod
     with running(LISTENER, master.address) as listener:
         assert listener.line() == "listens"
         begun = begin(pub)
-        pictures = [os.urandom(2**16) * 95 for _ in range(30)]  # 6 MB
+        pictures = [os.urandom(2**16) * 95 for _ in range(30)]  # 6 MB each
         for each in pictures:
             pub.publish(each)
         pub.publish(b".")
@@ -213,11 +213,11 @@ def test_received_image_is_a_read_only_view_of_shared_memory(node: nep.Node) -> 
 
 def test_loan_is_published_without_a_copy(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "image"), node.new_pub("t", "image")
-    assert pub.loan((480, 640, 3)).shape == (480, 640, 3)  # nobody shares: an array as any other
+    assert pub.loan((480, 640, 3)).shape == (480, 640, 3)  # no shared memory yet: an ordinary array
     while not readers(pub):
         pub.publish(nep.raw_image(np.zeros((480, 640, 3), np.uint8)))
         assert sub.receive(LONG_S) is not None
-    for value in range(50):  # more than there are slots
+    for value in range(50):  # more than the number of slots
         frame = pub.loan((480, 640, 3))
         frame[:] = value
         where = frame.ctypes.data
@@ -227,7 +227,7 @@ def test_loan_is_published_without_a_copy(node: nep.Node) -> None:
         assert in_memory(message)
         picture: Any = message.payload
         assert (picture.shape, int(picture.min()), int(picture.max())) == ((480, 640, 3), value, value)
-        assert where != picture.ctypes.data  # the same page, which each end sees at a place of its own
+        assert where != picture.ctypes.data  # the same page, mapped at a different address by each end
     floats = pub.loan((200, 300), "float32")
     floats[:] = 1.5
     pub.publish(nep.raw_image(floats))
@@ -256,7 +256,7 @@ def test_unpublished_loans_are_released(node: nep.Node) -> None:
     transport = pub._transport
     assert isinstance(transport, NativePublisher)
     kept = [pub.loan((480, 640, 3)) for _ in range(10)]
-    assert transport.borrow_memory(480 * 640 * 3) is None  # so many at once are an ordinary array
+    assert transport.borrow_memory(480 * 640 * 3) is None  # no free slot: would be an ordinary array
     kept.clear()
     assert transport.borrow_memory(480 * 640 * 3) is not None
 
@@ -289,7 +289,7 @@ def test_segment_grows_for_larger_payloads(node: nep.Node) -> None:
         assert message is not None
         assert in_memory(message), size
         assert message.payload == b"\1" * size
-    pub.publish(bytes(70_000_000))  # more than slots are made for
+    pub.publish(bytes(70_000_000))  # above the maximum size of a slot
     message = sub.receive(LONG_S)
     assert message is not None
     assert not in_memory(message)
@@ -322,14 +322,14 @@ def test_small_payloads_are_copied_and_hold_no_slots(node: nep.Node) -> None:
     for _ in range(begin(pub, size=size)):
         sub.receive(LONG_S)
     messages = []
-    for number in range(300):  # more than there are slots
+    for number in range(300):  # more than the number of slots
         pub.publish(bytes([number % 256]) * size)
         messages.append(sub.receive(LONG_S))
         assert readers(pub) == 1
     kept = [each for each in messages if each is not None]
     assert [each.payload[-1] for each in kept] == [number % 256 for number in range(300)]
     assert not any(map(in_memory, kept))
-    pub.publish(bytes(size + 1))  # which takes new memory
+    pub.publish(bytes(size + 1))  # above the copy limit: allocates memory
     sub.receive(LONG_S)
     for _ in range(begin(pub, size=size + 1)):
         sub.receive(LONG_S)
@@ -400,7 +400,7 @@ def test_slots_of_a_killed_reader_are_released() -> None:
             print(len(kept))
     """
     writer = SharedWriter(next(_ids))
-    assert writer.prepare(9_000_000)  # 16 MB: twenty slots
+    assert writer.prepare(9_000_000)  # twenty slots of 16 MB
     with running(code, str(writer._publisher)) as program:
         assert program.line() == "open"
         count = 0

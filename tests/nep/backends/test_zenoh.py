@@ -94,7 +94,7 @@ def ask(peer: Program, text: str) -> str:
     return peer.line()
 
 
-# ---- programs that meet
+# ---- connections between programs
 
 
 def test_two_programs_connect_without_a_master(make: Make, place: str) -> None:
@@ -171,7 +171,7 @@ def test_hung_subscriber_is_named_and_does_not_block_publishing(
         assert view.topics["from/peer"].rate_hz is None
         assert subscriber.received in {0, None}
         for n in range(1000):
-            pub.publish(n)  # nobody waits for it
+            pub.publish(n)  # must not wait for the stopped peer
         pub.close(timeout_s=0.2)
         assert "'to/peer' was closed before 1 subscriber(s) received everything: up to 1000" in caplog.text
         late = make("late")
@@ -282,7 +282,7 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
     assert sub.listen(timeout_s=30.0) == (True, 1)
 
 
-# ---- places
+# ---- addresses
 
 
 def test_zenoh_address_is_taken_from_argument_or_configuration_variable(
@@ -376,7 +376,7 @@ def test_invalid_rendezvous_folder_is_reported(monkeypatch: pytest.MonkeyPatch, 
         node.new_pub("t")
 
 
-# ---- a router between them
+# ---- routers
 
 
 def router(port: int, more: str = "", protocol: str = "tcp") -> str:
@@ -424,13 +424,13 @@ def test_user_configuration_file_is_used(
         between.line()
         sub = make("b", "").new_sub("t")
         pub = make("a", "").new_pub("t")
-        for number in range(1, 61):  # what is sent while the two connect directly, zenoh's router may drop
+        for number in range(1, 61):  # zenoh's router may drop messages while the two connect directly
             pub.publish(number)
             came, first = sub.listen(timeout_s=0.5)
             if came:
                 break
         assert came
-        assert sub.lost < first  # those from before it was greeted do not count
+        assert sub.lost < first  # messages from before the handshake don't count as lost
         import psutil
 
         listening = [
@@ -439,7 +439,7 @@ def test_user_configuration_file_is_used(
         assert set(listening) <= {"127.0.0.1"}
 
 
-# ---- the library, and forks
+# ---- missing library and forks
 
 
 def test_missing_zenoh_is_reported_with_the_install_command() -> None:

@@ -67,7 +67,7 @@ def make_certificates(folder: Path) -> None:
         subprocess.run(["openssl", *words], cwd=folder, check=True, capture_output=True)
 
     for name in ("authority", "stranger"):
-        subject = ("-subj", f"/CN={'robot' if name == 'stranger' else name}")  # it lies
+        subject = ("-subj", f"/CN={'robot' if name == 'stranger' else name}")  # claims the robot's name
         openssl(
             "req", "-x509", *_KEY, "-keyout", f"{name}.key", "-out", f"{name}.pem", "-days", "2", *subject
         )

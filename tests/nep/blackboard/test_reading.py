@@ -134,12 +134,12 @@ NOW, WALL_NS = 50.0, 1_800_000_000_000_000_000
     [
         (0.5, False, 0.5, "stamp"),
         (0.0, False, 0.0, "stamp"),
-        (-0.05, False, 0.0, "stamp"),  # clocks that are nearly the same
-        (-0.2, False, 0.0, "arrival"),  # of the future
+        (-0.05, False, 0.0, "stamp"),  # clocks that differ slightly
+        (-0.2, False, 0.0, "arrival"),  # stamp in the future
         (-1e6, True, 0.0, "arrival"),
         (9.0, False, 9.0, "stamp"),
-        (11.0, False, 0.0, "arrival"),  # a clock that goes late
-        (3600.0, True, 3600.0, "stamp"),  # it was kept for us
+        (11.0, False, 0.0, "arrival"),  # sender's clock is behind
+        (3600.0, True, 3600.0, "stamp"),  # latched an hour ago
         (None, False, 0.0, "arrival"),  # the original wire has no stamps
     ],
 )

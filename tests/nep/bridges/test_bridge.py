@@ -467,7 +467,7 @@ def test_pattern_routes_are_bounded(monkeypatch, caplog):
         assert len(bridge.routes) == 2
 
 
-# ---- who is not there
+# ---- unavailable networks
 
 
 def test_unavailable_network_is_reported_and_awaited_while_other_networks_work(caplog):
@@ -483,7 +483,7 @@ def test_unavailable_network_is_reported_and_awaited_while_other_networks_work(c
                 pub.publish(number)
             eventually(lambda: route(bridge, "a", "/t").counts().waiting == 5)
             eventually(lambda: re.match(f"no master .*'{address}'", bridge.sides["b"].problem))
-            # It is known before it is written to the log.
+            # The problem is set before it is logged.
             eventually(lambda: "waiting for side" in caplog.text)
             assert caplog.text.count("waiting for side") == 1
             assert not bridge.is_ready
@@ -558,7 +558,7 @@ def test_publisher_of_another_type_is_subscribed_with_its_type():
         assert len(watcher.graph().topics["/t"].subscribers) == 1
 
 
-# ---- what others see, and the end
+# ---- graph, counts and shutdown
 
 
 def test_graph_shows_the_bridge_and_counts_are_published_on_both_sides(pair):

@@ -89,7 +89,7 @@ def test_every_message_between_processes_is_forwarded_or_counted(file, nodes):
         assert taken(back, 1) == ["from b"]
         report = when(program, lambda it: way(it, "b")["received"] == 1)
         assert way(report, "b")["sent"] == 1
-        if sys.platform == "win32":  # where a process is asked to end by no signal
+        if sys.platform == "win32":  # Windows has no signal for a graceful shutdown
             return
         program.signal(signal.SIGTERM)
         out, err = program.end()
@@ -198,7 +198,7 @@ class OnTerminal:
     def _read(self):
         try:
             said = os.read(self._keys, 100_000).decode()
-        except OSError:  # its end
+        except OSError:  # the terminal was closed
             said = ""
         assert said, f"it ended: {self.text}"
         return said
@@ -231,7 +231,7 @@ def test_terminal_table_updates_in_place_with_warnings_above(file, nodes):
         pub.publish({"no": "text"})
         shown.shows("a message on '/t' can't be sent (1 so far): can't encode a 'dict' as 'string'")
         shown.shows("! zeromq → zenoh  /t: can't encode")
-        shown.shows("\x1b[1A")  # up again: the next report takes its place
+        shown.shows("\x1b[1A")  # cursor up: the next report replaces this one
         rest, code = shown.end()
         assert code == INTERRUPTED
         assert "Traceback" not in shown.text

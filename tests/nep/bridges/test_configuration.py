@@ -146,8 +146,8 @@ def test_qos_values_of_the_back_end_are_accepted(monkeypatch):
     )
 
 
-A_FOLDER = "permission denied" if sys.platform == "win32" else "is a directory"  # as the system says it
-NUL = "character" if sys.platform == "win32" else "byte"  # as Python says it there
+A_FOLDER = "permission denied" if sys.platform == "win32" else "is a directory"  # the system's error text
+NUL = "character" if sys.platform == "win32" else "byte"  # Python's word on that platform
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def written(path, data):
     return path
 
 
-# ---- whatever it holds
+# ---- arbitrary contents
 
 
 scalars = st.one_of(

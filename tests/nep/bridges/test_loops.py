@@ -145,7 +145,7 @@ def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
             assert 1 <= came <= 4, "each bridge once from each copy, and no more"
 
 
-# ---- networks that tell nothing
+# ---- networks without extensions
 
 
 class Nameless(memory.MemoryTransport):
@@ -364,7 +364,7 @@ def test_known_bridges_are_bounded():
     assert len(known.parallel_bridges(0.0)) == 64
 
 
-# ---- trails and echoes alone
+# ---- trails and echoes, unit tests
 
 
 def test_trail_determines_where_a_message_may_be_forwarded():

@@ -34,7 +34,7 @@ def test_every_message_of_a_rate_limited_topic_is_sent_or_counted_as_replaced():
         sub, pub, never = b.node("b").new_sub("/t"), a.node("a").new_pub("/t"), threading.Event()
         for number in range(50):
             pub.publish(number)
-            never.wait(0.006)  # memory hands them over 200 times a second
+            never.wait(0.006)  # the memory back end delivers 200 times a second
         counts = settled(route(bridge, "a", "/t"), 50)
         assert counts.sent + counts.thinned == 50
         assert taken(sub, 1) == [0]
@@ -80,7 +80,7 @@ def test_latched_message_stays_latched_under_a_rate_limit():
         assert b.node("late").new_sub("/t").receive(30.0).payload == 9
 
 
-# ---- the limit and the pacer alone
+# ---- rate limit and pacer, unit tests
 
 
 def test_rate_limit_passes_the_configured_rate():

@@ -33,8 +33,8 @@ def type_in(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) 
 
     def typed(*words: str) -> Typed:
         monkeypatch.setattr("sys.argv", ["nep", *words])
-        before = signal.getsignal(signal.SIGTERM)  # some commands have a handler of their own
-        environment = dict(os.environ)  # where the master is, say, is told to what a command starts
+        before = signal.getsignal(signal.SIGTERM)  # some commands install their own handler
+        environment = dict(os.environ)  # commands set variables for child processes, such as NEP_MASTER
         try:
             code = run()
         finally:

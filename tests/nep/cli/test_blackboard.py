@@ -85,7 +85,7 @@ def test_name_and_lifetime_options_are_applied(master: Master, run: TypeIn) -> N
         pub = node.new_pub("/blackboard")
         causes: list[object] = []
         while len(causes) < 2:
-            if not causes:  # on a busy computer one may come when its life is over
+            if not causes:  # on a busy computer, a value may arrive after its lifetime
                 pub.publish({"primitive": "word", "input": {"hello": 1}})
             ok, change = told.listen(timeout_s=1.0)
             causes += [change["cause"]] if ok else []  # type: ignore[index]

@@ -52,7 +52,7 @@ class Shown:
 
     def look(self) -> str:
         """Read the available output and return all text since the start."""
-        with suppress(BlockingIOError, OSError):  # there is nothing; it has ended
+        with suppress(BlockingIOError, OSError):  # no output yet, or the process has ended
             while data := os.read(self.keys, 65536):
                 self.text += data.decode("utf-8", "replace")
         return self.text
@@ -88,7 +88,7 @@ def talking(node: nep.Node) -> Iterator[None]:
     """Publish and log about 300 times a second; check that a subscriber received the first message."""
     pub, ended = node.new_pub("flood"), threading.Event()
     heard = node.new_sub("flood")
-    node.log.propagate = False  # the test's own output needs none of it
+    node.log.propagate = False  # keeps the log out of the test's output
 
     def talk() -> None:
         number = 0

@@ -81,7 +81,7 @@ def test_completion_without_a_master_is_empty_and_returns_at_once(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     assert complete("bash", "nep topic echo /o") == []
     line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))
-    with pytest.raises(OSError, match=r"refused|timed out"):  # at once: nobody is asked, and waited for
+    with pytest.raises(OSError, match=r"refused|timed out"):  # fails at once, without waiting for a master
         _reachable_master(line)
     for wrong in ("no address at all", "a..b:7780", f"{'x' * 70}.invalid"):
         monkeypatch.setenv("NEP_MASTER", wrong)

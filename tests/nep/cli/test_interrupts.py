@@ -83,7 +83,7 @@ def test_cli_package_import_loads_no_other_modules():
 def test_interrupt_during_interpreter_shutdown_exits_with_130():
     done = python(
         "import atexit, os, signal, sys; from nep.cli import main\n"
-        "def interrupt():\n"  # of Python: 3.10 looks for signals only between its own instructions
+        "def interrupt():\n"  # a Python function: 3.10 checks for signals only between bytecodes
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    os.getpid()\n"
         "atexit.register(interrupt)\n"
@@ -135,7 +135,7 @@ def test_every_termination_signal_is_handled_once_and_nohup_is_respected():
     assert (done.returncode, done.stdout, done.stderr) == (7, b"bye\n", b"")
 
 
-# ---- the package, which is imported before anything can be said of Ctrl+C
+# ---- the package, imported before Ctrl+C is handled
 
 
 def test_lazy_exports_match_those_seen_by_type_checkers():

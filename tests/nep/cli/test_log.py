@@ -70,11 +70,11 @@ def test_late_start_shows_the_last_errors_first_and_each_once(master, capfd):
 
 def test_error_logged_during_the_command_is_shown_once(busy, capfd):
     log("error", "other", 1, busy)
-    with nep.node("looker", master=busy) as looker:  # it is kept a moment after it was told
+    with nep.node("looker", master=busy) as looker:  # errors are stored shortly after they are published
         eventually(lambda: LAST_ERRORS_TOPIC in looker.graph().topics)
         with looker.new_sub(LAST_ERRORS_TOPIC) as kept:
             assert kept.listen(timeout_s=30.0)[0]
-    log("error", "other", 1, busy)  # the same one, which is kept
+    log("error", "other", 1, busy)  # the same error, now a stored one
     assert capfd.readouterr().out.count("not mine") == 2
 
 
@@ -91,7 +91,7 @@ def test_master_logs_its_alerts_and_their_resolution():
     ):
         assert {node.name for node in page.graph().nodes.values()} == {
             "page"
-        }  # nothing to tell, nobody there
+        }  # without alerts, no master node is registered
         with nep.node("twin", master=master.address) as one, nep.node("twin", master=master.address) as two:
             pubs = one.new_pub("a"), two.new_pub("b")
             first = records.listen(timeout_s=30.0)[1]

@@ -15,7 +15,7 @@ from tests.nep.meeting import place_for
 @pytest.fixture
 def there(monkeypatch):
     """Command-line options of a network over the memory back end in which a node publishes /odom."""
-    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # an address of another back end is ignored
     place, ended = place_for("memory", ""), threading.Event()
 
     def publish(publisher: Publisher) -> None:

@@ -84,7 +84,7 @@ def test_watch_shows_current_values_and_each_change_once(node: nep.Node) -> None
     try:
         lines = iter(watching.process.stdout.readline, "")
         assert [next(lines) for _each in range(3)] == ["speed: 0.5\n", 'mode: "walk"\n', 'serial: "7"\n']
-        node.parameters["speed"] = 0.5  # no change
+        node.parameters["speed"] = 0.5  # unchanged value
         with nep.node("stranger") as stranger, stranger.new_pub(parameters_topic(node.id)) as loud:
             loud.publish("no state")
             loud.publish({"parameters": 1})

@@ -23,7 +23,7 @@ from nep.messages.message import received_message as new_arrived
 def test_intervals_are_measured_with_the_publisher_clock():
     window = RateWindow(10.0)
     for number, stamp in enumerate((0.0, 0.1, 0.2, 0.4)):
-        window.add(5.0 + number * 0.005, stamp, 10)  # they arrived in one heap
+        window.add(5.0 + number * 0.005, stamp, 10)  # messages arrive in one burst
     found = window.frequency(6.0)
     assert found.messages == 4
     assert found.rate_hz == pytest.approx(3 / 0.4)
@@ -37,7 +37,7 @@ def test_intervals_without_stamps_use_arrival_times_and_ignore_order():
         window.add(arrived, None, 10)
     assert window.frequency(3.0).rate_hz == pytest.approx(1.0)
     mixed = RateWindow(10.0)
-    for stamp in (3.0, 1.0, 2.0):  # two publishers
+    for stamp in (3.0, 1.0, 2.0):  # as from two publishers
         mixed.add(5.0, stamp, 10)
     assert mixed.frequency(5.0).rate_hz == pytest.approx(1.0)
 

@@ -160,7 +160,7 @@ def test_service_names_are_completed(arm, master):
 
 
 def test_services_of_another_back_end_are_listed_and_called(type_in, monkeypatch):
-    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # an address of another back end is ignored
     monkeypatch.setenv("NEP_ZENOH_CONFIG", place_for("zenoh", ""))
     place = place_for("zenoh", "")
     there = ("--backend", "zenoh", "--master", place)

@@ -122,7 +122,7 @@ FULL = Path("/dev/full")
 )
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_full_disk_is_reported(talkers, words, unbuffered):
-    env = {"PYTHONUNBUFFERED": unbuffered}  # containers set it
+    env = {"PYTHONUNBUFFERED": unbuffered}  # set in many containers
     with FULL.open("w") as full, command(*words, stdout=full, env=env) as running:
         said = running.stderr.read().decode()
     assert running.returncode == 1

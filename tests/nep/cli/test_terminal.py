@@ -52,7 +52,7 @@ def test_write_never_blocks_and_dropped_output_is_reported(stuck: Stuck) -> None
     for n in range(1000):
         assert terminal.write(f"line {n}\n") > 0
         terminal.flush()
-    terminal.close(0.0)  # nor does closing
+    terminal.close(0.0)  # close doesn't block either
     stuck.may_go_on.set()
     eventually(lambda: "dropped" in stuck.getvalue())
     lines = stuck.getvalue().splitlines()
@@ -166,7 +166,7 @@ def test_master_with_a_blocked_terminal_keeps_serving_and_exits(tmp_path: Path) 
     os.close(writing)
     try:
         with nep.node("loud", master=address) as node:
-            for n in range(20):  # each an alert of some hundred letters
+            for n in range(20):  # each raises an alert of some hundred characters
                 topic = f"/{n}/" + "x" * 180
                 pair = node.new_pub(topic, "json"), node.new_pub(topic, "string")
                 assert pair[0].id != pair[1].id

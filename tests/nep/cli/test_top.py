@@ -128,15 +128,15 @@ def test_terminal_view_fits_reports_hidden_rows_and_marks_new_losses(
         shown.show(graph(*many), "")
         before = out.tell()
         shown.show(graph(replace(many[0], lost=3), *many[1:]), "the master has gone")
-        painted = out.getvalue()[before:]  # before the end, which paints once more
+        painted = out.getvalue()[before:]  # before the context exits, which renders once more
     assert "the master has gone" in painted
-    assert "(+39)" in painted  # 11 of 50 have room
+    assert "(+39)" in painted  # 11 of 50 rows fit
     assert "camera" in painted
     row = next(line for line in painted.splitlines() if "/t00" in line)
     assert "33m3" in row  # yellow
     assert "33m" not in next(line for line in painted.splitlines() if "/t01" in line)
     lines = [
         line for line in painted.splitlines() if "\x1b[1A" not in line
-    ]  # else what takes the old ones away
+    ]  # without the lines that erase the previous frame
     assert sum("/t" in line for line in lines) == 11
     assert len(lines) <= 20

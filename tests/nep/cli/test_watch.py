@@ -67,7 +67,7 @@ def test_alarm_is_printed_and_calls_a_service(master, type_in, file) -> None:
     assert lines == ["range of /distance is 0.3, below 0.4", "  brake replied"]
     assert asked == [{"n": 1}]
     assert "When range of /distance is below 0.4" in done.stderr
-    assert "\a" not in done.stderr  # no terminal
+    assert "\a" not in done.stderr  # stderr is not a terminal
 
 
 def test_alarms_are_printed_as_json_and_actions_only_studio_supports_are_reported(

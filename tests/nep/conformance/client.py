@@ -60,7 +60,7 @@ class Client(Connections, Services):
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
-    # ---- as the streams of an adapter
+    # ---- process interface of an adapter
 
     def wait(self, timeout_s: float) -> int | None:
         self._thread.join(timeout_s)

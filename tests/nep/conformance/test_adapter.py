@@ -18,7 +18,7 @@ ADAPTER = (sys.executable, str(Path(__file__).parents[3] / "examples" / "conform
 
 def test_nep_passes_every_rule() -> None:
     rules = select_rules(())
-    with ThreadPoolExecutor(4) as pool:  # they mostly wait
+    with ThreadPoolExecutor(4) as pool:  # the rules mostly wait
         found = pool.map(
             lambda first: list(check(lambda master: AdapterProcess(ADAPTER, master), rules[first::4])),
             range(4),

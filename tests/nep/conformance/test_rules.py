@@ -27,7 +27,7 @@ def outcomes() -> Mapping[str, Outcome]:
 
 def test_correct_client_passes_every_rule() -> None:
     rules = select_rules(())
-    with ThreadPoolExecutor() as pool:  # they mostly wait
+    with ThreadPoolExecutor() as pool:  # the rules mostly wait
         found = pool.map(lambda first: list(check(Client, rules[first::8], SCALE)), range(8))
         outcomes = [each for some in found for each in some]
     assert [(each.rule.id, each.observed) for each in outcomes if each.status != "passed"] == []

@@ -40,7 +40,7 @@ def test_local_master_is_found_with_its_process(master):
         facts = collect_facts(master.address)
         took_s = time.monotonic() - began
     assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
-    assert 0.0 < facts.reply_time_s < took_s  # it is a part of the look
+    assert 0.0 < facts.reply_time_s < took_s  # part of the whole collection time
     assert facts.master_port.is_taken
     assert facts.master_port.holder.pid == os.getpid()
     assert facts.loopback_problem == ""
@@ -208,7 +208,7 @@ def test_lingering_connections_of_a_killed_program_do_not_hold_its_port():
         address = server.getsockname()
         client.connect(address)
         accepted, _ = server.accept()
-        accepted.close()  # from here on its end of the connection waits for the other to close
+        accepted.close()  # the server's end of the connection is now in FIN-WAIT-2
         server.close()
         assert processes.is_free(address[1])
 

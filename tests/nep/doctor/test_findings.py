@@ -135,7 +135,7 @@ def test_no_start_command_is_suggested_for_a_network_address():
 def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, fix):
     made = found(view=None, address="10.0.0.5:7780", master_port=None, reach_failure=reach)
     one = made["master:unreached"]
-    assert (one.severity, one.command) == ("error", "")  # it can't be started from here
+    assert (one.severity, one.command) == ("error", "")  # a remote master can't be started from here
     assert one.sentence.startswith(sentence)
     assert fix in one.fix
     assert "master:none" not in made
@@ -315,7 +315,7 @@ def test_alerts_of_the_master_are_findings_except_those_the_doctor_checks_itself
     ]
     made = found(view=view(alerts=alerts))
     assert made["name:x"].fix == "Give each a name."
-    assert "port:7000" not in made  # the doctor looks who holds it
+    assert "port:7000" not in made  # the doctor checks the port itself
 
 
 def test_folders_clocks_and_loopback_problems_are_reported():

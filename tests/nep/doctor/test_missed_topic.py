@@ -46,7 +46,7 @@ def test_silent_publisher_is_reported_with_its_duration_and_alternatives():
     assert one.fix.endswith("Call its service “restart_camera” to restart it.")
     (one,) = found(**publisher(sent=0, last_message_s=None)).values()
     assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera yet."
-    (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends
+    (one,) = found(**publisher(sent=None, generation="B")).values()  # its messages are not counted
     assert "number" not in one.fix
     assert at in one.fix
 
@@ -93,7 +93,7 @@ def test_missing_publisher_is_reported_with_the_published_topics():
         alone["topic:nobody"].fix
         == "Start the program that publishes it. No other topics are published either."
     )
-    assert "topic:closed" not in alone  # it serves other computers
+    assert "topic:closed" not in alone  # the master accepts other computers
     assert alone["topic:shared"].severity == "info"
     assert "firewall" in alone["topic:shared"].fix
     assert "topic:shared" not in nobody
@@ -169,10 +169,10 @@ def test_endpoint_reachability_is_checked(monkeypatch):
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         place = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        assert probe_endpoint(place) == "refused"  # it is bound, and nobody listens
+        assert probe_endpoint(place) == "refused"  # bound, but not listening
         server.listen(1)
         assert probe_endpoint(place) == ""
-    assert probe_endpoint("ipc://@nep-7780") == ""  # not by the network
+    assert probe_endpoint("ipc://@nep-7780") == ""  # not a network endpoint
 
     for error, reach in ((TimeoutError(), "timeout"), (OSError("no route to host"), "unknown")):
         monkeypatch.setattr(socket, "create_connection", Mock(side_effect=error))
@@ -193,7 +193,7 @@ def test_published_topics_of_a_running_master_are_diagnosed(master):
         assert (one.node, one.reach_failure) == ("arm", "")
         assert one.endpoint.startswith("tcp://127.0.0.1:")
         (silent,) = [each for each in topic_findings(facts) if each.severity == "error"]
-        assert silent.id in {"topic:silent:arm", "topic:blocked"}  # by how new the master's figures are
+        assert silent.id in {"topic:silent:arm", "topic:blocked"}  # depends on the age of the master's data
         near = diagnose(master.address, "/arm/posse")
         assert (near[0].id, near[0].instead) == ("topic:near", "/arm/pose")
         assert "master" in {each.id for each in near}

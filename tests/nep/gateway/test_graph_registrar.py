@@ -112,7 +112,7 @@ def test_cpu_load_of_an_original_is_read_from_the_system(desk):
 
 def test_missing_process_and_first_reading_have_no_cpu_load():
     assert cpu_load_of(2**22 + 1).ratio() is None
-    assert cpu_load_of(os.getpid()).ratio() is None  # one reading tells nothing
+    assert cpu_load_of(os.getpid()).ratio() is None  # a load needs two readings
 
 
 def test_equivalent_type_names_are_not_a_conflict(desk, listing):

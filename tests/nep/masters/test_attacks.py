@@ -214,7 +214,7 @@ def test_forged_renewal_changes_neither_lease_nor_counts(master: Master, victims
 def test_id_of_a_publisher_or_subscriber_cannot_be_taken_over(
     master: Master, victims: Victims, is_proven: bool
 ) -> None:
-    number = 1 if is_proven else 0  # a number that does not prove it
+    number = 1 if is_proven else 0  # 1: a proof that doesn't match the id; 0: no proof
     with attacker_at(master) as attacker:
         taken = publisher(id=victims.pub.id, number=number)
         assert isinstance(attacker.ask(AddPublisher(node(), taken)), RejectedReply)

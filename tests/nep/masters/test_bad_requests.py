@@ -71,7 +71,7 @@ def test_master_logs_the_first_bad_request_then_rarely_and_raises_an_alert(
     caplog.set_level(logging.WARNING, "nep.master")
     context = zmq.Context()
     with nep.node("tester") as node:
-        for n in range(25):  # each time as another stranger
+        for n in range(25):  # each time as a new client
             with context.socket(zmq.DEALER) as socket:
                 socket.setsockopt(zmq.LINGER, 0)
                 socket.connect(f"tcp://{master.address}")

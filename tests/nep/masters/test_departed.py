@@ -24,7 +24,7 @@ def test_newest_departed_publishers_are_kept_for_a_minute_and_bounded() -> None:
         departed.add(("t", "**"), number, f"{number}")
     assert list(departed.for_topic("t")) == list(departed.for_topic("**")) == list(range(36, 100))
     departed.tick(10.0)
-    departed.add(("t",), 99, "again")  # it came back, and ended again
+    departed.add(("t",), 99, "again")  # the publisher returned and ended again
     departed.tick(69.0)
     assert departed.for_topic("t")[99] == "again"
     assert 99 not in departed.for_topic("**")

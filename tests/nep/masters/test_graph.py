@@ -344,7 +344,7 @@ def test_wildcard_subscribers_are_listed_as_patterns_and_round_trip(graph: Graph
     body = encoding.encode_reply(GraphReply(7, graph.revision, seen), 3)
     assert encoding.decode_reply(body) == (3, GraphReply(7, graph.revision, seen))
     assert seen.to_plain()["patterns"][0]["name"] == "/robot/*/camera"  # type: ignore[index]
-    ask(graph, AddPublisher(node("p"), publisher(3, "/robot/*/camera")))  # a name as any other
+    ask(graph, AddPublisher(node("p"), publisher(3, "/robot/*/camera")))  # valid as an ordinary topic name
     assert set(graph.view().topics) == {"/robot/a/camera", "/robot/*/camera"}
     assert graph.view().topics["/robot/*/camera"].subscribers == ()
     ask(graph, RemovePublisher("p", 3))
@@ -364,9 +364,9 @@ def test_rate_meter_needs_two_readings_and_resets_on_restart() -> None:
     assert meter.rates() is None
     meter.add(1.0, 100, 1000)
     assert meter.rates() == (100.0, 1000.0)
-    meter.add(2.0, 100, 1000)  # it stopped: shown as the mean until ten messages are out of the window
+    meter.add(2.0, 100, 1000)  # stopped: the mean is shown until ten messages have left the window
     for second in range(3, 20):
         meter.add(float(second), 100, 1000)
     assert meter.rates() == (0.0, 0.0)
-    meter.add(21.0, 3, 3)  # the program was started again
+    meter.add(21.0, 3, 3)  # the program was restarted
     assert meter.rates() is None

@@ -88,7 +88,7 @@ def test_longer_renewal_interval_extends_the_lease() -> None:
     assert "n0" in found.overdue_node_ids(4.41)
     assert "n0" not in found.expired_node_ids(5.9)
     assert "n0" in found.expired_node_ids(6.1)
-    assert "n1" in found.expired_node_ids(3.0)  # it was told nothing yet
+    assert "n1" in found.expired_node_ids(3.0)  # n1 has not received an interval yet
 
 
 def test_master_sends_the_renewal_interval() -> None:
@@ -190,7 +190,7 @@ def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
     assert port.take_ended_senders(now + 0.4) == []
     assert port.take_ended_senders(now + 0.6) == [b"b"]
     assert port.take_ended_senders(now + 9.0) == []
-    again = dealer(context, port.address, b"d")  # most likely on a connection of the same number
+    again = dealer(context, port.address, b"d")  # most likely reuses the connection number of b
     assert port.socket.poll(2000)
     assert port.receive()[0] == b"d"
     for socket in (*sockets.values(), again):

@@ -155,7 +155,7 @@ def test_original_nodes_can_be_registered_in_process(master: Master) -> None:
         view = node.graph()
         assert (view.nodes[ORIGINAL.id].generation, view.nodes[ORIGINAL.id].language) == ("A", "JavaScript")
         assert view.topics["old/topic"].publishers[0].count == 3
-        node.new_sub("old/topic")  # nobody to connect to, nobody to wait for
+        node.new_sub("old/topic")  # no endpoint to connect to, so no wait
     master.submit(Leave(ORIGINAL.id))
     assert master.view().nodes == {}
 

@@ -102,7 +102,7 @@ def test_listen_request_from_another_computer_is_rejected(far, master):
     context = zmq.Context()
     try:
         with context.socket(zmq.DEALER) as asking:
-            asking.connect(f"tcp://127.0.0.9:0;{far}")  # comes from the first address, goes to the second
+            asking.connect(f"tcp://127.0.0.9:0;{far}")  # sent from the first address to the second
             asking.send(encode_request(Listen(()), 1))
             assert asking.poll(WAIT_S * 1000)
             _call, answer = decode_reply(asking.recv())
@@ -163,7 +163,7 @@ def test_publisher_is_received_after_its_computer_changes_address(far, master, m
         heard = iter(lambda: sub.receive(WAIT_S), None)
         assert any(message.payload == "on the second" for message in heard)
         assert "127.0.0.3" not in str(near.graph().topics["t"].publishers)
-        address[0] = None  # no way to the master: what is known stays
+        address[0] = None  # master unreachable: the known address is kept
         pub.publish("still")
         assert sub.listen(True, timeout_s=WAIT_S) == (True, "still")
 

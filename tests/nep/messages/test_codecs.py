@@ -130,7 +130,7 @@ def test_naive_datetime_is_encoded_as_local_time() -> None:
 
 @pytest.mark.parametrize(
     ("data", "moment"),
-    [  # the three forms of msgpack's specification, as other languages write them
+    [  # the three timestamp formats of msgpack's specification
         ("d6ff5a4af6a5", datetime(2018, 1, 2, 3, 4, 5, tzinfo=timezone.utc)),
         ("d7ff3b9ac9fc5a4af6a5", datetime(2018, 1, 2, 3, 4, 5, 249999, tzinfo=timezone.utc)),
         ("c70cff00000000fffffffffffffff6", datetime(1969, 12, 31, 23, 59, 50, tzinfo=timezone.utc)),
@@ -237,7 +237,7 @@ def test_any_dtype_and_channel_count_round_trips_losslessly(kind: str, shape: tu
     made = numbers_of(kind, shape)
     wanted = made[:, :, 0] if shape[2:] == (1,) else made
     sent = [image_codec.raw_image(made), image_codec.raw_image(made.astype(made.dtype.newbyteorder(">")))]
-    if kind != "uint8" or shape[2:] in ((2,), (4,)):  # all but what is a JPEG
+    if kind != "uint8" or shape[2:] in ((2,), (4,)):  # all images that aren't encoded as JPEG
         sent.append(codec("image").encode(made))
         sent.append(codec("image").encode(np.asfortranarray(made)))
     for data, extension in sent:

@@ -120,7 +120,7 @@ PACKED_VALUES = st.recursive(
 def test_depth_check_of_decoded_msgpack_matches_depth_of_the_value(
     value: object, around: int, kind: str
 ) -> None:
-    padding = [0.5] * 500  # too large for a count of the headers
+    padding = [0.5] * 500  # too large for counting the headers
     for _level in range(around):
         value = {"a": value} if kind == "map" else (value,) if kind == "tuple" else [value]
     value = [value, padding]

@@ -145,7 +145,7 @@ def unsent(payload: object, declared: type | None = None) -> tuple[str, str]:
     return caught.value.reason, caught.value.place
 
 
-# ---- what goes there and comes back
+# ---- round trips
 
 _words = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
 _whole = st.integers(-(1 << 63), (1 << 64) - 1)
@@ -280,7 +280,7 @@ def test_private_fields_are_not_encoded_and_init_false_fields_are_not_decoded() 
     assert read(Square, {"side": 3, "area": 1, "_cache": 1}) == Square(3.0)
 
 
-# ---- what does not fit, and where
+# ---- conversion errors and their paths
 
 
 @pytest.mark.parametrize(
@@ -401,7 +401,7 @@ def test_mismatched_union_value_is_reported_with_all_alternatives() -> None:
     )
 
 
-# ---- what it costs, and odd classes
+# ---- import cost and unusual classes
 
 
 def test_typed_message_modules_are_imported_on_first_use() -> None:

@@ -191,7 +191,7 @@ def test_too_deeply_nested_types_are_rejected() -> None:
     for _level in range(2000):
         hint = list[hint]
     usual = sys.getrecursionlimit()
-    sys.setrecursionlimit(1000)  # some library may have raised it
+    sys.setrecursionlimit(1000)  # a library may have raised the limit
     try:
         with pytest.raises(ValueError, match="the types in 'Deep' are nested too deeply; use a dataclass"):
             message_type(TypedDict("Deep", {"inner": hint}))

@@ -171,7 +171,7 @@ def test_direct_connection_with_invalid_address_wire_or_generation_is_rejected(
 
 @pytest.mark.parametrize("wire", ["original", "native"])
 def test_failed_direct_connection_leaves_no_open_socket(wire: Any) -> None:
-    with nep.node("direct") as node:  # closing it would wait for a socket that is left
+    with nep.node("direct") as node:  # closing the node would wait for a leaked socket
         anywhere = node.direct("*", 5003, "many2one", wire=wire)
         with pytest.raises(nep.NepError, match=r"'\*:5003'; .*a computer's address"):
             node.new_pub("t", "json", anywhere)
@@ -233,7 +233,7 @@ def test_invalid_endpoint_does_not_block_other_publishers(
         (known,) = (source.remote for source in socket.sources.by_id.values())
         assert known is not None
         transport.connect((bad[0], known, bad[1]))
-        transport.connect(bad)  # twice is once
+        transport.connect(bad)  # connecting again has no effect
         pub.publish("heard")
         assert sub.listen(timeout_s=30.0) == (True, "heard")
         assert sub.refused == (2 if endpoint else 0)

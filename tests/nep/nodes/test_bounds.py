@@ -167,7 +167,7 @@ def test_unread_graph_replies_use_bounded_master_memory() -> None:
         for _ in range(500):
             assert port.send(sender, graph)
         assert len(port._unread[sender]) <= 32
-        assert port.send(sender, b"small")  # the rest of its answers still go out
+        assert port.send(sender, b"small")  # its later replies are still sent
         got = 0
         while socket.poll(500):
             got += len(socket.recv()) == len(graph)

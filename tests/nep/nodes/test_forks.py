@@ -290,7 +290,7 @@ print(os.waitpid(pid, 0)[1])
         assert pub.subscribers == 1
         program.say("close")
         assert program.line() == "bound again"
-        eventually(lambda: pub.subscribers == 0)  # its connection ended with the parent's
+        eventually(lambda: pub.subscribers == 0)  # the connection ended with the parent's socket
         program.say("end")
         assert program.line() == "0"
         assert program.end()[1] == ""

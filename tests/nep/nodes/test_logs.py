@@ -199,7 +199,7 @@ def test_unformattable_record_does_not_raise_and_long_text_is_truncated(handler,
     handler.logger.info("x" * (MAX_TEXT_LENGTH + 5))
     handler.close()
     assert kept.texts == [f"{'x' * MAX_TEXT_LENGTH}… ({MAX_TEXT_LENGTH + 5} characters)"]
-    capsys.readouterr()  # logging itself tells of the first on the error stream
+    capsys.readouterr()  # logging prints the formatting error to stderr
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_payloads_are_delivered_without_message_objects(nodes: tuple[nep.Node, n
         if len(heard) == FIRST:
             break
         if not quickly and len(heard) > FIRST // 2:
-            burst(pub, *range(FIRST))  # the first ones were read by the node's thread, on a busy computer
+            burst(pub, *range(FIRST))  # on a busy computer, the node's thread has read the first ones
             heard.clear()
     assert quickly
 
@@ -97,7 +97,7 @@ def test_callbacks_and_listen_alternate_without_loss(nodes: tuple[nep.Node, nep.
     assert heard == list(range(100))
     heard += [sub.receive(GREETINGS_S).payload, sub.listen(timeout_s=GREETINGS_S)[1]]  # type: ignore[union-attr]
     other: list[Message] = []
-    reader.new_callback("other", "json", other.append, with_message=True)  # from now on there are two
+    reader.new_callback("other", "json", other.append, with_message=True)  # two subscribers from now on
     burst(pub, *range(FIRST, 2 * FIRST))
     reader.spin(GREETINGS_S)
     assert heard == list(range(2 * FIRST))

@@ -202,7 +202,7 @@ def test_killed_master_under_traffic_loses_no_messages(monkeypatch: pytest.Monke
             topic = made[0].graph().topics["traffic"]
             assert (len(topic.publishers), len(topic.subscribers)) == (1, 2)
             assert made[0].graph().epoch != epoch
-            # A publisher made now knows of the subscribers that came back: its first message arrives.
+            # A new publisher knows the subscribers that rejoined: its first message arrives.
             late = made[2].new_pub("traffic")
             assert late.subscribers == 2
             late.publish("late")

@@ -173,7 +173,7 @@ def test_message_with_implausible_sequence_number_raises_an_alert_and_counts_no_
             dealer.connect(f"tcp://{master.address}")
             dealer.send(encoding.encode_request(AddPublisher(NodeRecord("0" * 16, "x", "h", 1), record), 1))
             assert xpub.poll(5000)
-            for _ in range(2):  # its topic and its hello
+            for _ in range(2):  # the subscriber's topic filter and hello
                 xpub.recv()
             for number in (1, seq):
                 xpub.send_multipart(wire.join("/t", wire.Header(3, 0, number, 1, 99), b"x"))

@@ -93,11 +93,11 @@ def test_publisher_sends_the_bytes_of_the_vector(
     sends = publisher._transport
     monkeypatch.setattr(sends, "_id", said["publisher"])
     monkeypatch.setattr(sends, "_count", said["seq"] - 1)
-    if len(parts) == 1:  # as when it has just been seen that all is read
+    if len(parts) == 1:  # as right after all messages were acknowledged
         monkeypatch.setattr(sends, "_full_path_at", 2**20)
     monkeypatch.setattr("nep.backends.zeromq.publisher._time_ns", lambda: said["stamp_ns"])
     theirs.subscribe(wire.topic_part(said["topic"]))
-    if len(parts) == 1:  # only to those who say that they read it
+    if len(parts) == 1:  # sent only to subscribers that announce support
         theirs.subscribe(wire.hello_part(7, said["topic"], one_part=True))
     theirs.connect(known.endpoints[0])
     eventually(lambda: publisher.subscribers if len(parts) == 1 else sends.has_subscribers)
@@ -153,7 +153,7 @@ def test_subscriber_decodes_a_batch(
     if "error" in vector:
         theirs.send_multipart(wire.join("example", wire.Header(1, 0, 1, 1, 9), b"{}"))
         (has_come, _payload) = subscriber.listen(timeout_s=LONG_MS / 1000)
-        assert has_come  # it reads on
+        assert has_come  # the subscriber keeps reading
         assert subscriber.refused == 1
         return
     said = [meaning_of(each) for each in vector["means"]]
@@ -182,7 +182,7 @@ def test_subscriber_rejects_an_invalid_message_and_receives_the_next_message(
     direct = node.direct(port=port, mode="one2many", wire="native")
     subscriber = node.new_sub("example", "json", direct)
     assert theirs.recv() == b"\1" + wire.topic_part("example")
-    # A topic that is none never passes the subscriber's own filter.
+    # Parts with an invalid topic never pass the subscriber's own filter.
     passes = parts_of(vector)[0].startswith(wire.topic_part("example"))
     theirs.send_multipart(parts_of(vector))
     theirs.send_multipart(parts_of(GOOD[0]))

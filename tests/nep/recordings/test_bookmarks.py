@@ -79,7 +79,7 @@ def test_bookmark_that_cannot_be_saved_raises_and_changes_no_bookmark(path, monk
         marks = Bookmarks(recording)
         with pytest.raises(RecordingError, match=r"name .*characters"):
             marks.add(recording.start_ns, "\ud800")
-        marks.path.mkdir()  # nothing can take its place
+        marks.path.mkdir()  # a folder can't be replaced by the file
         with pytest.raises(RecordingError, match="can't use the recording"):
             marks.add(recording.start_ns, "new")
         assert len(marks.all) == 1

@@ -112,7 +112,7 @@ def test_ring_command_saves_the_last_seconds_on_command_and_on_signal(master, tm
         words = ("recording", "keep", "--master", master.address)
 
         def is_kept() -> bool:
-            with suppress(ServiceError):  # the message is on its way
+            with suppress(ServiceError):  # the message hasn't arrived yet
                 run(*words, "--note", "it fell", "--json")
             return bool(files())
 
@@ -345,7 +345,7 @@ def test_clock_time_after_midnight_is_on_the_next_day():
     midnight = at.replace(hour=23, minute=59, second=50, microsecond=0)
     start = int(midnight.timestamp()) * 10**9
     assert parse_time_ns("00:00:05", start, start + 60 * 10**9) == start + 15 * 10**9
-    assert parse_time_ns("00:00:05", start, start + 10**9) < start  # it has ended before
+    assert parse_time_ns("00:00:05", start, start + 10**9) < start  # the recording ends before that time
 
 
 @pytest.mark.parametrize(

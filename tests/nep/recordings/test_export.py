@@ -84,7 +84,7 @@ def test_parquet_export_preserves_value_types(recording, tmp_path):
     rows = table.to_pylist()
     assert [row["pose.x"] for row in rows] == [0.1, 2.0, 1e300]
     assert [row["name"] for row in rows] == ['a,\n"b"', "ñ", "7"]
-    assert [row["big"] for row in rows] == [None, 1, None]  # 2^63 has no place there
+    assert [row["big"] for row in rows] == [None, 1, None]  # 2^63 doesn't fit into int64
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
@@ -156,7 +156,7 @@ def test_video_is_exported_as_avi_without_ffmpeg(tmp_path):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     made = next((tmp_path / "out").iterdir())
     assert done.stdout.split() == [made.name, "30"]
-    if made.suffix == ".avi":  # a system can have another part of OpenCV that writes MP4
+    if made.suffix == ".avi":  # other systems may have another MP4 encoder of OpenCV
         film = cv2.VideoCapture(str(made), cv2.CAP_OPENCV_MJPEG)
         assert (film.get(cv2.CAP_PROP_FPS), film.read()[0]) == (20.0, True)
         film.release()
@@ -295,6 +295,6 @@ def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
         assert [(each.log_ns, kept(each.message)) for each in recording.read()] == wanted
         assert recording.recorder_metadata["note"] == "first"
         assert list(recording.entries("notes")) == notes
-        assert [value for _at, value in recording.entries("runs")] == [run]  # not once for each second
+        assert [value for _at, value in recording.entries("runs")] == [run]  # stored once, not every second
     assert McapDoctor(made.path).problems == []
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["a.mcap"]

@@ -154,7 +154,7 @@ def test_images_are_foxglove_messages_with_the_original_bytes():
 
 
 def test_protobuf_descriptors_match_the_verified_checksums():
-    # Parsed and compared with foxglove's definitions by protobuf 7.36; the sums hold them to that.
+    # Verified against foxglove's definitions with protobuf 7.36; the checksums pin that state.
     sums = {name: hashlib.sha256(descriptor_set(name)).hexdigest()[:16] for name in SCHEMAS}
     assert sums == GOLDEN
 
@@ -195,7 +195,7 @@ def test_json_schemas_list_fields_of_known_types_only():
         "name": {"type": "string"},
         "laps": {"type": "integer"},
         "gears": {"type": "array", "items": {"type": "integer"}},
-    }  # lists of lists are none of what viewers read
+    }  # viewers don't support lists of lists
 
 
 def test_recordings_of_other_programs_are_read_with_every_compression(tmp_path: Path):
@@ -212,7 +212,7 @@ def test_recordings_of_other_programs_are_read_with_every_compression(tmp_path: 
             odom = writer.register_channel("/odom", "json", 0)
             ros = writer.register_channel("/ros", "cdr", 0)
             encoding = encoding_of(wrapped, 0)
-            for seq in range(20):  # theirs come in no order
+            for seq in range(20):  # other programs don't sort by time
                 writer.add_message(odom, 1000 - seq, b"{}", 5, seq)
             writer.add_message(camera, 1000, encoding.before + bytes(wrapped.data), 6, 3)
             writer.add_message(ros, 7, b"\0\1", 7, 1)

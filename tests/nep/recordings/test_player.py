@@ -138,7 +138,7 @@ def test_loop_repeats_its_range_until_disabled(recording, times):
     playback.loop()
     playback.play()
     found = [seq for _at, seq in run(playback, clock, 3.0)]
-    assert found[: 2 * COUNT] == [*range(COUNT), *range(COUNT)]  # the first one, too, each time
+    assert found[: 2 * COUNT] == [*range(COUNT), *range(COUNT)]  # including the first message of each pass
     for part in ((5, 5), (times[9], times[3])):
         with pytest.raises(ValueError, match="within the recording"):
             playback.loop(*part)
@@ -162,7 +162,7 @@ def test_slow_consumer_receives_all_messages_and_the_actual_speed_is_reported(re
         due = playback.advance()
         found += [each.seq for each in due.messages]
         assert len(due.messages) <= 10 * 0.25 / STEP_S + 1
-        clock.now += 1.0  # it takes a second to show them
+        clock.now += 1.0  # displaying the messages takes a second
     assert found == list(range(COUNT))
     playback = Playback(recording, clock=clock)
     playback.speed = 0.4
@@ -173,7 +173,7 @@ def test_slow_consumer_receives_all_messages_and_the_actual_speed_is_reported(re
         playback.advance()
         clock.now += 0.5
     playback.advance()
-    assert playback.status().measured_speed == pytest.approx(0.2, rel=0.3)  # 0.25 s of every half
+    assert playback.status().measured_speed == pytest.approx(0.2, rel=0.3)  # a step covers at most 0.25 s
 
 
 def test_pause_keeps_the_position_and_invalid_speeds_are_rejected(recording):

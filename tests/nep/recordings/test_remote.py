@@ -33,7 +33,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def reader(path: Path) -> Iterator[ReaderProcess]:
     with ReaderProcess(COMMAND) as reader:
-        reader.open(path).close()  # its thread is there before the first test looks for threads
+        reader.open(path).close()  # starts its thread before the leak check of the first test
         yield reader
 
 

@@ -43,7 +43,7 @@ def test_repair_of_a_truncated_recording_recovers_all_complete_messages(path, tm
         damaged.write_bytes(data[:cut])
         there = [each for each in chunks if each.offset + each.length <= cut]
         least = sum(sum(each.counts.values()) for each in there)
-        if not there:  # a part of the first chunk may be whole
+        if not there:  # part of the first chunk may be readable
             with suppress(RecordingError):
                 found = read(repair(damaged).path)
                 assert found == whole[: len(found)]
@@ -52,8 +52,8 @@ def test_repair_of_a_truncated_recording_recovers_all_complete_messages(path, tm
         found = read(report.path)
         assert found == whole[: len(found)], cut
         assert len(found) == report.recovered
-        assert len(found) >= min(least - 2, len(ALL)), cut  # the recorder's own words are not counted
-        assert damaged.stat().st_size == cut  # as it was
+        assert len(found) >= min(least - 2, len(ALL)), cut  # the recorder's own messages are not counted
+        assert damaged.stat().st_size == cut  # unchanged
 
 
 def test_repaired_file_is_complete_and_has_the_stats_of_the_original(path, tmp_path):
@@ -102,7 +102,7 @@ def test_repair_finds_chunks_after_a_damaged_length(path, tmp_path):
     (tmp_path / "a.mcap").write_bytes(data)
     report = repair(tmp_path / "a.mcap")
     found = read(report.path)
-    assert report.discarded is None  # nobody knows how many
+    assert report.discarded is None  # the number can't be determined
     assert set(found) < {kept(each) for each in ALL}
     assert {kept(each) for part in (*PARTS[:3], *PARTS[5:]) for each in part} <= set(found)
     assert McapDoctor(report.path).problems == []

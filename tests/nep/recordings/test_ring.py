@@ -45,7 +45,7 @@ def test_flight_recorder_keeps_the_last_seconds_plus_at_most_one_segment(tmp_pat
         assert McapDoctor(tmp_path / "a.mcap").problems == []
         short = ring.save(tmp_path / "b.mcap", 0.5)
         assert 0.5 <= short.duration_s <= 0.7
-        fill(ring, 1001, 1101)  # and it goes on
+        fill(ring, 1001, 1101)  # buffering continues
         ring.save(tmp_path / "c.mcap", 60.0)
         with Recording(tmp_path / "c.mcap") as recording:
             assert recording.newest(recording.end_ns)["/odom"].message.seq == 1100
@@ -94,7 +94,7 @@ def test_segment_is_removed_only_after_its_copy_is_finished(tmp_path, monkeypatc
 def test_saved_flight_recording_counts_only_losses_within_its_duration(tmp_path):
     clock = TestClock()
     with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(stats_interval_s=1e-9)) as ring:
-        ring.post([json_message(1), json_message(5)])  # three are missing, long ago
+        ring.post([json_message(1), json_message(5)])  # three are lost, before the saved time
         assert ring._writer.flush()
         ring.post([json_message(6)])
         assert ring._writer.flush()
@@ -109,7 +109,7 @@ def test_saved_flight_recording_counts_only_losses_within_its_duration(tmp_path)
         ring.save(tmp_path / "last.mcap", 1.0)
     with Recording(tmp_path / "last.mcap") as recording:
         assert [each.message.seq for each in recording.read()] == [7, 9, 10]
-        assert recording.stats()["/odom"].lost in {0, 1}  # of this second, never the three
+        assert recording.stats()["/odom"].lost in {0, 1}  # only losses of this second, not the three
 
 
 def test_segments_of_dead_processes_are_removed_and_segments_of_live_processes_kept(tmp_path):
@@ -143,7 +143,7 @@ def test_flight_recorder_raises_for_invalid_limits_existing_files_and_damaged_se
         with pytest.raises(RecordingError, match="damaged"):
             ring.save(tmp_path / "b.mcap", 1e6)
         assert not (tmp_path / "b.mcap").exists()
-        ring.post([json_message(2)])  # what comes later is good again
+        ring.post([json_message(2)])  # later messages are intact
         assert ring.save(tmp_path / "c.mcap", 1e6).message_count == 1
     with Recording(tmp_path / "c.mcap") as recording:
         assert [each.message.seq for each in recording.read()] == [2]

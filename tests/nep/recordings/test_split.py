@@ -93,7 +93,7 @@ def test_record_command_splits_and_stops_by_size(
     with nep.node("robot", master=master.address) as robot:
         publisher = robot.new_pub("/noise", "bytes", latched=True)
         publisher.publish(json_message(1, size=300_000).raw)
-        run("record", "/noise", "-o", tmp_path / "one.mcap", *words)  # ends by itself
+        run("record", "/noise", "-o", tmp_path / "one.mcap", *words)  # stops at the maximum size
         told = json.loads(capfdbinary.readouterr().out)
         assert told["size_bytes"] > 100_000
         run("record", "/noise", "-o", tmp_path / "many.mcap", "--split", "--duration", 1.0, *words)

@@ -99,7 +99,7 @@ def look_at_protobuf(name: str, described: bytes, data: bytes) -> None:
     demand(name in known, f"{name} is not in its description")
     for number, value in fields(memoryview(data)):
         field, kind = known[name].get(number, ("", 0))
-        if not field:  # passed over
+        if not field:  # unknown field
             continue
         demand(isinstance(value, memoryview) == (kind in {9, 11, 12}), f"{name}.{field}: another type")
         if kind == 9:
@@ -176,7 +176,7 @@ def test_viewer_reads_all_supported_encodings(made: Made, tmp_path: Path) -> Non
     assert {topic for topic, each in shown if each is UnreadableError} <= {"/packed", "/camera"}
     assert ("/typed", {"x": 1.0}) in shown
     pictures = [each for topic, each in shown if topic == "/camera"]
-    # Raw pixels after a JPEG on one topic are taken for a JPEG.
+    # Viewers decode raw pixels that follow a JPEG on the same topic as a JPEG.
     assert pictures
     assert (
         pictures == ["foxglove.CompressedImage", "foxglove.CompressedImage", UnreadableError][: len(pictures)]

@@ -182,7 +182,7 @@ def test_full_disk_leaves_complete_records_and_counts_the_remaining_messages(tmp
     assert status.message_count + status.unkept == len(messages)
     with Recording(path) as recording:
         assert not recording.is_complete
-        assert recording.size_bytes == path.stat().st_size  # nothing half is there
+        assert recording.size_bytes == path.stat().st_size  # no partial record remains
         found = [each.message for each in recording.read()]
     assert [kept(each) for each in found] == [kept(each) for each in messages[: status.message_count]]
 
@@ -244,7 +244,7 @@ def test_deleted_recording_file_is_reported(tmp_path):
     path.unlink()
     until(lambda: writer.problem)
     assert "moved or deleted" in writer.close().problem
-    writer.post([json_message(2)])  # is counted, and nothing else
+    writer.post([json_message(2)])  # only counted as not saved
     assert writer.status.unkept == 1
 
 

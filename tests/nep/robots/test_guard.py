@@ -39,13 +39,13 @@ def test_later_robot_is_protected_on_every_topic_of_its_description(network: str
         guard.wait_for_descriptions(5.0)
         said = guard.denial_reason("/orders")
         assert "Rover" in said
-        assert "--allow-moving Rover" in said  # its claim to be virtual is not believed
+        assert "--allow-moving Rover" in said  # its claim to be virtual is not trusted
         assert "--allow-moving Rover" in guard.denial_reason("robot_action")
         assert guard.denial_reason("/weather") == ""
         describe(robot, "Rover", "/others")
         eventually(lambda: (guard.poll(), guard.denial_reason("/others"))[1])
     guard.poll()
-    assert guard.denial_reason("/orders")  # it may only have lost its connection
+    assert guard.denial_reason("/orders")  # the robot may only be disconnected
     guard.close()
 
 

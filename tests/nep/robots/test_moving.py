@@ -34,7 +34,7 @@ def graph(*topics: TopicInfo, nodes: tuple[NodeInfo, ...] = (), patterns: tuple[
 def test_robot_is_moved_by_the_topics_of_its_description() -> None:
     moving = MovingTopics([ROVER])
     assert moving.robots_moved_by("/Rover/drive") == moving.robots_moved_by("/Rover/world") == ("Rover",)
-    assert moving.robots_moved_by("/Rover/command") == ()  # the name alone says nothing
+    assert moving.robots_moved_by("/Rover/command") == ()  # the name alone doesn't count
     assert moving.robots_moved_by("/elsewhere", "robot/command") == ("/elsewhere",)
 
 
@@ -91,7 +91,7 @@ def test_driver_without_a_published_description_is_protected() -> None:
     )
     assert (
         moving_topics(announced, [ROVER]).robots_moved_by("/go") == ()
-    )  # its description says what moves it
+    )  # its description lists the topics that move it
 
 
 def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:

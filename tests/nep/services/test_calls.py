@@ -40,7 +40,7 @@ def make(request: pytest.FixtureRequest, master: Master) -> Iterator[Make]:
         return made[-1]
 
     yield new
-    for node in reversed(made):  # SP's server waits a moment for clients that are still there
+    for node in reversed(made):  # SP's server waits a moment for clients that are still connected
         node.close()
 
 
@@ -111,7 +111,7 @@ def test_server_threads_handle_calls_without_spin(make: Make) -> None:
     together = threading.Barrier(3)
 
     def answer(request):
-        together.wait(LONG_S)  # all three at once, or never
+        together.wait(LONG_S)  # requires three concurrent calls
         return doubled(request)
 
     server = make("server").new_server("/double", answer, threads=3)
@@ -303,7 +303,7 @@ def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
     eventually(lambda: client.is_connected)
     with pytest.raises(nep.ServiceTimeoutError):
         client.call("late", timeout_s=0.05)
-    # Its time began when it arrived, which may be after its client gave up.
+    # Its time limit starts on arrival, possibly after the client's timeout.
     eventually(lambda: any(call.is_late for call in node._services.queues[0]._calls))
     spin(node)
     assert client.call("in time", timeout_s=LONG_S) == {}
@@ -313,11 +313,11 @@ def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
 
 def test_closing_server_rejects_queued_calls_and_fails_the_running_call(make: Make) -> None:
     node = make("server")
-    server = node.new_server("/closes", doubled)  # nobody spins
+    server = node.new_server("/closes", doubled)  # calls stay queued: no spin
     client = make("client").new_client("/closes", timeout_s=LONG_S)
     eventually(lambda: client.is_connected)
     future = client.call_async({})
-    assert node._services.queues[0].pop(LONG_S) is not None  # it is carried out when the server ends
+    assert node._services.queues[0].pop(LONG_S) is not None  # running when the server closes
     waiting = client.call_async({})
     eventually(lambda: len(node._services.queues[0]._calls) == 1)
     server.close()
@@ -330,7 +330,7 @@ def test_closing_server_rejects_queued_calls_and_fails_the_running_call(make: Ma
 def test_closing_server_rejects_every_queued_call(make: Make) -> None:
     """Clients must learn that none of these calls was executed, not that their result is unknown."""
     node = make("server")
-    server = node.new_server("/closes", doubled)  # nobody spins
+    server = node.new_server("/closes", doubled)  # calls stay queued: no spin
     clients = [make(f"client {n}").new_client("/closes", timeout_s=LONG_S) for n in range(4)]
     futures = [client.call_async({"text": "x" * 10_000}) for client in clients for _ in range(100)]
     eventually(lambda: len(node._services.queues[0]._calls) == 400)
@@ -497,7 +497,7 @@ def test_second_server_raises_an_alert_and_takes_over(registered: Make) -> None:
     def is_second() -> bool:
         try:
             return client.call({}) == "second"
-        except (nep.ServerGoneError, nep.RequestRefusedError):  # the first one was asked once more
+        except (nep.ServerGoneError, nep.RequestRefusedError):  # the call still reached the first server
             return False
 
     eventually(is_second)

@@ -123,7 +123,7 @@ def test_malformed_call_is_counted(node: nep.Node, port: int, said: bytes) -> No
     assert server.calls == 1
 
 
-# ---- bad days
+# ---- failures
 
 
 @pytest.mark.parametrize("wire", [pytest.param("original", marks=pytest.mark.long), "native"])
@@ -137,7 +137,7 @@ def test_server_death_during_a_call_is_reported_immediately(node: nep.Node, port
         program.kill()
         with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
-    with running(SERVER, str(port), wire) as program:  # and the next one is found
+    with running(SERVER, str(port), wire) as program:  # the client finds the restarted server
         program.line()
         assert client.call({}) == {"pid": program.process.pid}
 

@@ -48,7 +48,7 @@ def test_server_death_during_a_call_is_reported_immediately(client) -> None:
         program.kill()
         with pytest.raises(nep.ServerGoneError, match="'/x'"):
             future.result(LONG_S)
-    with running(SERVER) as program:  # and the next one is found
+    with running(SERVER) as program:  # the client finds the restarted server
         assert program.line() == "ready"
         assert client.call({}) == {"pid": program.process.pid}
 
@@ -71,7 +71,7 @@ def test_suspended_server_replies_to_pending_calls_after_resuming(client) -> Non
         client.call({})
         program.stop()
         with pytest.raises(nep.ServiceTimeoutError):
-            client.call({}, timeout_s=4.0)  # so it was unlisted meanwhile
+            client.call({}, timeout_s=4.0)  # long enough for the server to be unlisted
         future = client.call_async({})
         program.signal(signal.SIGCONT)
         assert future.result(LONG_S) == {"pid": program.process.pid}
@@ -90,12 +90,12 @@ def test_server_suspended_during_a_call_is_replaced_by_another_server(
         if is_late:
             eventually(lambda: not master.view().services["/x"].servers)
         other.new_server("/x", lambda request: ["other", request], threads=1)
-        eventually(lambda: len(master.view().services["/x"].servers) == 1)  # it was unlisted
-        # ... and the client was told: what it sends before goes to the old one, which may only be suspended.
+        eventually(lambda: len(master.view().services["/x"].servers) == 1)  # the old server was unlisted
+        # ... and the client was notified: earlier calls reach the old server, which may only be suspended.
         (server,) = master.view().services["/x"].servers
         eventually(lambda: set(client._transport._servers.values()) == set(server.endpoints[:1]))
         assert client.call(1) == ["other", 1]
-        with pytest.raises(nep.ServerGoneError):  # nobody can know any more
+        with pytest.raises(nep.ServerGoneError):  # the outcome is unknown
             waiting.result(LONG_S)
         assert client.call(2) == ["other", 2]
 
@@ -159,9 +159,9 @@ def test_server_and_client_without_a_master_raise_master_unreachable() -> None:
         [b"x" * 16, b"{}"],
         [b"\1\1\1\0" + b"\0" * 12],
         [b"\1\1\1\0" + b"\0" * 12, b"{}", b"{}"],
-        [b"\1\2\1\0" + b"\0" * 12, b"{}"],  # an answer
-        [b"\1\1\1\0" + b"\0" * 12, b"{oops"],  # no JSON: is refused
-        [b"\1\1\x63\0" + b"\xff" * 12, b"{}"],  # a codec that is not there, the largest number
+        [b"\1\2\1\0" + b"\0" * 12, b"{}"],  # a reply instead of a call
+        [b"\1\1\1\0" + b"\0" * 12, b"{oops"],  # invalid JSON: rejected
+        [b"\1\1\x63\0" + b"\xff" * 12, b"{}"],  # unknown codec, largest call number
         [b"\1\1\1\0" + b"\xff" * 12, b"[" * 100_000],
     ],
 )
@@ -194,9 +194,9 @@ def test_many_malformed_calls_do_not_block_the_next_valid_call(master: Master) -
     "answer",
     [
         [b""],
-        [b"\1\2\1\0" + b"\xff" * 12, b"{}"],  # a number nobody has
-        [b"\1\1\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # a call
-        [b"\2\2\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # of a later version
+        [b"\1\2\1\0" + b"\xff" * 12, b"{}"],  # unknown call number
+        [b"\1\1\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # a call, not a reply
+        [b"\2\2\1\0\0\0\0\0" + (1).to_bytes(8, "little"), b"{}"],  # later protocol version
     ],
 )
 def test_malformed_or_unmatched_reply_raises_service_timeout(master: Master, client, answer) -> None:
@@ -271,7 +271,7 @@ class _fake_server:  # noqa: N801 - it reads as a function
 
 def test_calls_beyond_the_server_queue_are_rejected(master: Master) -> None:
     with nep.node("server") as a, nep.node("one") as one, nep.node("two") as two:
-        server = a.new_server("/full", lambda request: request)  # nobody spins
+        server = a.new_server("/full", lambda request: request)  # calls stay queued: no spin
         calls = [
             client.call_async(n, timeout_s=LONG_S)
             for client in (one.new_client("/full"), two.new_client("/full"))
@@ -340,8 +340,8 @@ def test_spin_wakes_for_a_new_server_and_for_each_call(
     monkeypatch.setattr("nep.nodes.work.WAIT_SLICE_S", 3600.0)
     with nep.node("server") as a, nep.node("client") as b:
         spinner = threading.Thread(target=a.spin, name="spin")
-        spinner.start()  # before there is a server
-        eventually(lambda: a._transport._waiting)  # from its first wait on no wake is lost
+        spinner.start()  # before any server exists
+        eventually(lambda: a._transport._waiting)  # no wake-up is lost after the first wait
         a.new_server("/x", lambda request: request)
         client = b.new_client("/x", timeout_s=LONG_S)
         assert [client.call(n) for n in range(300)] == list(range(300))

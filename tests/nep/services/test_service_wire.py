@@ -89,7 +89,7 @@ def test_plain_tcp_frame_is_the_size_followed_by_the_native_parts(
     ours.send(parts_of(vector))
     assert theirs.recv(len(told) + 1) == told
     pairs = []
-    for byte in (*told, *told):  # in pieces, however small
+    for byte in (*told, *told):  # byte by byte
         theirs.sendall(bytes([byte]))
         assert ours.read()
         pairs.append(ours.next())

@@ -293,7 +293,7 @@ def test_killed_respondent_does_not_delay_the_survey(master: Master) -> None:
         assert program.line() == "asked"
         assert next(answers) == "here"
         program.kill()
-        assert list(answers) == []  # at once, though it would wait for ever
+        assert list(answers) == []  # returns at once, despite no time limit
         assert surveyor.failures == 1
 
 

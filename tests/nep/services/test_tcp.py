@@ -40,7 +40,7 @@ def port() -> int:
 
 @pytest.fixture
 def node() -> Iterator[nep.Node]:
-    with nep.node("here", master="127.0.0.1:1") as made:  # where no master is: none is needed
+    with nep.node("here", master="127.0.0.1:1") as made:  # no master runs there: none is needed
         yield made
 
 
@@ -131,7 +131,7 @@ def test_malformed_frame_closes_the_connection_and_is_counted(
     with Program(port) as program, Program(port) as stranger:
         stranger.socket.sendall(said)
         eventually(lambda: server.unreadable == 1)
-        with contextlib.suppress(ConnectionResetError):  # it had not read all of it
+        with contextlib.suppress(ConnectionResetError):  # the server closed before reading everything
             assert stranger.is_ended()
         program.send(1, {})
         assert program.receive() == (2, 1, {"heard": {}})
@@ -177,7 +177,7 @@ def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> Non
         with pytest.raises(nep.ServerGoneError):
             future.result(LONG_S)
     future = client.call_async({"n": 1})
-    serve(node, port)  # the next one is found
+    serve(node, port)  # the client finds the new server
     assert future.result(LONG_S) == {"heard": {"n": 1}}
 
 
@@ -186,8 +186,8 @@ def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> Non
     [
         (b"\xff\xff\xff\xff", nep.ServerGoneError),
         (b"HTTP/1.1 400 Bad Request\r\n\r\n", nep.ServerGoneError),
-        (struct.pack("<IBBHIQ", 16, 1, 1, 1, 0, 1), nep.ServiceTimeoutError),  # a call
-        (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 99), nep.ServiceTimeoutError),  # of a number nobody has
+        (struct.pack("<IBBHIQ", 16, 1, 1, 1, 0, 1), nep.ServiceTimeoutError),  # a call, not a reply
+        (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 99), nep.ServiceTimeoutError),  # unknown call number
         (struct.pack("<IBBHIQ", 16, 1, 2, 1, 0, 1), nep.DecodeError),
     ],
 )

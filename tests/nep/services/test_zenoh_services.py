@@ -92,7 +92,7 @@ def stranger(routed: str) -> Iterator[Any]:
         yield session
 
 
-# ---- servers that die
+# ---- server crashes
 
 
 def test_server_death_during_a_call_is_reported_immediately(make: Make, place: str) -> None:
@@ -107,7 +107,7 @@ def test_server_death_during_a_call_is_reported_immediately(make: Make, place: s
             future.result(LONG_S)
     eventually(lambda: not client.is_connected)
     waiting = client.call_async({})
-    with running(SERVER, place) as program:  # and the next one is found
+    with running(SERVER, place) as program:  # the client finds the restarted server
         program.line()
         assert waiting.result(LONG_S) == {"pid": program.process.pid}
 
@@ -141,7 +141,7 @@ def test_suspended_server_replies_to_pending_calls_after_resuming(make: Make, pl
         eventually(lambda: client.late == 1)
 
 
-# ---- programs that have zenoh alone, by the words of docs/zenoh.md
+# ---- programs with plain zenoh, as described in docs/zenoh.md
 
 
 def asked(session: Any, key: str, header: bytes | None, data: bytes | None) -> list[tuple[bytes, bytes]]:
@@ -206,7 +206,7 @@ def test_nep_client_calls_a_zenoh_program(
     queryable = stranger.declare_queryable(key, create_handler(answer))
     token = stranger.liveliness().declare_token("nep/v1/live/someone/srv/ab/%2Fecho/1")
     assert client.call({"n": 1}) == {"n": 1}
-    for what in ("nothing", "nonsense", "error"):  # and it is not said that it has ended
+    for what in ("nothing", "nonsense", "error"):  # not reported as a server that has ended
         with pytest.raises(nep.NepError, match=f"'/echo' .*'{key}'"):
             client.call(what)
     assert client.call("twice") == 1
@@ -260,7 +260,7 @@ def test_direct_servers_are_rejected(make: Make) -> None:
             made("/x", configuration=node.direct(port=7000))
 
 
-# ---- keys, and forks
+# ---- keys and forks
 
 
 @pytest.mark.parametrize("word", ["/x", "%", "a/b", "*", "é 漢", "x" * 180])
@@ -288,7 +288,7 @@ def test_service_token_round_trip(word: str) -> None:
         "cli/0/x",
         "cli/1/%",
         "cli/1/x/more",
-        "pub/1/nep.service%3Ax/service/service/plain",  # it would come before all servers
+        "pub/1/nep.service%3Ax/service/service/plain",  # would sort before all servers
         "sub/1/nep.service%3Ax/service",
     ],
 )

@@ -67,7 +67,7 @@ def test_cpu_share_of_this_process_is_measured() -> None:
     load = CpuLoad(clock=lambda: next(ticks))
     load.ratio()
     end = time.process_time() + 0.02
-    while time.process_time() < end:  # 20 ms of work, whatever else the computer does
+    while time.process_time() < end:  # 20 ms of CPU time, independent of other load
         pass
     found = load.ratio()
     assert found is not None

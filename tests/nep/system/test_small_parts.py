@@ -66,7 +66,7 @@ def test_sequence_gaps_since_the_echo_are_counted_as_lost() -> None:
     for seq in (11, 12, 15):
         assert sources.count_message(1, seq, is_alone=False)
     assert (sources.received, sources.lost) == (3, 2)
-    sources.advance_to(1, 17)  # it reconnected: two were published meanwhile
+    sources.advance_to(1, 17)  # reconnected: two messages were published meanwhile
     assert sources.lost == 4
 
 
@@ -90,12 +90,12 @@ def test_tail_loss_is_counted_at_the_next_renewal_and_reverted_by_a_late_message
     sources.get(1).has_echoed = True
     sources.count_message(1, 1, is_alone=False)
     sources.expect_up_to(1, 3)
-    assert sources.lost == 0  # they may be on their way
+    assert sources.lost == 0  # the messages may be in flight
     sources.expect_up_to(1, 3)
     assert sources.lost == 2
     assert sources.count_message(1, 2, is_alone=False)
     assert (sources.received, sources.lost) == (2, 1)
-    sources.expect_up_to(99, 5)  # nobody we know
+    sources.expect_up_to(99, 5)  # unknown publisher
 
 
 def test_restarted_publisher_replaces_its_silent_predecessor() -> None:
@@ -185,7 +185,7 @@ def test_io_thread_serves_on_wake_requests_and_deadlines() -> None:
     assert bell.served.acquire(timeout=30.0)
     bell.waker.wake()
     assert bell.served.acquire(timeout=30.0)
-    bell.waker.wake()  # it is quiet: the descriptor is not looked at
+    bell.waker.wake()  # reading is paused: the descriptor isn't polled
     assert not bell.served.acquire(timeout=0.01)
     assert bell.served.acquire(timeout=30.0)
     io.serve_soon(bell)
@@ -359,7 +359,7 @@ def test_io_thread_survives_poll_errors(caplog: pytest.LogCaptureFixture) -> Non
     made[0].is_broken = True
     io.serve_soon(bell)
     assert bell.served.acquire(timeout=30.0)
-    assert bell.served.acquire(timeout=30.0)  # by the new poll, the second that was tried
+    assert bell.served.acquire(timeout=30.0)  # by the new selector, opened at the second attempt
     bell.waker.wake()
     assert bell.served.acquire(timeout=30.0)
     io.remove(bell)
@@ -370,7 +370,7 @@ def test_io_thread_survives_poll_errors(caplog: pytest.LogCaptureFixture) -> Non
         each.close()
 
 
-# The second is what Windows has.
+# Windows has only SelectSelector.
 @pytest.mark.parametrize("poller", [selectors.DefaultSelector, selectors.SelectSelector])
 def test_socket_that_cannot_be_polled_is_served_each_second(
     caplog: pytest.LogCaptureFixture, poller: type[selectors.BaseSelector]
@@ -409,7 +409,7 @@ def test_removal_from_a_blocked_io_thread_waits_only_once() -> None:
     others = [Bell([]) for _ in range(100)]
     io.remove(others[0], 0.05)
     for other in others[1:]:
-        io.remove(other, 30.0)  # pytest's time-out would end the test
+        io.remove(other, 30.0)  # waits of 30 s would exceed pytest's timeout
     let_go.set()
     io.close()
     for each in (slow, *others):
@@ -441,11 +441,11 @@ def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
         len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
     )
     assert subscriptions.rejections.count == 1000
-    assert subscriptions.handle_event(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
+    assert subscriptions.handle_event(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # same hello
     assert subscriptions.handle_event(b"\0" + hello_part(5, "t", tells=True), 0) is None
     assert subscriptions.handle_event(b"\1" + hello_part(77_777, "t"), 0) is not None
     assert not subscriptions.all_acknowledge
-    for number in range(50_000):  # nor do other filters pile up
+    for number in range(50_000):  # other filters don't accumulate either
         subscriptions.handle_event(b"\1t\0" + b"%d" % number, 0)
         subscriptions.handle_event(b"\1t", 0)
     assert len(subscriptions.legacy_filters) == 1
@@ -475,7 +475,7 @@ def test_lost_message_that_is_received_later_is_counted_once() -> None:
     for _ in range(2):
         sources.expect_up_to(1, 5)
     assert (sources.received, sources.lost) == (3, 2)
-    # A connection was made anew, and the publisher sends its whole history.
+    # After a reconnection, the publisher sends its whole history.
     told = [seq for seq in (1, 2, 3, 4, 5) if sources.count_message(1, seq, is_alone=True)]
     assert told == [4, 5]
     assert not sources.count_message(1, 5, is_alone=True), "once"
@@ -502,7 +502,7 @@ def test_removed_publisher_counts_its_announced_messages_as_lost() -> None:
     assert sources.lost == 0, "it may only be out of reach"
     sources.count_missing(1)
     assert (sources.received, sources.lost) == (1, 2)
-    sources.mark_closing(2, 5, now=0.0)  # nobody we know
+    sources.mark_closing(2, 5, now=0.0)  # unknown publisher
     sources.mark_silent(2, 5)
     sources.count_missing(2)
     assert sources.lost == 2

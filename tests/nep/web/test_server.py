@@ -169,7 +169,7 @@ def test_page_moves_an_allowed_robot(master: Master, node: nep.Node) -> None:
         assert orders.listen(timeout_s=30) == (True, {"op": "invoke"})
 
 
-# ---- refused operations
+# ---- rejected operations
 
 
 def test_invalid_operations_receive_an_error_status_and_the_page_stays_connected(

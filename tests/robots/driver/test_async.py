@@ -46,7 +46,7 @@ class Drone:
             for _ in range(times):
                 await pause(0.005)
         finally:
-            await pause(0.0)  # putting away takes its turns, too
+            await pause(0.0)  # cleanup also awaits
             self.events.append("put away")
         return times
 
@@ -129,7 +129,7 @@ def test_cancel_timeout_and_stop_end_an_async_action(drone):
     eventually(lambda: body.events == ["flies"])
     ears.command(id="1", op="cancel")
     assert ears.final("1")["state"] == "canceled"
-    assert body.events == ["flies", "put away"]  # the answer waits for it
+    assert body.events == ["flies", "put away"]  # the reply waits for the cleanup
 
     ears.invoke("2", "fly")
     eventually(lambda: body.events[2:] == ["flies"])
@@ -142,7 +142,7 @@ def test_cancel_timeout_and_stop_end_an_async_action(drone):
     assert ears.final("s", "stop")["state"] == "succeeded"
     assert ears.final("3")["state"] == "canceled"
     assert set(body.events[5:]) == {"put away", "stopped"}
-    assert body.events[-1] == "stopped"  # also when the action ended after the stop function
+    assert body.events[-1] == "stopped"  # stop runs again if an action ended after it
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_blocking_wait_in_a_coroutine_fails_with_a_hint(drone):
 def test_coroutine_that_ignores_cancellation_is_reported_until_finished(drone):
     body, ears, clock = drone
     ears.invoke("1", "stubborn")
-    eventually(lambda: "begun" in body.events)  # "running" is told before; who has not begun need not listen
+    eventually(lambda: "begun" in body.events)  # "running" is published before the function begins
     ears.command(id="s", op="stop")
     eventually(lambda: "told" in body.events and "stopped" in body.events)
     clock.advance(STOP_REPLY_TIMEOUT_S + 0.01)
@@ -192,7 +192,7 @@ def test_function_that_returns_an_awaitable_is_awaited(node):
         ran: list[str] = []  # noqa: RUF012 - read after the robot has ended
 
         @action("go", "Movement", "move")
-        def go(self, call: Call):  # as a decorator of the driver's own may make it
+        def go(self, call: Call):  # as a driver's own decorator may produce
             async def later() -> None:
                 self.ran.append("ran")
 

@@ -39,13 +39,13 @@ def test_replace_cancels_the_running_action_and_both_replies_report_the_replacem
 
 def test_replace_also_cancels_queued_actions(turtle) -> None:
     body, ears, _ = turtle
-    ears.invoke("1", "ignore")  # does not end when it is told to: what comes waits for it
+    ears.invoke("1", "ignore")  # ignores its cancellation, so later actions are queued
     eventually(lambda: ears.states("1") == ["accepted", "running"])
     ears.invoke("2", "ignore")
     ears.invoke("3", "move", distance=1)
     assert first_answer(ears, "2")["waits_for"] == ["ignore"]
     assert ears.final("2") == {**ears.final("2"), "state": "canceled", "error": "replaced by move"}
-    assert ears.states("2") == ["accepted", "canceled"]  # it never ran
+    assert ears.states("2") == ["accepted", "canceled"]  # the queued action never ran
     body.go_on.set()
     assert ears.final("3")["state"] == "succeeded"
 
@@ -96,10 +96,10 @@ def test_timeout_starts_when_the_action_runs_and_not_while_queued(turtle) -> Non
     ears.invoke("1", "ignore")
     ears.invoke("2", "ignore")
     first_answer(ears, "2")
-    clock.advance(5.1)  # the limit of the first: it is told to end, and does not
+    clock.advance(5.1)  # beyond the first one's timeout; it ignores its cancellation
     ears.invoke("3", "light")
     ears.final("3")
-    clock.advance(1.1)  # so it is answered for
+    clock.advance(1.1)  # so the driver replies for the action
     assert ears.final("1")["error"] == (
         "Turtle may still move: ignore is still running (ignore took longer than 5 s)"
     )
@@ -127,7 +127,7 @@ def test_heartbeat_is_sent_only_while_an_action_runs(turtle) -> None:
     assert beats() <= told + 1
 
 
-# ---- who must stay alive ---------------------------------------------------------------------------
+# ---- program heartbeats ----------------------------------------------------------------------------
 
 
 def test_missing_heartbeat_of_an_idle_program_does_not_stop_the_robot(turtle) -> None:
@@ -140,7 +140,7 @@ def test_missing_heartbeat_of_an_idle_program_does_not_stop_the_robot(turtle) ->
         clock.advance(0.2)
         ears.command(op="alive", id=f"a{number}", **{"from": "running"})
         ears.invoke(f"l{number}", "light")
-        ears.final(f"l{number}")  # the robot has looked at the clock
+        ears.final(f"l{number}")  # the robot has checked the clock
     assert body.stops == 0
     body.go_on.set()
     assert ears.final("2")["state"] == "succeeded"

@@ -33,7 +33,7 @@ from tests.robots.driver.driver_program import ProgramDriver, ProgramKind, progr
 EXAMPLES = Path(__file__).parents[3] / "examples"
 MAX_HOSTILE_BYTES = 60_000  # larger messages use shared memory, which outlives the test
 FINAL = {"succeeded", "failed", "canceled"}
-PATIENCE_S = 3.0  # a loaded machine; what stops on its own within its `within` is measured in bench/stop.py
+PATIENCE_S = 3.0  # for loaded machines; bench/stop.py measures each stop against its `within`
 
 
 def kinds_in(path: Path) -> list[Kind]:
@@ -42,7 +42,7 @@ def kinds_in(path: Path) -> list[Kind]:
     assert spec is not None, f"{path} is no file of Python"
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module  # where dataclasses and type hints look a file's names up
+    sys.modules[path.stem] = module  # dataclasses and type hints resolve names through sys.modules
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
@@ -201,7 +201,7 @@ def at_its_start(kind: Kind | ProgramKind, name: str, *, real_clock: bool = Fals
         clock, alone = (
             FakeClock(),
             f"only {name}",
-        )  # who hears of another robot steps aside, and bumps elsewhere
+        )  # separate networks, because robots avoid other robots
         node = opened.enter_context(nep.node("contract", "memory", master=alone))
         other = opened.enter_context(nep.node("listener", "memory", master=alone))
         ears = Ears(other, name.replace(" ", "_"))
@@ -212,24 +212,24 @@ def at_its_start(kind: Kind | ProgramKind, name: str, *, real_clock: bool = Fals
 @pytest.fixture(scope="module")
 def shared(kind: Kind | ProgramKind) -> Iterator[Bench]:
     with at_its_start(kind, f"The {kind.model}") as bench:
-        bench.stop()  # an async one begins the robot's event loop, which lasts as long as the robot
+        bench.stop()  # starts the event loop of an async robot, which runs until the robot closes
         yield bench
 
 
 @pytest.fixture
 def bench(shared: Bench) -> Iterator[Bench]:
     yield shared
-    shared.stop()  # whatever a test left running
+    shared.stop()  # ends actions that a test left running
 
 
-# ---- what it says about itself ---------------------------------------------------------------------
+# ---- description -----------------------------------------------------------------------------------
 
 
 def test_description_is_valid_and_declares_every_action(bench, request) -> None:
     option = request.config.getoption
     ours = not option("--driver") and not option(
         "--driver-command"
-    )  # what we ask of our own robots, for the look of them
+    )  # requirements for our own robots only, such as icons
     described = json.loads(json.dumps(bench.driver.description))
     assert validate(described) == ()
     assert parse(described) == bench.robot
@@ -261,7 +261,7 @@ def test_stop_ends_running_and_queued_actions(bench) -> None:
         eventually(lambda second=second: bench.ears.states(second))
         assert bench.stop()["state"] == "succeeded", action.name
         for wanted in (first, second):
-            (final,) = bench.finals(wanted)  # one that has nothing to do may have been quicker than the stop
+            (final,) = bench.finals(wanted)  # an action with nothing to do may finish before the stop
             ended.append(final["state"])
     assert "canceled" in ended or not any(takes_time(bench, action) for action in bench.long())
     assert set(ended) <= FINAL
@@ -303,18 +303,18 @@ def test_stop_with_only_the_name_of_a_program_does_not_block_its_later_commands(
 def test_each_action_is_answered_exactly_once_and_can_be_canceled(shared) -> None:
     canceled = []
     for action in shared.actions():
-        # What turned a robot away would take the face from its next action.
+        # A new robot for each action: one that has turned away no longer sees a face.
         with at_its_start(shared.kind, f"Another {shared.kind.model}") as bench:
             wanted = bench.invoke(action)
             if action.cancellable:
                 bench.running(wanted)
                 bench.ears.command(id=wanted, op="cancel")
             ended = bench.ears.final(wanted)["state"]
-            bench.stop()  # all answers have been given by now
+            bench.stop()  # all replies have been sent by now
             assert len(bench.finals(wanted)) == 1
             assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
-            # one that has nothing to do (to stand straight when it does) may be quicker than its cancel,
-            # and one that gets a made up value may have its own reason to refuse it
+            # an action with nothing to do (standing up while standing) may finish before its cancel,
+            # and an action with a made-up value may reject it
             made_up = any(p.required and p.default is None for p in action.parameters)
             allowed = ["succeeded", *["canceled"] * action.cancellable, *["failed"] * made_up]
             assert ended in allowed, (action.name, bench.finals(wanted))
@@ -332,14 +332,14 @@ def test_cancel_of_an_unknown_task_fails(bench) -> None:
 def test_action_that_exceeds_its_timeout_fails_with_the_limit(shared) -> None:
     late = []
     for action in (each for each in shared.long() if each.timeout_s):
-        # The world has a clock of its own: what moved a robot for a while would take the face from the next.
+        # The world keeps its own clock: a robot that moved would no longer see the face in the next action.
         with at_its_start(shared.kind, f"Late {shared.kind.model}") as bench:
             wanted = bench.invoke(action)
             bench.running(wanted)
             bench.clock.advance(action.timeout_s + 0.1)
             ended = bench.ears.final(wanted)
         if ended["state"] == "succeeded":
-            continue  # one that only lets time pass was done in that moment
+            continue  # an action that only waits finishes in that moment
         assert ended["state"] == "failed"
         assert ended["error"] == f"{action.name} took longer than {action.timeout_s:g} s"
         late.append(action.name)
@@ -354,13 +354,13 @@ def test_busy_robot_queues_replaces_or_rejects_actions_as_declared(shared) -> No
             second = bench.invoke(action)
             eventually(lambda bench=bench, second=second: bench.ears.states(second))
             if bench.finals(first) and bench.finals(first)[0]["state"] == "succeeded":
-                continue  # it had nothing to do
+                continue  # the action had nothing to do
             told = bench.ears.answers(second)[0]
             if action.on_busy == "queue":
                 assert told["waits_for"] == [action.name]
                 bench.ears.command(id=first, op="cancel")
             elif action.on_busy == "replace":
-                if bench.ears.final(first)["state"] == "succeeded":  # over just before the second came
+                if bench.ears.final(first)["state"] == "succeeded":  # finished before the second arrived
                     continue
                 assert told["replaces"] == [action.name]
             else:
@@ -388,7 +388,7 @@ def test_robot_sends_heartbeats_while_active(bench) -> None:
     eventually(lambda: beats() > told)
 
 
-# ---- what is wrong ---------------------------------------------------------------------------------
+# ---- invalid input ---------------------------------------------------------------------------------
 
 
 def test_invalid_inputs_are_rejected_with_a_message_and_no_action_runs(bench) -> None:
@@ -453,12 +453,12 @@ def test_duplicate_command_runs_once(bench) -> None:
     assert len(bench.finals(wanted)) == 1
 
 
-# ---- its life --------------------------------------------------------------------------------------
+# ---- close and real clock --------------------------------------------------------------------------
 
 
 def test_close_cancels_the_running_action_and_leaves_no_thread(kind) -> None:
     name = f"Closing {kind.model}"
-    with at_its_start(kind, name) as bench:  # closes it once more
+    with at_its_start(kind, name) as bench:  # the context closes it again
         ears = bench.ears
         long = bench.any_action(long=True)
         ears.invoke("1", long.name, **required(long))

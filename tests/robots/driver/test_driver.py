@@ -107,7 +107,7 @@ def test_function_that_ignores_its_timeout_is_answered_as_failed(turtle):
     eventually(lambda: "running" in ears.states("1"))
     clock.advance(5.1)
     eventually(lambda: clock.advance(0.2) or "failed" in ears.states("1"))
-    ears.invoke("2", "dig")  # what it uses is still in use
+    ears.invoke("2", "dig")  # its resource is still in use
     assert ears.final("2")["error"] == "dig: Turtle is busy with ignore"
     body.go_on.set()
     eventually(lambda: ears.invoke("3", "dig") or "succeeded" in ears.states("3"))
@@ -193,13 +193,13 @@ def test_stop_that_does_not_end_an_action_is_reported_as_failed(turtle):
     still = "Turtle may still move: ignore is still running"
     assert ears.final("s", "stop")["error"] == still
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", still)
-    ears.invoke("2", "light")  # uses nothing that is in use, and is refused all the same
+    ears.invoke("2", "light")  # needs no busy resource, but is rejected all the same
     assert ears.final("2")["error"] == f"light: {still}"
     beats = [a for a in ears.heard["answer"] if a["op"] == "alive"]
     assert (beats[-1]["not_ended"], beats[-1]["error"]) == (["ignore"], still)
     body.go_on.set()
     eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
-    assert body.stops == 2  # what went on may have moved the robot after the first one
+    assert body.stops == 2  # the running action may have moved the robot after the first stop
     ears.invoke("3", "light")
     assert ears.final("3")["state"] == "succeeded"
     ears.command(id="t", op="stop")
@@ -217,7 +217,7 @@ def test_failing_stop_function_reports_its_reason(turtle, caplog):
         "failed",
         "Turtle may still move: the brake does not answer",
     )
-    assert caplog.records == []  # no traceback for what it says itself
+    assert caplog.records == []  # no traceback for an expected failure
     body.stop_fails = None
     ears.command(id="t", op="stop")
     assert ears.final("t", "stop")["state"] == "succeeded"
@@ -308,10 +308,10 @@ def test_missing_heartbeat_stops_the_robot(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
-    for number in range(4):  # alive: nothing happens
+    for number in range(4):  # with heartbeats, nothing happens
         clock.advance(0.6)
         ears.command(op="alive", **{"from": "p"})
-        ears.invoke(f"d{number}", "fail")  # answered: the sign of life before it was taken
+        ears.invoke(f"d{number}", "fail")  # its reply proves that the heartbeat was processed
         ears.final(f"d{number}")
     assert body.stops == 0
     clock.advance(1.1)
@@ -337,7 +337,7 @@ def test_failed_watchdog_stop_is_reported_until_a_stop_succeeds(turtle, caplog):
     eventually(lambda: told_of_itself(ears) == still)
     assert [record.getMessage() for record in caplog.records] == [still[1]]
     count = len(ears.heard["answer"])
-    eventually(lambda: clock.advance(0.1) or len(ears.heard["answer"]) > count + 1)  # for who comes later
+    eventually(lambda: clock.advance(0.1) or len(ears.heard["answer"]) > count + 1)  # for late subscribers
     assert told_of_itself(ears) == still
     body.stop_fails = Failed("the brake is stuck")
     ears.command(id="s", op="stop")
@@ -387,7 +387,7 @@ def test_forged_heartbeat_does_not_keep_the_robot_moving(turtle, node):
         clock.advance(0.4)
         attacker.publish({"op": "alive", "id": f"a{number}", "from": "p"})
         attacker.publish({"op": "invoke", "id": f"i{number}", "action": "fail", "input": {}, "from": "p"})
-        ears.final(f"i{number}")  # the forged sign before it was taken
+        ears.final(f"i{number}")  # the forged heartbeat was processed before it
     assert ears.final("1")["error"] == "its program hasn't responded for 1 s"
     eventually(lambda: body.stops >= 1)
     assert not body.moving
@@ -475,7 +475,7 @@ def test_close_stops_the_robot_and_answers_all_actions(node, clock):
         eventually(lambda: not other.graph().topics["/Turtle/answer"].publishers)
 
 
-# ---- what the robot tells -------------------------------------------------------------------------
+# ---- sensors and events ---------------------------------------------------------------------------
 
 
 def test_sensors_and_events_are_published_with_blackboard_entries(turtle):
@@ -483,7 +483,7 @@ def test_sensors_and_events_are_published_with_blackboard_entries(turtle):
     bumps = ears.listen("bumped")
     board = ears.listen("board", topic="/blackboard")
     body.link.sense("battery", 84)
-    assert ears.listen("battery") is not None  # latched: heard although it was told before
+    assert ears.listen("battery") is not None  # latched: received although published earlier
     body.link.happen("bumped", side="left")
     eventually(lambda: bumps and board and ears.heard["battery"])
     assert ears.heard["battery"] == [{"value": 84}]

@@ -10,6 +10,6 @@ from tests.robots.conftest import FakeClock
 def test_fake_clock_wait_ends_if_its_time_passed_before_the_wait_started(clock: FakeClock) -> None:
     due = clock.now() + 0.5
     rest = due - clock.now()
-    clock.advance(0.6)  # the waiting thread had no turn yet
+    clock.advance(0.6)  # due time passes before the wait
     assert not clock.wait(threading.Event(), rest)
     assert clock.now() >= due

@@ -137,7 +137,7 @@ def test_commands_received_before_a_stop_are_not_run_after_the_stop(busy, how):
     eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
     go_on.set()
     answers = [ears.final(f"q{number}") for number in range(100)]
-    if how != "rize":  # on another topic nobody knows which of them was first
+    if how != "rize":  # messages on different topics have no common order
         assert {answer["state"] for answer in answers} == {"canceled"}
         assert driver.body.done == []
         assert ears.final("s", "stop" if how == "native" else "invoke")["state"] == "succeeded"
@@ -179,7 +179,7 @@ def test_stop_is_confirmed_only_by_a_stop_call_that_ended_after_the_last_action(
     assert body.stops == 2
 
 
-# ---- what ends a thread
+# ---- ended threads
 
 
 def kill(name: str) -> threading.Thread:

@@ -71,7 +71,7 @@ def test_stop_command_has_the_fields_that_older_drivers_read(robot):
     stop = rize.to_command(robot, "stop", {}, "7")
     assert stop["node"] == "cancel"
     action = rize.to_command(robot, "say", {"text": "hi"}, "8")
-    assert stop.keys() == action.keys()  # drivers that do not know a cancel read what every action has
+    assert stop.keys() == action.keys()  # older drivers expect the fields of an action in every command
 
 
 def test_rize_replies_are_parsed(robot):
@@ -91,7 +91,7 @@ def test_ready_message_of_a_robot_is_parsed():
     assert rize.ready(["x"]) is None
 
 
-# ---- every driver ----------------------------------------------------------------------------------------
+# ---- tests of every driver -------------------------------------------------------------------------------
 
 SAY = {"primitive": "say", "input": "hello", "options": {"contextual": True, "pitch": 50, "velocity": 50}}
 FLY = {"primitive": "fly", "input": "high", "options": "none"}
@@ -106,10 +106,10 @@ class Speaker:
     """Running driver, its listener, and the values that differ between drivers in the shared cases."""
 
     ears: Ears
-    several: list[dict[str, object]]  # primitives that it does ...
-    did: Callable[[], object]  # ... and whether it has done them
-    long: dict[str, object]  # a primitive that goes on until it is stopped
-    beyond: dict[str, object]  # one that it has, with what that can't have
+    several: list[dict[str, object]]  # primitives of one command ...
+    did: Callable[[], object]  # ... and the check that all were executed
+    long: dict[str, object]  # a primitive that runs until stopped
+    beyond: dict[str, object]  # a supported primitive with an invalid argument
     let: Callable[[], None] = field(default=lambda: None)
     """Function that allows actions of limited duration to end."""
 
@@ -228,7 +228,7 @@ def test_program_and_rize_driver_exchange_commands_and_results(speaker):
     assert [answer["state"] for answer in speaker.answered(2)] == ["success", "failure"]
 
 
-# ---- one driver ------------------------------------------------------------------------------------------
+# ---- tests of one driver ---------------------------------------------------------------------------------
 
 
 def test_driver_kit_executes_only_commands_for_its_robot(turtle):

@@ -130,7 +130,7 @@ def test_block_text_with_an_unknown_parameter_is_rejected():
         Kind(model="x", title="X", body=Wrong)
 
 
-# ---- values of richer types ------------------------------------------------------------------------
+# ---- values of richer types (enums, dataclasses, arrays) -------------------------------------------
 
 
 class Side(Enum):
@@ -263,7 +263,7 @@ def test_recursive_type_is_rejected():
         schema_of(Tree)
 
 
-# ---- a robot with them -----------------------------------------------------------------------------
+# ---- robot with richer types -----------------------------------------------------------------------
 
 
 class Arm:

@@ -39,7 +39,7 @@ def load(file: Path, text: str) -> object:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[file.stem] = module  # where the classes of a file are looked up
+    sys.modules[file.stem] = module  # type hints of classes are resolved through sys.modules
     try:
         spec.loader.exec_module(module)
     finally:
@@ -85,7 +85,7 @@ def test_valid_driver_is_accepted(tmp_path):
 def test_invalid_declaration_is_reported_with_its_line(tmp_path, old, new, sentence):
     text = GOOD.replace(old, new)
     assert text != GOOD
-    if sentence is None:  # a sensor whose name is taken by something else is none: nothing is wrong
+    if sentence is None:  # replacing a sensor by another attribute is valid
         load(tmp_path / "table.py", text)
         return
     with pytest.raises(DescriptionError) as caught:

@@ -141,7 +141,7 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     body.touch("head", down=True)
     body.touch("head", down=False)
     body.step(0.1)
-    body.touch("head", down=True)  # before the tap has ended: now it is held
+    body.touch("head", down=True)  # pressed during the tap: held from now on
     body.step(5)
     assert list(body.touched) == ["head"]
 
@@ -163,7 +163,7 @@ def test_heard_word_is_shown_for_some_seconds():
     assert drawing_state(body)["heard"] == "hello"
     body.step(4)
     assert drawing_state(body)["heard"] == ""
-    assert body.last_word == "hello"  # the sensor keeps it
+    assert body.last_word == "hello"  # the sensor keeps its last value
 
 
 def test_battery_drains_faster_while_moving():

@@ -104,7 +104,7 @@ def test_face_is_detected_only_while_visible(eyes):
     assert seen(Body())
     assert not seen(Body(theta_deg=90.0))
     assert not seen(Body(theta_deg=180.0))
-    assert not seen(Body(theta_deg=30.5))  # at the edge, most of it outside
+    assert not seen(Body(theta_deg=30.5))  # mostly outside the image
     hidden = Body(room=Room().with_moved("person", 0.35, -2.4), theta_deg=-75.0)
     tall = hidden.room.boxes[1]
     assert tall.height > hidden.room.people[0].face_z

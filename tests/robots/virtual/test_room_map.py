@@ -29,13 +29,13 @@ def test_room_changes_are_merged_from_json_messages() -> None:
     assert other.merge(json.loads(json.dumps(one.message())))
     assert other.room() == one.room() != Room()
     assert [person.name for person in other.room().people] == ["Aiko", "Ben"]
-    assert other.room().markers[0].facing_deg == 0.0  # it hangs on the wall that is near
+    assert other.room().markers[0].facing_deg == 0.0  # attached to the nearest wall
     assert not other.merge(one.message())
 
 
 def test_maps_converge_for_any_order_of_messages() -> None:
     chance = random.Random(7)
-    maps = [RoomMap(clock_ns=lambda: chance.randrange(5)) for _ in range(3)]  # clocks that hardly go on
+    maps = [RoomMap(clock_ns=lambda: chance.randrange(5)) for _ in range(3)]  # clocks with many equal times
     told = []
     for _ in range(60):
         one = chance.choice(maps)

@@ -67,7 +67,7 @@ def test_camera_shows_the_other_robots() -> None:
     assert with_other(Room(), hidden).is_hidden((-0.5, 0.0, 1.1), (1.5, 0.0, 0.9))
 
 
-# ---- held by a person -----------------------------------------------------------------------------
+# ---- lifted by a person ---------------------------------------------------------------------------
 
 
 def test_lifted_robot_pauses_its_motion_and_resumes_when_put_down() -> None:
@@ -108,7 +108,7 @@ def test_carried_robot_does_not_overlap_walls_or_furniture(body) -> None:
     assert (body.x, body.y) != (table.x, table.y), before
 
 
-# ---- who is there ------------------------------------------------------------------------------------
+# ---- neighbours --------------------------------------------------------------------------------------
 
 
 def test_robot_that_stops_publishing_is_removed_from_the_neighbours() -> None:
@@ -193,7 +193,7 @@ def test_object_moved_by_the_user_moves_for_all_robots_including_later_robots(ro
 
 def test_pushed_ball_moves_for_the_other_robot(robots: Robots) -> None:
     here = RoomMap()
-    here.move("ball", -0.5, -0.62)  # ahead of the small robot
+    here.move("ball", -0.5, -0.62)  # in front of the small robot
     robots.room.publish(here.message())
     pepper, turtle = robots.start(PEPPER, "Pepper"), robots.start(TURTLE, "Turtle")
     eventually(lambda: place(pepper, "ball") == place(turtle, "ball") == (-0.5, -0.62))
@@ -243,7 +243,7 @@ def test_reset_moves_robots_to_their_start_and_keeps_objects_of_the_room(robots:
     eventually(lambda: all(world.subscribers for world in worlds.values()))
 
     def is_carried(name: str, x: float, y: float) -> bool:
-        worlds[name].publish({"move": "robot", "x": x, "y": y})  # refused as long as the other stands there
+        worlds[name].publish({"move": "robot", "x": x, "y": y})  # rejected while the other robot is there
         return pose(name) != first[name]
 
     eventually(lambda: is_carried("Bob", 1.0, 1.0))

@@ -122,7 +122,7 @@ def test_stop_is_answered_while_moving(pepper):
     ):
         pepper.invoke(f"{number}", action, **given)
         eventually(lambda: pepper.newest("state")["moving"])
-        assert pepper.stopped(f"s{number}")["state"] == "succeeded"  # bench/stop.py measures how soon
+        assert pepper.stopped(f"s{number}")["state"] == "succeeded"  # bench/stop.py measures the delay
         eventually(lambda: not pepper.newest("state")["moving"])
 
 
@@ -231,7 +231,7 @@ def test_camera_images_are_published_while_subscribed(node, pepper):
         assert picture.payload.shape == (240, 320, 3)
         assert picture.extension["encoding"] == "jpeg"
         assert picture.size_bytes < 40_000
-        assert cv2.Laplacian(picture.payload, cv2.CV_64F).var() > 20  # something is on it
+        assert cv2.Laplacian(picture.payload, cv2.CV_64F).var() > 20  # the image isn't empty
 
 
 def test_same_seed_gives_the_same_object_positions():

@@ -27,7 +27,7 @@ def near(value: float, expected: float, within: float) -> bool:
     return abs(value - expected) <= within
 
 
-# ---- the body --------------------------------------------------------------------------------------
+# ---- body ------------------------------------------------------------------------------------------
 
 
 def test_wheels_reach_the_requested_speed_and_brake_within_a_tenth_of_a_second() -> None:
@@ -48,11 +48,11 @@ def test_positive_turn_is_left_and_driving_with_turn_follows_a_circle() -> None:
     body = WheelBody(x=0.0, y=0.6, theta_deg=180.0)
     body.drive(0.0, 90.0)
     body.step(1.0)
-    assert -120 < body.theta_deg < -60  # from 180 over the left
+    assert -120 < body.theta_deg < -60  # turned left from 180 degrees
     body = WheelBody(x=-1.0, y=-0.6, theta_deg=0.0)
     body.drive(0.3, 60.0)
     body.step(6.3)
-    assert math.hypot(body.x + 1.0, body.y + 0.6) < 0.2  # once round
+    assert math.hypot(body.x + 1.0, body.y + 0.6) < 0.2  # one full circle
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_pressed_bumper_stops_the_robot_and_is_released_after_its_press_duration
     assert [(h.event, h.data) for h in body.events] == [("bump", {"side": "left"})]
 
 
-# ---- what it sees ----------------------------------------------------------------------------------
+# ---- camera ----------------------------------------------------------------------------------------
 
 
 def test_camera_detects_the_red_ball_and_the_blue_shirt() -> None:
@@ -120,7 +120,7 @@ def test_grey_image_and_small_specks_have_no_colour() -> None:
     assert (seen.name, round(seen.x, 1)) == ("red", 0.9)
 
 
-# ---- its description -------------------------------------------------------------------------------
+# ---- description -----------------------------------------------------------------------------------
 
 
 def test_shipped_thing_model_matches_the_driver() -> None:
@@ -132,7 +132,7 @@ def test_shipped_thing_model_matches_the_driver() -> None:
     assert ROBOT.thing_model["actions"] == DIFFDRIVE.thing_model["actions"]
 
 
-# ---- the whole robot -------------------------------------------------------------------------------
+# ---- whole robot -----------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -165,7 +165,7 @@ def test_robot_moves_turns_and_drives_to_a_position(turtle) -> None:
     assert told
     assert set(told[0]) == {"moved", "to_go"}
     ears.invoke("4", "go_to", x=pose(ears)[0], y=pose(ears)[1])
-    assert ears.final("4")["state"] == "succeeded"  # it is there
+    assert ears.final("4")["state"] == "succeeded"  # already at the target
 
 
 def test_carrying_the_robot_does_not_count_as_moved_distance(turtle) -> None:
@@ -195,7 +195,7 @@ def test_missing_heartbeat_of_the_program_stops_a_driving_robot(turtle) -> None:
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
     eventually(lambda: not body.wheels.still())
-    eventually(body.wheels.still)  # nothing said that the program lives
+    eventually(body.wheels.still)  # no heartbeat was sent
     assert ears.heard["state"][-1]["figure"] == "turtle"
 
 
@@ -204,7 +204,7 @@ def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(tu
     ears.invoke("1", "drive", program="test", speed=0.0, turn=60)
     ears.final("1")
     began = len(ears.heard["pose"])
-    while len(ears.heard["pose"]) < began + 40:  # more than a second
+    while len(ears.heard["pose"]) < began + 40:  # longer than one second
         seen = len(ears.heard["pose"])
         ears.command(op="alive", id="a", **{"from": "test"})
         eventually(lambda seen=seen: len(ears.heard["pose"]) > seen)
@@ -230,7 +230,7 @@ def test_stop_during_a_move_ends_the_move_immediately(turtle) -> None:
 
 def test_move_into_an_obstacle_fails_and_publishes_a_bump_event(turtle) -> None:
     _, ears = turtle
-    ears.invoke("1", "go_to", x=0.3, y=-2.2)  # into the shelf
+    ears.invoke("1", "go_to", x=0.3, y=-2.2)  # inside the shelf
     ended = ears.final("1")
     assert (ended["state"], ended["error"]) == ("failed", "go_to: something is in the way")
     assert ears.heard["bump"]

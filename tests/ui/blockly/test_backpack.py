@@ -213,7 +213,7 @@ def test_variables_of_backpack_stacks_are_matched_by_name(qtbot, view, them, win
     them.wait_for(f"!!{SHOWN}.querySelector('[data-id=g2]')")
     put_in(them, window, "g1")
     put_in(them, window, "g2")
-    # The other file has one of that name with another id, and the id belongs to another name.
+    # The other file has a variable with this name and another id, and one with this id and another name.
     other = [{"id": "own", "name": "score"}, {"id": "v2", "name": "other"}]
     view.show_tab("to", {**workspace(START), "variables": other})
     them.wait_for(f"{STACKS}.length === 0 && !{SHOWN}.querySelector('[data-id=g2]')")
@@ -239,7 +239,7 @@ def test_backpack_of_another_studio_is_loaded_and_unknown_blocks_are_preserved(
     }
     wrong = {"type": "control_wait", "inputs": {"SECONDS": {"block": {"type": "control_wait"}}}}
     Backpack(tmp_path).add([strange, wrong, {"type": "control_wait", "extraState": 5, "icons": 7}])
-    open_it(them, 3)  # opening it looks
+    open_it(them, 3)  # opening validates the blocks
     them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (3)")
     them.click(f"{IN_SHEET}:first-child > .blocklyPath")
     them.until(lambda: len(chains(them)) == 3, "it is on the canvas")

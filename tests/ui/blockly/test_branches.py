@@ -77,10 +77,10 @@ def test_plus_button_adds_else_then_else_if_with_undo(qtbot, view, person):
     them: Person = person(state=choice())
     press_button(them, 0)
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
-    them.wait_for("document.querySelectorAll('[data-id=if] > .nepButton').length", 2)  # it is drawn anew
+    them.wait_for("document.querySelectorAll('[data-id=if] > .nepButton').length", 2)  # block re-rendered
     press_button(them, 0)
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 1, "else": True}, timeout=WAIT_MS)
-    assert compile_behaviour(them.newest(), []).errors  # no condition yet: that is said, and nothing else
+    assert compile_behaviour(them.newest(), []).errors  # the missing condition is the only error
     view.undo()
     qtbot.waitUntil(lambda: shape(them) == {"elseIfs": 0, "else": True}, timeout=WAIT_MS)
     view.undo()

@@ -68,7 +68,7 @@ def test_bubble_of_a_block_covered_by_the_open_flyout_is_hidden(qtbot, view, per
     shown_beside(qtbot, them, view, "w")
     visible = "document.querySelector('.nepBubble').checkVisibility({visibilityProperty: true})"
     assert them.ask(visible)
-    them.open_category("Control")  # its blocks lie over this one
+    them.open_category("Control")  # the flyout's blocks cover this block
     them.wait_for(visible, False)
     them.press(Qt.Key_Escape)
     them.wait_for(visible)

@@ -53,7 +53,7 @@ def test_failed_build_keeps_the_existing_bundle(tools, tmp_path):
     shutil.copytree(EDITOR / "src", here / "src")
     shutil.copy(EDITOR / "build.mjs", here)
     (here / "node_modules").symlink_to(EDITOR / "node_modules", target_is_directory=True)
-    (here / "src" / "index.html").unlink()  # is needed last, after the script was built
+    (here / "src" / "index.html").unlink()  # needed last, after the script is built
     out.mkdir()
     (out / "editor.js").write_text("the one before")
     done = subprocess.run(
@@ -86,7 +86,7 @@ def test_bundle_loads_no_external_resources():
     bundle = resources.path("blockly", "editor.js").read_text()
     addresses = set(re.findall(r"https?://[a-z0-9.-]+", bundle))
     # Names of XML formats, a comment, help texts, and Blockly's default media folder, which the page
-    # replaces; none is ever fetched (the page's own rules forbid it too, and the fence blocks it).
+    # replaces; none is ever fetched (the page's security policy and the request filter block it, too).
     assert addresses <= {
         "http://www.w3.org",
         "https://bugzilla.mozilla.org",

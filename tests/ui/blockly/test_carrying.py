@@ -205,7 +205,7 @@ def test_note_is_moved_to_another_tab(qtbot, view, them, told) -> None:
     qtbot.waitUntil(lambda: "workspaceComments" not in them.newest(), timeout=WAIT_MS)
 
 
-# -- a tab that opens under what is held -----------------------------------------------------------
+# -- a tab that opens under a held block -----------------------------------------------------------
 
 
 def hold_outside(them: Person, told: Told, selector: str, to: QPoint = ABOVE) -> None:

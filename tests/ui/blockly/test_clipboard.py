@@ -66,7 +66,7 @@ def test_duplicates_are_placed_unattached_next_to_the_original_in_the_viewport(q
     for count in range(2, 6):
         press(them, Qt.Key_D)
         qtbot.waitUntil(lambda count=count: len(them.tops()) == count, timeout=WAIT_MS)
-        # The keys go to the copy.
+        # The duplicate gets the focus.
         them.wait_for("document.hasFocus() && !!document.querySelector('.blocklySelected')")
     boxes = them.ask(BOXES)
     assert len(boxes) == 5
@@ -74,7 +74,7 @@ def test_duplicates_are_placed_unattached_next_to_the_original_in_the_viewport(q
     room = them.box(".blocklySvg")
     assert all(room["left"] < box[0] and box[2] < room["right"] for box in boxes)
     assert all(room["top"] < box[1] and box[3] < room["bottom"] for box in boxes)
-    assert "next" in them.tops()[0]  # nothing was torn off, nothing was put in between
+    assert "next" in them.tops()[0]  # the stack is intact, nothing was inserted
 
 
 def test_rapid_duplicates_leave_the_focus_on_the_newest_duplicate(them):
@@ -84,7 +84,7 @@ def test_rapid_duplicates_leave_the_focus_on_the_newest_duplicate(them):
     for _ in range(4):
         press(them, Qt.Key_D)
     them.wait_for("document.querySelectorAll('.nepTab:not([hidden]) .control_wait').length", 5)
-    them.box(".blocklySelected")  # two pictures later
+    them.box(".blocklySelected")  # selected after two frames
     them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", them.tops()[-1]["id"])
 
 
@@ -114,7 +114,7 @@ def test_blocks_cut_in_one_tab_are_pasted_in_another_tab(qtbot, view, them):
     press(them, Qt.Key_X)
     qtbot.waitUntil(lambda: "next" not in them.tops()[0], timeout=WAIT_MS)
     view.show_tab("second", workspace())
-    # A key that is pressed comes to the page by another way than what we tell it, and may be there first.
+    # A key press reaches the page through another channel than a call and may arrive first.
     them.wait_for("document.querySelector('.nepTab:not([hidden]) [data-id=start]') === null")
     press(them, Qt.Key_V)
     qtbot.waitUntil(lambda: types(them) == ["control_wait"], timeout=WAIT_MS)
@@ -136,7 +136,7 @@ def test_paste_works_while_another_widget_of_the_window_has_focus(qtbot, view, t
     them.wait_for("document.hasFocus()", False)
     view.edit("copy")
     them.wait_for("document.hasFocus()")
-    view.edit("paste")  # has the keys now: what it does with them is its own
+    view.edit("paste")  # the page has the focus and handles its own keys
     other.setFocus()
     them.wait_for("document.hasFocus()", False)
     view.edit("paste")
@@ -147,7 +147,7 @@ def test_paste_works_while_another_widget_of_the_window_has_focus(qtbot, view, t
 def test_edit_menu_cuts_copies_and_pastes_blocks(qtbot, view, them):
     them.click("[data-id=w] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "w")
-    view.edit_from_menu("copy")  # the page has the keys: from the menu it is done all the same
+    view.edit_from_menu("copy")  # a menu command is executed even if the page has the focus
     qtbot.waitUntil(lambda: "control_wait" in QGuiApplication.clipboard().text(), timeout=WAIT_MS)
     view.edit_from_menu("paste")
     qtbot.waitUntil(lambda: types(them) == ["control_wait", "events_started"], timeout=WAIT_MS)
@@ -186,7 +186,7 @@ def test_blocks_copied_as_text_in_another_studio_are_pasted_and_other_text_is_ig
     press(them, Qt.Key_V)
     qtbot.waitUntil(lambda: "robot_nao_do_sing" in types(them), timeout=WAIT_MS)
     made = next(top for top in them.tops() if top["type"] == "robot_nao_do_sing")
-    assert made["fields"] == {"SONG": "la"}  # not known here, and kept as it is
+    assert made["fields"] == {"SONG": "la"}  # an unknown block keeps its fields
 
 
 def test_paste_in_an_open_field_inserts_text(qtbot, them):

@@ -51,7 +51,7 @@ def test_focused_script_stays_rendered_and_focused_outside_the_viewport(person):
 
 
 def test_script_with_a_note_is_always_rendered(person):
-    # Blockly looks where the picture of its block is when it puts the note down.
+    # Blockly reads the rendered position of the block when it places the note.
     below = script("below", 40, 1400)
     below["icons"] = {"comment": {"text": "look", "pinned": True, "height": 80, "width": 160}}
     them = person(script("here", 40, 40), below)
@@ -76,7 +76,7 @@ def test_far_script_is_rendered_after_a_redo_joins_another_script(person):
     them.view.apply_edit(workspace(joined))
     them.wait_for(drawn("here_wait", "below_wait"), ["here_wait", "below_wait"])
     them.view.undo()
-    them.wait_for(f"{drawn('here_wait', 'below_wait')}.length", 1)  # Blockly may show what came back
+    them.wait_for(f"{drawn('here_wait', 'below_wait')}.length", 1)  # Blockly may render the restored blocks
     them.view.redo()
     them.wait_for(drawn("here_wait", "below_wait"), ["here_wait", "below_wait"])
     them.wait_for("document.querySelectorAll('.nepFar').length", 0)

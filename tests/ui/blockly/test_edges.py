@@ -92,7 +92,7 @@ def test_selected_block_has_two_tones_with_enough_contrast(view, person, mode) -
         assert them.ask(shape.format(".nepSelection > path")) == them.ask(shape.format(".blocklyPath"))
     outer, inner = them.ask(tones)
     focus = TOKENS["colour"][mode]["focus"]
-    assert inner == "rgb(255, 255, 255)"  # as the words: at least 4.5 : 1 on every block
+    assert inner == "rgb(255, 255, 255)"  # like the text: a contrast of at least 4.5 : 1 on every block
     assert outer == "rgb({}, {}, {})".format(*(int(focus[at : at + 2], 16) for at in (1, 3, 5)))
     assert contrast(focus, TOKENS["colour"][mode]["workspace"]) >= 3
     them.click(".nepTab:not([hidden]) .blocklyMainBackground", dx=500, dy=400)
@@ -124,7 +124,7 @@ def test_focus_ring_is_hidden_after_a_click_and_shown_by_the_first_navigation_ke
         them.wait_for(keys, False)
         assert rings(them) == [], place
         assert them.ask(f"{shown}.classList.contains('blocklyKeyboardNavigation')") is False
-    them.wait_for(SELECTED, ["start"])  # a block that was clicked is still seen to be selected
+    them.wait_for(SELECTED, ["start"])  # a clicked block is still shown as selected
     them.press(Qt.Key_Down)
     them.wait_for(keys)
     them.wait_for(f"{shown}.classList.contains('blocklyKeyboardNavigation')")

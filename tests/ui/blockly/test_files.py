@@ -66,7 +66,7 @@ def test_unknown_blocks_round_trip(person):
 def test_stack_with_invalid_shadow_blocks_is_preserved(person):
     number = {"type": "values_number", "id": "n", "fields": {"NUMBER": 1}}
     compare = {"type": "values_compare", "id": "c", "fields": {"OP": "<"}, "inputs": {"A": {"block": number}}}
-    # A shadow block cannot hold a real one.
+    # A shadow block can't contain a real block.
     shadowed = {**WAIT, "inputs": {"SECONDS": {"shadow": compare}}}
     state = workspace(shadowed, START)
     assert person(state=state).newest() == state

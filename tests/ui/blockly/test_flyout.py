@@ -221,7 +221,7 @@ def test_block_returned_to_the_flyout_adds_no_undo_step(opened, width):
     them.view.history_changed.connect(lambda *history: told.append(history))
     them.open_category("Movement")
     start = them.hold(TURN)
-    # On a narrow page the blocks of the category close while one is in the hand: only the toolbox is left.
+    # On a narrow page the flyout closes during a drag: only the toolbox is left.
     back = start if width == WIDE else QPoint(90, 420)
     them.move(start, CANVAS)
     them.until(lambda: told[-1:] == [(True, False)], "it is on the canvas")

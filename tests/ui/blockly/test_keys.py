@@ -85,9 +85,9 @@ def test_behaviour_is_built_with_the_keyboard_only(qtbot, view, person):
     goes_to(them, "events")
     press(them, Qt.Key_Right)
     goes_to(them, "when started")
-    press(them, Qt.Key_Return)  # takes the block
+    press(them, Qt.Key_Return)  # picks the block up
     them.wait_for("!!document.querySelector('.blocklyDragging')")
-    press(them, Qt.Key_Return)  # puts it down
+    press(them, Qt.Key_Return)  # drops the block
     qtbot.waitUntil(lambda: [top["type"] for top in them.tops()] == ["events_started"], timeout=WAIT_MS)
     assert min(them.tops()[0]["x"], them.tops()[0]["y"]) >= EDGE, "its signs at the left are whole"
     hold(them, Qt.Key_B)
@@ -98,7 +98,7 @@ def test_behaviour_is_built_with_the_keyboard_only(qtbot, view, person):
     goes_to(them, "wait")
     press(them, Qt.Key_Return)
     them.wait_for("!!document.querySelector('.blocklyDragging')")
-    press(them, Qt.Key_Return)  # under the hat, where the keys were
+    press(them, Qt.Key_Return)  # below the event block, which had the focus
     qtbot.waitUntil(lambda: "next" in them.tops()[0], timeout=WAIT_MS)
     them.wait_for("!document.querySelector('.blocklyDragging')")
     QTest.qWait(PACE_MS)
@@ -216,7 +216,7 @@ def test_f1_explains_the_focused_block_and_otherwise_reaches_the_window(qtbot, v
     goes_to(them, "wait")
     assert them.ask(CARD) == ""
     assert pressed == ["window"]
-    view.setParent(None)  # it is the test's, not the window's
+    view.setParent(None)  # the test owns the view, not the window
 
 
 def test_context_menu_help_explains_blocks_on_canvas_and_in_the_toolbox(view, them):

@@ -115,7 +115,7 @@ def test_repeated_delete_removes_only_the_selected_block(qtbot, them):
     them.wait_for("document.querySelector('.blocklySelected') === null")
     them.press(Qt.Key_Backspace)
     them.press(Qt.Key_Delete)
-    them.press(Qt.Key_Down)  # the keys still have a place: it leads to the block that is left
+    them.press(Qt.Key_Down)  # the focus isn't lost: the arrow key leads to the remaining block
     them.wait_for("document.activeElement.closest('[data-id]')?.dataset.id", "start")
     assert [top["id"] for top in them.tops()] == ["start"]
 

@@ -52,7 +52,7 @@ def test_running_blocks_are_outlined(view, person):
     shape = "document.querySelector('[data-id=say_touch] > {}').getAttribute('d')"
     assert them.ask(shape.format(".nepState .nepOutline")) == them.ask(shape.format(".blocklyPath"))
     animated = "getComputedStyle(document.querySelector('.nepGlow')).animationName"
-    them.wait_for("!!document.querySelector('.nepGlow')")  # a block that is over at once gets no glow
+    them.wait_for("!!document.querySelector('.nepGlow')")  # a block that ends immediately gets no glow
     assert them.ask(animated) == "nepBreathe"
     view.set_reduced_motion(True)
     them.wait_for(animated, "none")

@@ -91,7 +91,7 @@ def test_list_slots_are_added_and_removed_with_undo(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops()[0]["extraState"] == {"items": 2}, timeout=WAIT_MS)
     qtbot.wait(QApplication.doubleClickInterval())  # two clicks, not one double click
     them.click("[data-id=l] .nepButton", dx=8, dy=8)
-    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)  # “b” is beside it now, not lost
+    qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)  # “b” was moved out, not deleted
     view.undo()
     qtbot.waitUntil(lambda: [len(top.get("inputs", ())) for top in them.tops()] == [2], timeout=WAIT_MS)
 
@@ -130,10 +130,10 @@ def test_calls_follow_renamed_added_and_removed_function_inputs(qtbot, view, per
     qtbot.waitUntil(lambda: "input" in parts(them, "c"), timeout=WAIT_MS)
     view.undo()
     qtbot.waitUntil(lambda: "input" not in parts(them, "c"), timeout=WAIT_MS)
-    qtbot.waitUntil(lambda: them.box("[data-id=g] .nepButton") == at_first, timeout=WAIT_MS)  # drawn later
+    qtbot.waitUntil(lambda: them.box("[data-id=g] .nepButton") == at_first, timeout=WAIT_MS)  # re-rendered
     before = them.newest()
     them.click("[data-id=g] .nepButton", dx=8, dy=8)
-    qtbot.waitUntil(lambda: len(them.tops()) == 3, timeout=WAIT_MS)  # the text “Ada” lies beside
+    qtbot.waitUntil(lambda: len(them.tops()) == 3, timeout=WAIT_MS)  # the text “Ada” is next to its block
     assert all_blocks(them.newest())["c"]["extraState"]["inputs"] == []
     view.undo()
     qtbot.waitUntil(lambda: them.newest() == before, timeout=WAIT_MS)

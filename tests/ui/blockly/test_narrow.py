@@ -62,7 +62,7 @@ def test_tile_shows_its_name_on_hover_and_opens_its_blocks_on_click(view, person
         f"(r => [r.left, r.right, r.width])([...{BOX}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
         ".find(e => e.getBoundingClientRect().width > 0).getBoundingClientRect())"
     )
-    assert chip[0] >= 52  # beside the tile, which it does not cover
+    assert chip[0] >= 52  # next to the tile, without covering the tile
     assert chip[1] < 620
     QTest.mouseClick(them.target, Qt.LeftButton, pos=first_tile(them))
     flyout = "document.querySelector('.nepTab:not([hidden]) .blocklyFlyout')"

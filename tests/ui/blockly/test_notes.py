@@ -67,7 +67,7 @@ def test_new_note_is_focused_placed_next_to_its_block_and_saves_typed_text(view,
         assert beside or sheet["top"] >= bottom or sheet["bottom"] <= top
     assert room["left"] <= sheet["left"] < sheet["right"] <= room["right"]
     assert room["top"] <= sheet["top"] < sheet["bottom"] <= room["bottom"]
-    assert note_of(them)["text"] == WORDS  # nobody has left the field
+    assert note_of(them)["text"] == WORDS  # saved while the field has the focus
     shown = "getComputedStyle(document.querySelector('.nepNote textarea'))"
     assert them.ask(f"{shown}.color") != them.ask(f"{shown}.backgroundColor")
     assert "Inter" in them.ask(f"{shown}.fontFamily")
@@ -143,7 +143,7 @@ def test_note_stays_readable_when_zoomed_out(view, them):
         view.zoom_out()
     note = "document.querySelector('.nepNote textarea')"
     seen = "(e => parseFloat(getComputedStyle(e).fontSize) * e.getBoundingClientRect().width / e.offsetWidth)"
-    # The page is told of each step by itself, and its letters follow one picture later.
+    # The page receives each zoom step separately, and the font size follows one frame later.
     them.wait_for(f"{note}.getBoundingClientRect().width < 120 && {seen}({note}) > 8.5")
 
 

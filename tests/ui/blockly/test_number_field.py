@@ -85,7 +85,7 @@ def test_typed_and_pasted_numbers_in_a_block_are_parsed_or_rejected(them: Person
     them.wait_for(f"{SENTENCE}.includes('comma or point')")
     them.wait_for("document.activeElement.classList.contains('blocklyInvalidInput')")
     them.press(Qt.Key_Return)
-    them.wait_for(f"{SENTENCE}.includes('0.2')")  # the value that the field keeps
+    them.wait_for(f"{SENTENCE}.includes('0.2')")  # the value that the field restores
     assert seconds(them) == 0.2
 
     open_field(them)

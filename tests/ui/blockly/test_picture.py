@@ -40,7 +40,7 @@ def taken(qtbot, view: BlocklyView, kind: str, white: bool = True) -> bytes:
 
 
 def test_exported_image_shows_all_blocks_at_double_scale_on_white(qtbot, view, them):
-    them.wait_for("!!document.querySelector('.nepFar')")  # the one that is far away is not drawn
+    them.wait_for("!!document.querySelector('.nepFar')")  # the distant block isn't rendered
     image = QImage.fromData(taken(qtbot, view, "png"))
     assert image.height() > 2 * 3940
     assert image.pixelColor(2, 2).getRgb() == (255, 255, 255, 255)
@@ -79,7 +79,7 @@ def test_exported_image_omits_the_selection(qtbot, view, them):
     after = taken(qtbot, view, "svg")
     assert sorted(after.split(b"<")) == sorted(
         before.split(b"<")
-    )  # what is selected lies above what is below it
+    )  # the selected block is drawn above others: only the order differs
 
 
 def test_empty_canvas_exports_no_image(qtbot, view, them):

@@ -71,12 +71,12 @@ ENGLISH = {
     # in any order
     "left turn": "robot_pepper_do_turn",
     "then if": "control_if",
-    # a wrong letter, one too few, one too many, two that changed places
+    # a wrong, a missing and an extra letter, two swapped letters
     "repeet": "control_repeat",
     "brodcast": "events_broadcast",
     "waitt": "control_wait",
     "trun": "robot_pepper_do_turn",
-    # a word that nothing has beside one that something has
+    # one matching word, one word without matches
     "rotate zzyzx": "robot_pepper_do_turn",
 }
 SPANISH = {
@@ -121,7 +121,7 @@ SPANISH = {
     "random": "values_random",
 }
 
-# What people type who come from Scratch: these come first and second, in any order where both are meant.
+# Terms of Scratch users: these results come first and second, in any order if both are meant.
 LEADING = {
     "sum": ["values_arithmetic", "variables_change"],
     "add": ["values_arithmetic", "variables_change"],

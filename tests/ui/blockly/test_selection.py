@@ -124,7 +124,7 @@ def test_dragging_moves_all_selected_blocks_and_a_single_undo_reverts_the_move(q
     end = start + QPoint(110, 90)
     them.move(start, end)
     them.drop(end)
-    # The one in the hand reaches the grid only after the next picture, which is long in coming at times.
+    # The dragged block snaps to the grid after the next frame, which may be delayed.
     qtbot.waitUntil(lambda: way(them, "e", before[2]) != (0, 0), timeout=WAIT_MS)
     qtbot.waitUntil(lambda: way(them, "d", before[1]) == way(them, "e", before[2]), timeout=WAIT_MS)
     assert way(them, "d", before[1])[0] > 60

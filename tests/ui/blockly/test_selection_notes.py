@@ -136,7 +136,7 @@ def test_dragging_moves_blocks_and_notes_and_a_single_undo_reverts_the_move(qtbo
         now = them.newest()
         return way(notes(before)["one"], notes(now)["one"]), way(blocks(before)["d"], blocks(now)["d"])
 
-    # what is held goes to the grid with the next picture, and takes the others along
+    # the dragged note snaps to the grid in the next frame and moves the other selected elements
     qtbot.waitUntil(lambda: moved()[0] == moved()[1] and moved()[0][1] > 80, timeout=WAIT_MS)
     now = them.newest()
     assert notes(now)["two"] == notes(before)["two"]

@@ -109,7 +109,7 @@ def test_pending_edit_is_reported_with_its_tab_when_switching(qtbot, view, two) 
     told: list[tuple[str, WorkspaceJson]] = []
     view.changed.connect(lambda *each: told.append(each))
     two.drag(".nepTab:not([hidden]) .blocklyFlyout .control_wait", QPoint(700, 400))
-    qtbot.waitUntil(lambda: len(two.tops()) == 2, timeout=WAIT_MS)  # the page has seen the drop
+    qtbot.waitUntil(lambda: len(two.tops()) == 2, timeout=WAIT_MS)  # the page has handled the drop
     view.show_tab("b", {})
     qtbot.waitUntil(lambda: bool(told), timeout=WAIT_MS)
     assert {key for key, _ in told} == {"a"}
@@ -171,7 +171,7 @@ def test_keyboard_focus_follows_the_shown_tab(qtbot, view, two) -> None:
     with qtbot.waitSignal(view.block_selected, timeout=WAIT_MS, check_params_cb=lambda id: id == "start"):
         two.click(PATH, dy=30)
     two.press(Qt.Key_C, Qt.ControlModifier)
-    for _ in range(2):  # the page answers in order: the key has been dealt with
+    for _ in range(2):  # replies are in order: the key has been handled
         two.tops()
     turn_to(two, "b")
     two.wait_for(f"{SHOWN}.contains(document.activeElement)")

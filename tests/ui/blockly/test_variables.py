@@ -89,7 +89,7 @@ def test_variable_dropdown_offers_a_new_variable_and_opens_the_dialogs_of_the_wi
     qtbot.waitUntil(lambda: "counter" in str(them.newest()["variables"]), timeout=WAIT_MS)
     (made,) = [each["id"] for each in them.newest()["variables"] if each["name"] == "counter"]
     getter = them.tops()[0]["next"]["block"]["next"]["block"]["inputs"]["VALUE"]["block"]
-    assert getter["fields"]["VAR"] == {"id": made}  # the drop-down has it at once
+    assert getter["fields"]["VAR"] == {"id": made}  # the drop-down is updated immediately
     them.click("[data-id=get] .blocklyDropdownField")
     them.wait_for(f"{MENU}.length >= 5")
     choose(them, next(each for each in them.ask(MENU) if each.startswith("Rename")))
@@ -114,7 +114,7 @@ def test_rename_and_delete_of_a_variable_are_one_undo_step_each(qtbot, view, the
     view.edit_variable({"do": "delete", "id": "score"})
     qtbot.waitUntil(lambda: "score" not in str(them.newest()), timeout=WAIT_MS)
     (hat,) = them.tops()
-    assert hat["next"]["block"]["type"] == "messages_write"  # moved up to the place of the one that went
+    assert hat["next"]["block"]["type"] == "messages_write"  # moved up to the place of the deleted block
     view.undo()
     qtbot.waitUntil(
         lambda: them.newest()["blocks"] == before["blocks"] and len(them.newest()["variables"]) == 2,

@@ -102,7 +102,7 @@ def test_robot_that_may_still_move_has_no_green_status_dot_even_during_a_drag(vi
     them.wait_for(DOTS, {"Rovermay still move": "error"})
     them.drop(QPoint(700, 300))
     more = with_rover()
-    more["toolbox"]["contents"][-2]["connected"] = False  # it goes away, and may move all the same
+    more["toolbox"]["contents"][-2]["connected"] = False  # a disconnected robot may still move
     view.set_definitions(more)
     them.wait_for(DOTS, {"Rovermay still move": "error"})
     view.set_alarms({})
@@ -200,7 +200,7 @@ def test_page_texts_are_translated_by_the_window(qtbot, monkeypatch):
     them = Person(qtbot, view)
     them.wait_for("document.querySelector('.nepSearch input')?.placeholder === 'Buscar un bloque'")
     titles = them.ask("[...document.querySelectorAll('.nepZoom button')].map(e => e.title)")
-    assert "Zoom in" in titles  # nobody has translated it
+    assert "Zoom in" in titles  # has no translation
     assert them.ask("document.querySelector('.nepFind input').placeholder") == "Find in blocks"
 
 

@@ -75,7 +75,7 @@ class Doctor(doctor_module.Doctor):
         self._run_checks()
 
     def _find_at_once(self, _topic: str, tell: ProgressCallback) -> tuple[Finding, ...]:
-        if self.found is not None:  # else it breaks off
+        if self.found is not None:  # otherwise the check is cancelled
             tell(self.found, len(self.found), len(self.found))
         return self.found
 
@@ -119,7 +119,7 @@ class Session(session_module.Session):
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_present, self.clock)
         self.images = Images(self.watch, self.clock)
         self.master = MasterState("none", ADDRESS)
-        self.alarms.path = self.acting.path = None  # kept in memory alone
+        self.alarms.path = self.acting.path = None  # stored in memory only
         self.ticks = 0
         self.runner: Runner | None = None
         """The program that runs, or ran last."""
@@ -149,7 +149,7 @@ class Session(session_module.Session):
         self.runner = Runner(on_event)
         return self.runner
 
-    # -- what a test lets happen
+    # -- events that a test triggers
 
     def take_over(self) -> None:
         """Process the posted events without advancing the clock."""
@@ -165,7 +165,7 @@ class Session(session_module.Session):
                 topic.last_stamp_ns = now_ns - round(self.ticks * 0.033 % (1 / topic.rate_hz) * 1e9)
         if self.ticks % 3 == 0:
             self.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
-        pictures: Images = self.live.images  # also while a recording shows
+        pictures: Images = self.live.images  # also while a recording is open
         for stream in pictures.streams:
             if not stream.is_suspended:
                 pictures.look(stream.topic)

@@ -119,12 +119,12 @@ def test_messages_of_a_watched_topic_reach_every_sink(world: World) -> None:
     world.send(1)
     world.send({"two": 2})
     assert world.heard == [("/a", 1), ("/a", 1), ("/a", {"two": 2}), ("/a", {"two": 2})]
-    world.source.watch("/a")  # said twice it is one watch
+    world.source.watch("/a")  # watching twice is one watch
     world.source.unwatch("/a")
     assert world.listens(False)
     world.send("nobody listens")
     assert len(world.heard) == 4
-    world.source.unwatch("/a")  # nor does this
+    world.source.unwatch("/a")  # a second unwatch has no effect
 
 
 def test_missed_messages_are_counted_for_watched_topics_only(world: World) -> None:

@@ -80,7 +80,7 @@ def test_robots_appear_and_disappear_with_their_processes(launcher: Launcher, st
     assert (launcher.virtual_robots, launcher.process_ids) == ((), ())
     launcher.start_virtual_robot("Pepper")
     launcher.start_virtual_robot("Turtle", "diffdrive")
-    launcher.start_virtual_robot("Pepper")  # it is there
+    launcher.start_virtual_robot("Pepper")  # already running
     assert launcher.virtual_robots == ("Pepper", "Turtle")
     pepper, turtle = started_here.made
     assert launcher.process_ids == (pepper.pid, turtle.pid)
@@ -133,7 +133,7 @@ def test_restarted_process_is_a_new_process(launcher: Launcher, started_here, to
     for process in (before, now):
         process.terminate()
         process.wait(60)
-        process.kill()  # what has ended stays as it ended
+        process.kill()  # an ended process keeps its exit code
     assert [before.poll(), now.poll()] == ([-9, -15] if os.name == "posix" else [1, 1])
     assert told == []
 

@@ -220,7 +220,7 @@ def test_run_again_restarts_the_running_program(run: Run) -> None:
     pressed_long_ago(run)
     runs.run()
     assert (runs.active, shown(run)) == (False, RUNNING), "nothing flashes while the robots answer"
-    runs.run()  # while it stops: no third program
+    runs.run()  # still stopping: starts no third program
     tick_until(run.session, lambda: runs.active)
     assert runs._runner is not first
     assert first.state in {"stopping", "ended"}
@@ -381,7 +381,7 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
     until(lambda: bool(told) and told[-1].kind == "ended")
     assert (told[-1].is_ok, told[-1].text, runner.state) == (True, "", "ended")
     seen = len(told)
-    runner.stop()  # it has ended already
+    runner.stop()  # already ended
     assert len(told) == seen
     assert runner.program_key != run.make_runner(told.append).program_key
 

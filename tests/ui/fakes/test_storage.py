@@ -55,7 +55,7 @@ def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> No
     for file in files:
         file.write_text("x", "utf-8")
         settings.add_recent(file)
-    settings.add_recent(files[5], "Five")  # it is called as its file
+    settings.add_recent(files[5], "Five")  # the name of a saved file is its file name
     files[-1].unlink()
     assert [each.name for each in settings.recent_files][:2] == ["5", files[-2].stem]
     assert len(settings.all_recent_files) == MAX_RECENT_FILES
@@ -97,7 +97,7 @@ def test_edit_is_in_the_journal_until_the_behaviour_is_saved(kept: Kept, tmp_pat
     document = kept.document
     assert (kept.blocks, document.dirty, document.edits) == (None, False, 0)
     document.apply_edit(FIRST)
-    document.apply_edit(FIRST)  # the same once more is no edit
+    document.apply_edit(FIRST)  # an edit without changes isn't counted
     assert (kept.blocks, document.dirty, document.edits) == (FIRST, True, 1)
     document.apply_edit(SECOND)
     assert (kept.blocks, document.edits) == (SECOND, 2)
@@ -114,7 +114,7 @@ def test_each_behaviour_has_its_own_journal(kept: Kept) -> None:
     assert document.journal_name != before
     assert kept.blocks is None
     document.close()
-    document.close()  # there is nothing to give up
+    document.close()  # already closed
     assert document.journal_error is None
 
 
@@ -149,7 +149,7 @@ def test_fake_document_returns_the_given_compiler_results() -> None:
     assert program.starts == 1
 
 
-# -- the doctor -------------------------------------------------------------------------------------------
+# -- connection doctor ------------------------------------------------------------------------------------
 
 
 @pytest.fixture

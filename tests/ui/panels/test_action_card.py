@@ -73,9 +73,9 @@ def test_timeout_is_shown_as_a_sentence_below_the_card(card) -> None:
 def test_replaced_action_names_its_replacement_and_stopped_action_shows_no_text(card) -> None:
     card.show_invocation(tried("canceled", error="replaced by turn", elapsed_s=1.0))
     assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Replaced by turn.")
-    assert card.error.property("role") == "textSecondary"  # that is no error
+    assert card.error.property("role") == "textSecondary"  # a replaced action isn't an error
     card.show_invocation(tried("canceled", elapsed_s=1.0), may_move=True)
-    assert card.result.text == "ended after 1.0 s"  # its robot is not proven to stand still
+    assert card.result.text == "ended after 1.0 s"  # the robot's standstill isn't confirmed
     card.show_invocation(tried("canceled", error="stopped", elapsed_s=1.0))
     assert not card.error.isVisible()
 

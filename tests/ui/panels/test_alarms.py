@@ -104,7 +104,7 @@ def test_parts_of_an_alarm_sentence_are_edited_by_keyboard(panel) -> None:
     slot(panel, "limit").setFocus()
     QTest.keyClick(slot(panel, "limit"), Qt.Key.Key_Return)
     type_in(panel, "much")
-    assert panel.field is not None  # it is no number
+    assert panel.field is not None  # the text isn't a number
     assert panel.field.property("wrong") == "true"
     QTest.keyClick(panel.field, Qt.Key.Key_Escape)
     assert panel.field is None

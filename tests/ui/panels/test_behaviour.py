@@ -53,7 +53,7 @@ class Editor(QWidget):
 
     def flush(self, done: Callable[[dict[str, object]], None]) -> None:
         if self.late:
-            self.changed.emit("behaviour-1", self.late)  # the page tells an edit before it answers
+            self.changed.emit("behaviour-1", self.late)  # pending edits are reported before the reply
         done(self.late)
 
     def last(self, name: str) -> object:
@@ -212,7 +212,7 @@ def test_python_view_shows_and_copies_the_newest_program(panel, window) -> None:
     editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
     panel.title_widget().show()
     press(button(panel.title_widget(), "Python"))
-    assert window.session.document.workspace == editor(panel).late  # the last 150 ms are not missing
+    assert window.session.document.workspace == editor(panel).late  # includes an edit of the last 150 ms
     assert panel.program.toPlainText() == PROGRAM
     assert panel.program.isReadOnly()
     press(button(panel.title_widget(), "Copy the program"))
@@ -237,7 +237,7 @@ def test_undo_and_redo_are_enabled_when_available(panel, window) -> None:
 def test_function_keys_in_the_page_trigger_window_commands(panel, window) -> None:
     for key in ("F12", "F5"):
         editor(panel).key_pressed.emit(key)
-    assert window.commands == ["key:F12", "key:F5"]  # the window knows what a person made of them
+    assert window.commands == ["key:F12", "key:F5"]  # the window maps keys to commands
 
 
 def test_tab_shows_name_and_save_state_of_the_behaviour(panel, window) -> None:
@@ -298,7 +298,7 @@ def test_python_program_has_syntax_highlighting(qtbot, qapp) -> None:
     view.show_program(PROGRAM)
     block = view.document().findBlockByNumber(view.line_containing("# Say hello") - 1)
     colours = [one.format.foreground().color().name() for one in block.layout().formats()]
-    assert colours == [Theme("light").colour("textTertiary").name()]  # nothing inside a comment
+    assert colours == [Theme("light").colour("textTertiary").name()]  # no highlighting inside a comment
     block = view.document().findBlockByNumber(view.line_containing("for _ in range(3)") - 1)
     assert len(block.layout().formats()) == 3  # for, in, 3
 

@@ -189,7 +189,7 @@ def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
     assert asked == [("tab.duplicate", "b"), ("tab.close", "b")]
 
 
-# -- another name ---------------------------------------------------------------------------------
+# -- renaming -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("way", ["double click", "F2", "menu"])
@@ -248,7 +248,7 @@ def test_folder_suffix_of_a_tab_is_not_editable(tabs) -> None:
     assert tabs.field.text() == "Quiz"
 
 
-# -- blocks from the page -------------------------------------------------------------------------
+# -- blocks dragged from the page -----------------------------------------------------------------
 
 
 def test_drop_target_is_the_tab_or_plus_button_at_the_position_if_any(qtbot, tabs) -> None:

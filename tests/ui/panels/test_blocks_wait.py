@@ -24,5 +24,5 @@ def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_l
     assert wait.words.geometry() == place.rect()
     wait.set_ready(ready=True)
     assert wait.words.isHidden()
-    wait.set_ready(ready=False)  # its process died: the patience begins anew
+    wait.set_ready(ready=False)  # its process died: the delay starts again
     assert wait.words.isHidden()

@@ -50,7 +50,7 @@ def test_new_lines_are_inserted_without_a_model_reset(qtmodeltester, panel, wind
     assert lines(panel)[:2] == ["info studio two", "warn studio one"]
     assert (reset.count(), inserted.count()) == (0, 1)
     panel.refresh()
-    assert inserted.count() == 1  # nothing new, nothing done
+    assert inserted.count() == 1  # no update without new records
 
 
 def test_evicted_records_are_removed_from_the_console_list(qtbot, qapp) -> None:
@@ -73,7 +73,7 @@ def test_evicted_records_are_removed_from_the_console_list(qtbot, qapp) -> None:
     session.console.add_messages(
         [Message(LOG_TOPIC, b'{"text": "%d"}' % number, "json", LOG_TYPE) for number in range(9)]
     )
-    panel.refresh()  # everything that was shown has left the ring
+    panel.refresh()  # all displayed records were evicted
     assert [line.split()[-1] for line in lines(panel)] == ["8", "7", "6"]
 
 
@@ -143,7 +143,7 @@ def test_large_text_leaves_room_for_the_message(panel, window, percent: int, wid
     shown = delegate.columns(record, width)
     assert {"icon", "origin"} <= shown.keys()
     letter = paint.width_of(panel.text_font(), "n")
-    if len(shown) > 2:  # nothing more could go
+    if len(shown) > 2:  # no further column can be hidden
         assert width - sum(shown.values()) >= MIN_TEXT_CHARS * letter
     if percent == 100 or width == 1200:
         assert {"time", "level"} <= shown.keys()
@@ -209,7 +209,7 @@ def test_console_is_cleared_and_copied(panel, window) -> None:
     assert len(QGuiApplication.clipboard().text().splitlines()) == 6
     clear.trigger()
     assert lines(panel) == []
-    copy_all.trigger()  # nothing to copy is no error
+    copy_all.trigger()  # copying an empty list isn't an error
     assert window.toasts == ["Copied 6 lines"]
     logged(window)
     panel.refresh()
@@ -264,7 +264,7 @@ def test_twenty_thousand_lines_scroll_and_only_visible_rows_are_painted(qtbot, q
         assert all(abs(row - top) <= in_view + 2 for row in painted)
     assert lines(panel)[-1] == "info arm line 0"
     before = panel.list.indexAt(panel.list.viewport().rect().center()).data()
-    session.console.add("info", "arm", "the newest")  # the oldest leaves, what is read stays in place
+    session.console.add("info", "arm", "the newest")  # the oldest line is evicted, the view stays in place
     bar.setValue(bar.maximum() // 2)
     here = panel.list.indexAt(panel.list.viewport().rect().center()).data()
     panel.refresh()

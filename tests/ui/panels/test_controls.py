@@ -65,7 +65,7 @@ def wheel(widget: QWidget, notches: int = 1) -> None:
     QApplication.sendEvent(widget, event)
 
 
-# ---- what was typed is kept ------------------------------------------------------------------------
+# ---- entered text is kept --------------------------------------------------------------------------
 
 
 def test_out_of_range_number_is_returned_by_the_form_unclamped_and_reported(qtbot, theme) -> None:
@@ -74,13 +74,13 @@ def test_out_of_range_number_is_returned_by_the_form_unclamped_and_reported(qtbo
     slider.field.setFocus()
     slider.field.selectAll()
     QTest.keyClicks(slider.field, "12")
-    assert form.input() == {"d": 12.0}  # also before the field is left
+    assert form.input() == {"d": 12.0}  # also while the field has the focus
     assert form.action.check(form.input()) == ("do: distance must be between -1 and 1 m",)
     QTest.keyClick(slider.field, Qt.Key.Key_Return)
     assert slider.field.text() == "12"
     form.show_problems(form.action.problems(form.input()))
     shown = [text for text in (slider._sentence.text(), form._error_labels["d"].text()) if text]
-    assert shown == ["The maximum is 1 m."]  # said once
+    assert shown == ["The maximum is 1 m."]  # reported only once
     assert slider.field.property("wrong") == "true"
 
 
@@ -112,7 +112,7 @@ def test_arrow_keys_step_a_number_without_limits(qtbot, theme) -> None:
     assert form.input() == {"n": 13}
     for _ in range(3):
         QTest.keyClick(field, Qt.Key.Key_PageDown)
-    assert form.input() == {"n": 0}  # not below its least
+    assert form.input() == {"n": 0}  # not below the minimum
 
 
 def test_text_that_is_too_long_is_kept_and_reported_when_editing_ends(qtbot, theme) -> None:
@@ -166,7 +166,7 @@ def test_text_field_grows_to_at_most_five_lines(qtbot, theme) -> None:
     assert form.input() == {"t": "word " * 60}
 
 
-# ---- keys, wheel, double click ---------------------------------------------------------------------
+# ---- keys, wheel and double click ------------------------------------------------------------------
 
 
 def test_slider_supports_home_end_and_double_click(qtbot, theme) -> None:
@@ -200,7 +200,7 @@ def test_angle_is_changed_by_keys_dial_and_wheel_only_with_focus(qtbot, theme) -
     assert form.input() == {"a": 90.0}
     slider.track.setFocus()
     QTest.keyClick(slider.track, Qt.Key.Key_Home)
-    assert dial.value == -360.0  # and the drawing follows the slider
+    assert dial.value == -360.0  # the dial follows the slider
 
 
 def test_dragging_an_angle_dial_around_adds_full_turns_up_to_the_limit(qtbot, theme) -> None:
@@ -218,12 +218,12 @@ def test_dragging_an_angle_dial_around_adds_full_turns_up_to_the_limit(qtbot, th
         QApplication.processEvents()
     assert form.input() == {"a": 360.0}
     QTest.mouseRelease(dial, Qt.MouseButton.LeftButton, pos=at(420))
-    assert dial.direction(90).x() == pytest.approx(-1)  # left of the robot is left in the drawing
+    assert dial.direction(90).x() == pytest.approx(-1)  # left of the robot is left in the drawing, too
 
 
 def test_pitch_angle_is_drawn_from_the_side(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("pitch", "down", "angle", -40, 36, 2, "°", 8))
-    assert child(form, AngleDial).direction(30).y() > 0.4  # down on the screen
+    assert child(form, AngleDial).direction(30).y() > 0.4  # positive pitch points down
 
 
 # ---- colours ---------------------------------------------------------------------------------------
@@ -255,7 +255,7 @@ def test_custom_colour_is_selected_from_the_strip_or_by_hex_code(qtbot, theme) -
     assert red > 150 > max(green, blue)
     choice.field.selectAll()
     QTest.keyClicks(choice.field, "#00ff")
-    assert form.input() == {"c": "#00ff"}  # as it was typed
+    assert form.input() == {"c": "#00ff"}  # returned as typed
     assert form.action.check(form.input())
     QTest.keyClick(choice.field, Qt.Key.Key_Return)
     assert "#33aaff" in choice._wrong.text()
@@ -264,7 +264,7 @@ def test_custom_colour_is_selected_from_the_strip_or_by_hex_code(qtbot, theme) -
     assert not choice._wrong.isVisible()
 
 
-# ---- pictures --------------------------------------------------------------------------------------
+# ---- images ----------------------------------------------------------------------------------------
 
 
 class Cameras:
@@ -336,7 +336,7 @@ def test_decompression_bomb_is_rejected_as_file_and_as_url(qtbot, theme, tmp_pat
     assert choice.thumbnail.image is None
     choice.set_value("data:image/png;base64," + base64.b64encode(BOMBS[name]).decode())
     assert choice.thumbnail.image is None
-    choice.set_value("data:image/png;base64,é")  # no base64 at all
+    choice.set_value("data:image/png;base64,é")  # not base64 at all
     assert choice.thumbnail.image is None
 
 
@@ -402,14 +402,14 @@ def test_try_button_sends_the_newest_image_of_the_selected_topic(qtbot, theme) -
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=cameras)
     choice = child(form, PictureChoice)
     choice.use_topic("/Pepper/camera")
-    assert form.input() == {}  # none has come yet
+    assert form.input() == {}  # no image received yet
     cameras.send(320, 240)
     qtbot.waitUntil(lambda: choice.thumbnail.image is not None)
     cameras.send(160, 120)
     sent = decoded(form.input()["p"])
     assert (sent.width(), sent.height()) == (160, 120)
     cameras.made.suspend()
-    cameras.made.resume()  # its panel was hidden: what it has may be from long ago
+    cameras.made.resume()  # the panel was hidden: its image may be outdated
     assert form.input() == {}
     cameras.send(160, 120)
     assert decoded(form.input()["p"]).width() == 160

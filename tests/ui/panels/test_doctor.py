@@ -47,7 +47,7 @@ def test_doctor_runs_when_first_shown_and_lists_the_most_severe_finding_first(pa
     assert panel.rows[0].accessibleName().startswith("error: “python3 server.py” (process 77) uses port 7780")
     assert panel.chip.accessibleName() == "2"
     panel.refresh()
-    assert window.session.doctor.looked == 1  # nothing changed, nothing done
+    assert window.session.doctor.looked == 1  # no new check without a change
 
 
 def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
@@ -81,7 +81,7 @@ def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
     assert panel.looked.text() == "3 checks done"
     told.clear()
     doctor.found = (FINE, ALSO_FINE)
-    look()  # again: what was found stays until all was looked at
+    look()  # the previous findings stay until all checks are done
     panel.refresh()
     assert [shown for shown, _looked, _chip in told] == [["disk", "master", "loopback"]] * 2
     assert [looked for _shown, looked, _chip in told] == ["Checking: 1 of 4", "Checking: 2 of 4"]
@@ -254,7 +254,7 @@ def test_open_recording_that_hides_the_live_topic_is_reported(qtbot, panel, wind
     window.session.open_recording(tmp_path / "none.mcap")
     try:
         panel.refresh()
-        assert "recording" not in panel.rows[0].accessibleName()  # nobody misses a topic
+        assert "recording" not in panel.rows[0].accessibleName()  # no panel expects a topic yet
         window.session.doctor.expect_topic("/robot/camera")
         panel.refresh()
         said = panel.rows[0].accessibleName()
@@ -323,7 +323,7 @@ def test_doctor_is_opened_from_every_empty_panel_with_its_topic(qtbot, qapp) -> 
         made.show_topic("/nothing")
         ticks(window, made, 2)
         empty = made.body.empty if name == "inspector" else made.empty
-        press(empty.findChildren(Button)[-1])  # those before may not be gone yet
+        press(empty.findChildren(Button)[-1])  # earlier buttons may not be deleted yet
         wanted = "/nothing" if name in {"inspector", "image"} else ""
         assert window.asked_why.pop() == (made, wanted)
         made.dispose()

@@ -203,7 +203,7 @@ def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, 
     clock.now = HINT_DELAY_S - 1
     panel.refresh()
     assert window.commands == []
-    build(panel, block("control_wait"))  # somebody who builds is not idle
+    build(panel, block("control_wait"))  # building resets the idle time
     clock.now += 2
     panel.refresh()
     assert window.commands == []

@@ -68,7 +68,7 @@ def test_numbers_without_limits_and_images_have_text_fields(qtbot, theme) -> Non
         ),
     )
     qtbot.addWidget(form)
-    assert form.input() == {"n": 2}  # what is left empty is left out
+    assert form.input() == {"n": 2}  # empty fields are omitted
     form.set_input({"n": 7, "x": 1.5, "i": "file:///p.png"})
     assert form.input() == {"n": 7, "x": 1.5, "i": "file:///p.png"}
 
@@ -84,7 +84,7 @@ def test_invalid_number_is_kept_as_typed_and_reported_by_validation(qtbot, theme
     assert field.property("wrong") == "true"
     assert field.text() == "two"
     QTest.keyClicks(field, "x")
-    assert field.property("wrong") == "false"  # typing takes the sentence away
+    assert field.property("wrong") == "false"  # typing removes the error message
 
 
 def test_choices_offered_by_the_robot_at_runtime_fill_the_list(qtbot, theme) -> None:
@@ -129,7 +129,7 @@ def test_advanced_parameters_are_shown_by_the_more_button(qtbot, theme) -> None:
     widget = form.controls["b"].widget
     assert form.controls["a"].widget.isVisible()
     assert not widget.isVisible()
-    assert form.input()["b"] == "x"  # folded, not forgotten
+    assert form.input()["b"] == "x"  # collapsed fields keep their values
     QTest.mouseClick(form.more, Qt.MouseButton.LeftButton)
     assert widget.isVisible()
     assert not ActionForm(theme, action(Parameter("a", "a", "text"))).more.isVisibleTo(form)
@@ -159,7 +159,7 @@ def test_ampersand_in_a_parameter_name_is_shown_literally(qtbot, theme) -> None:
     form = ActionForm(theme, action(Parameter("p", "R&D", "text", default="hi")))
     qtbot.addWidget(form)
     (name,) = (each for each in form.findChildren(QLabel) if each.buddy() is not None)
-    assert name.text() == "R&&D"  # beside its control an & would underline the D
+    assert name.text() == "R&&D"  # in a label with a buddy, a single & would underline the D
 
 
 def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) -> None:

@@ -173,7 +173,7 @@ def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtb
 
     qtbot.wait(1)
     painted = panel.canvas.painted
-    show(window, graph())  # the same once more
+    show(window, graph())  # an unchanged graph
     assert renewed() == 0
     panel.refresh()
     qtbot.wait(1)
@@ -268,7 +268,7 @@ def test_service_card_shows_its_details(panel: GraphPanel) -> None:
     assert content is not None
     assert [(figure.title, figure.value) for figure in content.stats] == [("Calls", "7"), ("Errors", "1")]
     assert not panel.card.steps.isVisible()
-    panel.canvas.opened.emit("remember")  # Enter: there is nothing to inspect
+    panel.canvas.opened.emit("remember")  # Enter: a service can't be inspected
 
 
 def menu_at(panel: GraphPanel, place: QPoint, *, by_keys: bool = False) -> QMenu:

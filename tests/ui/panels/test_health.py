@@ -104,7 +104,7 @@ def test_health_rows_are_rebuilt_when_the_text_size_changes(panel) -> None:
     assert len(panel.rows) == len(said(panel))
 
 
-# -- where it stands --------------------------------------------------------------------------------------
+# -- panel position ---------------------------------------------------------------------------------------
 
 
 def test_health_panel_opens_with_robots_below_the_sensors(

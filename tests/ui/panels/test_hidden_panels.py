@@ -149,7 +149,7 @@ def test_panel_behind_another_tab_watches_no_topics(qtbot, case: Case) -> None:
     image.panel.show_topic(OTHER)
     settle(qtbot, case, image)
     assert case.source.wanted >= {OTHER}
-    camera = case.dock("camera")  # shares the place of the pictures
+    camera = case.dock("camera")  # a tab in the same dock area as the image panel
     qtbot.waitUntil(lambda: camera.is_displayed() and not image.is_displayed())
     case.hide_for_long()
     assert OTHER not in case.source.wanted
@@ -334,11 +334,11 @@ def test_ticks_without_changes_repaint_only_the_status_bar(qtbot, case: Case, la
     bench = case.window.show_layout(layout)
     for name in ("health", "robots", "alerts", "console"):
         bench.open(name)
-    bench.focus_panel(bench.docks["health"])  # nothing there blinks, as a field does
+    bench.focus_panel(bench.docks["health"])  # no blinking cursor as in a text field
     case.tick()
     case.arrive("/Pepper/battery", b'{"value": 84}')
     settle(qtbot, case, bench.docks["health"])
-    for _ in range(40):  # figures that are told only now and then have been told
+    for _ in range(40):  # until rarely updated figures are up to date
         case.tick()
         QApplication.processEvents()
     paints = Paints()
@@ -349,13 +349,13 @@ def test_ticks_without_changes_repaint_only_the_status_bar(qtbot, case: Case, la
         case.tick()
         QApplication.processEvents()
     application.removeEventFilter(paints)
-    told = {"MainWindow", "QWidget", "StatusBar", "StatusItem"}  # how long a tick takes is a new figure
+    told = {"MainWindow", "QWidget", "StatusBar", "StatusItem"}  # the duration of a tick changes
     assert set(paints.of) <= told
 
 
 def test_unchanged_camera_image_is_not_repainted(qtbot, case: Case, monkeypatch) -> None:
     for module in ("app.ui.pictures.view", "app.ui.panels.camera"):
-        monkeypatch.setattr(f"{module}.STALE_AFTER_S", 1e9)  # however busy the computer is
+        monkeypatch.setattr(f"{module}.STALE_AFTER_S", 1e9)  # independent of the load of the computer
     bench = case.window.show_layout("behaviour")
     camera = bench.docks["camera"]
     settle(qtbot, case, camera)

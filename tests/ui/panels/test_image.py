@@ -78,9 +78,9 @@ def test_image_keeps_its_aspect_ratio_on_black(view) -> None:
 def test_caption_shows_frame_rate_and_image_size(view) -> None:
     view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
     assert view.label_text.startswith("60 fps (30 shown)  320\u00d7240  ")
-    assert view.label_text.endswith(" ms")  # its age
+    assert view.label_text.endswith(" ms")  # latency
     assert rate_text(None, None) == ""
-    assert rate_text(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive
+    assert rate_text(17.2, 15.0) == "15 fps (15 shown)"  # capped: both rates have their own period
 
 
 def test_fluctuating_frame_rate_is_updated_once_per_second() -> None:
@@ -194,7 +194,7 @@ def test_last_image_of_a_lost_camera_is_grey_with_a_message_in_the_middle(camera
     found = [image.pixelColor(x, y) for x in range(0, 400, 3) for y in range(0, 160, 3)]
     assert all(max(one.red(), one.green(), one.blue()) - min(one.red(), one.green(), one.blue()) < 3
         for one in found)  # fmt: skip
-    assert any(one.lightness() > 240 for one in found)  # the words
+    assert any(one.lightness() > 240 for one in found)  # the label's text
     assert all(image.pixelColor(x, 150).lightness() < 200 for x in range(8, 200, 4))  # no label below
     camera_view.show_image(stream_of(shown))  # type: ignore[arg-type]
     assert any(one.saturation() > 100 for one in (camera_view.grab().toImage().pixelColor(x, 100)
@@ -207,8 +207,8 @@ def test_detection_boxes_are_drawn_at_their_position_with_labels(view) -> None:
     assert boxes[0].rect == QRectF(0.5, 0.25, 0.25, 0.25)
     view.show_image(stream_of(picture()), boxes)  # type: ignore[arg-type]
     image = view.grab().toImage()
-    assert image.pixelColor(250, 125).name() == "#ffc53d"  # its upper edge
-    assert image.pixelColor(203, 110).name() == "#ffc53d"  # the tag above
+    assert image.pixelColor(250, 125).name() == "#ffc53d"  # top edge of the box
+    assert image.pixelColor(203, 110).name() == "#ffc53d"  # label above the box
 
 
 @pytest.mark.parametrize(
@@ -287,7 +287,7 @@ def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None
     window.session.fleet.revision += 1
     window.session.clock.now += 4.0
     panel.refresh()
-    assert panel.view.label_text == "Last image 4 s ago"  # the last picture stays, grey
+    assert panel.view.label_text == "Last image 4 s ago"  # the last image stays, in grey
     assert panel.rate.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.dispose()
@@ -295,7 +295,7 @@ def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None
     assert window.session.looked_at == []
 
 
-# -- zoom, move, turn, keep ---------------------------------------------------------------------------
+# -- zoom, pan, rotate, save --------------------------------------------------------------------------
 
 
 def wheel(view: ZoomablePicture, at: QPoint, notches: int) -> None:
@@ -334,7 +334,7 @@ def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
     view.update()
     image = view.grab().toImage()
     colours = {image.pixelColor(x, y).name() for x in range(190, 210) for y in range(190, 210)}
-    assert len(colours) > 2  # smooth: there are greys
+    assert len(colours) > 2  # interpolated: there are grey pixels
 
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])
@@ -420,7 +420,7 @@ def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> N
     panel = made(qtbot, window)
     view, place = panel.view, panel.view.place
     QTest.keyClicks(view, "++")
-    assert view.scale() == pytest.approx(1.25**3, rel=0.01)  # it fitted at 125 %
+    assert view.scale() == pytest.approx(1.25**3, rel=0.01)  # fitted at 125 %
     QTest.keyClick(view, Qt.Key.Key_Minus, Qt.KeyboardModifier.ControlModifier)
     QTest.keyClicks(view, "1")
     assert view.scale() == pytest.approx(1.0)
@@ -538,7 +538,7 @@ def test_snapshot_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qap
     job.save(message)
     assert job.is_busy
     qtbot.waitUntil(lambda: bool(told))
-    job._start(lambda: Path(str(1 / 0)))  # whatever goes wrong is told, and the next one can begin
+    job._start(lambda: Path(str(1 / 0)))  # any exception is reported and the next job can start
     qtbot.waitUntil(lambda: len(told) == 2)
     assert set(told) == {threading.get_ident()}
     assert not job.is_busy

@@ -71,7 +71,7 @@ def test_depth_image_has_a_colour_bar_with_selectable_colours_and_range(panel, w
     panel.look_bar.colours.set_value("turbo")
     panel.look_bar.colours.activated.emit(panel.look_bar.colours.currentIndex())
     ticks(window, panel)
-    assert not np.array_equal(shown(panel), usual)  # the very same picture, in other colours
+    assert not np.array_equal(shown(panel), usual)  # the same image with another colour map
     press(panel.look_bar.own_range)
     assert panel.look_bar.low.isVisible()
     assert (panel.look_bar.low.text(), panel.look_bar.high.text()) == ("500", "4500")
@@ -89,12 +89,12 @@ def test_brightness_and_contrast_apply_to_a_frozen_image(panel, window) -> None:
     panel.show_topic(CAMERA)
     sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
     assert panel.view.picture.scale is None
-    assert not panel.look_bar.colours.isEnabled()  # colours are no numbers
+    assert not panel.look_bar.colours.isEnabled()  # colour maps need a single-channel image
     panel.freeze.setChecked(True)
     panel.look_bar.brightness.setValue(panel.look_bar.brightness.maximum())
     ticks(window, panel)
     assert shown(panel)[..., :3].min() == 255
-    panel.look_bar.brightness.reset.emit()  # a double click
+    panel.look_bar.brightness.reset.emit()  # like a double click
     panel.look_bar.contrast.setValue(0)
     ticks(window, panel)
     assert shown(panel)[0, 0, :3].tolist() == [125, 125, 125]

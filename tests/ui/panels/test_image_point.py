@@ -122,10 +122,10 @@ def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot,
 def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, window, panel) -> None:
     view = panel.view
     for key in (Qt.Key.Key_Left, Qt.Key.Key_Return):
-        QTest.keyClick(view, key)  # not armed: nothing is pointed at
+        QTest.keyClick(view, key)  # not armed: no point is selected
     assert view.pointed is None
     heard = arm(window, panel)
-    QTest.keyClick(view, Qt.Key.Key_Return)  # nothing is pointed at yet
+    QTest.keyClick(view, Qt.Key.Key_Return)  # no point is selected yet
     QTest.keyClick(view, Qt.Key.Key_Left)
     assert view.pointed == (160, 120)
     plain = view.grab().toImage()
@@ -150,7 +150,7 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
     ticks(window, panel)
     told = heard.listen(timeout_s=20.0)[1]
     assert (told["x"], told["y"], told["button"]) == (x, y, "left")
-    panel.actions_of["right"].trigger()  # turned to the right, what is seen above is the picture's left edge
+    panel.actions_of["right"].trigger()  # rotated right: the top of the view is the image's left edge
     for _step in range(60):
         QTest.keyClick(view, Qt.Key.Key_Up, SHIFT)
     assert view.pointed[0] == 0

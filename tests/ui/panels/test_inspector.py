@@ -125,7 +125,7 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     panel.refresh()
     panel.freeze.setChecked(True)
     said = panel._message_info(panel._shown_message)
-    panel._shown_message.stamp_ns -= 600 * 10**9  # as ten minutes later
+    panel._shown_message.stamp_ns -= 600 * 10**9  # as if ten minutes old
     panel._set_mode("raw")
     assert panel.foot.facts.text() == said
     assert panel._message_info(panel._shown_message) == said
@@ -152,7 +152,7 @@ def test_changing_metadata_does_not_relayout_the_window(qapp, panel, window) -> 
         window.session.send("/blackboard", blackboard(number))
         ticks(window, panel)
         qapp.processEvents()
-        if number == 2:  # its first messages fill the panel, which is laid out for them
+        if number == 2:  # the first messages fill the panel and change its layout
             layouts.count = 0
             told.clear()
         told.add(panel.foot.facts.text())
@@ -167,12 +167,12 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
     panel.show_topic("/odom")
     ticks(window, panel)
     said = []
-    for number in range(61):  # two seconds and a little, thirty messages a second
+    for number in range(61):  # slightly more than two seconds at 30 Hz
         now[0] = 1.0 + number / 30
         window.session.send("/odom", {"n": number})
         ticks(window, panel)
         said.append((panel.model.value()["n"], panel.foot.facts.text()))
-    assert [number for number, _facts in said[:3]] == [0, 1, 2]  # the first ones at once
+    assert [number for number, _facts in said[:3]] == [0, 1, 2]  # the first ones immediately
     assert 20 <= len(set(said)) <= 24
     now[0] += 0.1
     ticks(window, panel)
@@ -184,7 +184,7 @@ def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel,
     panel.clock = lambda: 5.0
     for topic, number, size in (("/blackboard", 1, "8 B"), ("/odom", 22, "9 B")):
         panel.show_topic(topic)
-        for value in range(9):  # the last of them come too soon to be shown
+        for value in range(9):  # the last ones exceed the update rate
             window.session.send(topic, {"n": value})
             ticks(window, panel)
         window.session.send(topic, {"n": number})
@@ -295,7 +295,7 @@ def test_large_json_message_is_decoded_in_another_thread_and_shown_when_ready(qt
     rows_index = panel.model.index(0, 0)
     panel.tree.expand(rows_index)
     panel.model.fetchMore(rows_index)
-    assert panel.model.rowCount(rows_index) < 5000  # what can be seen, by pages
+    assert panel.model.rowCount(rows_index) < 5000  # rows are fetched in pages
     choose(panel, "rows", 39_999, "name")
     assert panel.foot.path.text() == "rows[39999].name"
     QTest.keyClicks(panel.finder.field, "n3999")
@@ -350,7 +350,7 @@ def test_large_messages_that_are_not_json_are_decoded_only_on_request(qtbot, pan
     assert panel.body.page == LARGE
     assert panel.body.large._title.text() == "Large message (1.2 MB)"
     press(button(panel.body.large, "Decode the newest message"))
-    assert panel.is_frozen  # the next large one would hide it again
+    assert panel.is_frozen  # otherwise the next large message would hide this one
     topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
     qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])
     assert panel.model.value() == {"value": "x" * 1_200_000}
@@ -382,7 +382,7 @@ def test_images_are_not_decoded_to_be_summarised(panel, window) -> None:
     assert panel.model.value()["width"] == 640
     topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=2)
     panel.refresh()
-    assert panel.body.page == RAW  # nothing tells its shape, and its bytes are none
+    assert panel.body.page == RAW  # without a shape, bytes that are no image are shown raw
 
 
 def test_string_is_shown_as_one_value(panel, window) -> None:

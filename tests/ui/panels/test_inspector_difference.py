@@ -95,7 +95,7 @@ def test_tree_marks_differences_from_another_message(qtmodeltester) -> None:
 def test_changes_only_hides_equal_items_and_switching_back_shows_all(qtmodeltester) -> None:
     model = TreeModel()
     model.set_value(AFTER, 0.0)
-    shown(model)  # everything is opened
+    shown(model)  # fetches all items
     model.set_value(AFTER, 1.0, BEFORE, changes_only=True)
     assert shown(model) == [
         ("pose", "changed"), ("pose.y", "changed"), ("words", "changed"), ("words[1]", "removed"),

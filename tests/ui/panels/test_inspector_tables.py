@@ -72,8 +72,8 @@ def test_input_starting_with_dollar_is_a_query_and_the_tree_shows_its_results(pa
     soon(lambda: rows(panel) == ["people[1].name"])
     assert panel.query.words.text() == "1 found."
     assert panel.query.isVisible()
-    assert not panel.strip.isVisible()  # parts are not compared
-    send(window, panel, seen(30, 41))  # asked again of every message
+    assert not panel.strip.isVisible()  # query results aren't compared
+    send(window, panel, seen(30, 41))  # the query is repeated for every message
     soon(lambda: rows(panel) == ["people[0].name", "people[1].name"])
     panel.tree.setCurrentIndex(panel.model.index(1, 0))
     panel.own.copy_path()
@@ -150,15 +150,15 @@ def test_list_of_objects_is_a_table_whose_order_is_stable_while_values_change(pa
     assert panel.body.page == TABLE
     assert table(panel) == [["0", "Ann", "7"], ["1", "Bea", "41"], ["2", "Cy", "30"]]
     assert panel.body.objects.words.text() == "people   3 rows"
-    head(panel, 2)  # the largest first
+    head(panel, 2)  # descending by age
     assert [row[1] for row in table(panel)] == ["Bea", "Cy", "Ann"]
     made = panel.body.objects.table
-    send(window, panel, seen(99, 41, 30))  # within a second: values change, nothing jumps
+    send(window, panel, seen(99, 41, 30))  # within one second, values change but the order stays
     assert table(panel) == [["1", "Bea", "41"], ["2", "Cy", "30"], ["0", "Ann", "99"]]
     panel.clock = lambda: now + 2
     send(window, panel, seen(99, 41, 30, 50))
     assert [row[1] for row in table(panel)] == ["Ann", "Di", "Bea", "Cy"]
-    assert panel.body.objects.table is made  # twenty times a second nothing is built anew
+    assert panel.body.objects.table is made  # the table is reused, not rebuilt for every message
     press(panel.body.objects.copy)
     lines = list(csv.reader(QGuiApplication.clipboard().text().splitlines()))
     assert lines[:2] == [["#", "name", "age"], ["0", "Ann", "99"]]
@@ -216,7 +216,7 @@ def test_history_steps_back_through_messages_and_compares_with_any_message(panel
     assert shown_stamp(panel) == 3
     assert panel.live.text == "earlier"
     assert panel.history.words.text().startswith("4 of 5")
-    send(window, panel, seen(9, stamp=9))  # what comes is kept, and what is looked at stays
+    send(window, panel, seen(9, stamp=9))  # new messages are stored, the displayed one stays
     assert shown_stamp(panel) == 3
     panel.history.track.setValue(0)
     assert shown_stamp(panel) == 0

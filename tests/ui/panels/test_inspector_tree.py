@@ -28,10 +28,10 @@ def at(model: TreeModel, *path: str | int) -> QModelIndex:
 def test_model_obeys_qt_rules_while_messages_change_shape(qtmodeltester, model) -> None:
     at(model, "robots", "Pepper", "pose", "x")
     at(model, "list", 2)
-    qtmodeltester.check(model)  # it goes on listening: a broken rule is a Qt warning, which fails the test
+    qtmodeltester.check(model)  # keeps checking: a violation is a Qt warning, which fails the test
     for value in (
         {"stamp": 2, "robots": {"Pepper": {"pose": {"x": 1, "z": 3, "y": 2}}}, "list": [1, 2, 3, 4]},
-        {"list": [], "stamp": 3, "robots": {"Pepper": 5}},  # other order, a container became a value
+        {"list": [], "stamp": 3, "robots": {"Pepper": 5}},  # other key order; a container became a value
         {"list": [[1], [2]], "new": {}, "robots": {"Pepper": {"pose": {"x": 1}}}},
         [1, 2, 3],
         "only a word",
@@ -64,7 +64,7 @@ def test_expansion_and_selection_are_kept_across_messages(qtbot, model) -> None:
     for path in (("robots",), ("robots", "Pepper"), ("robots", "Pepper", "pose")):
         view.expand(at(model, *path))
     view.setCurrentIndex(y)
-    # A key comes before it, the order of others changes, values change.
+    # A key is inserted before the current one, the order of others changes, values change.
     model.set_value(
         {"robots": {"Pepper": {"on": False, "pose": {"w": 0, "x": 3, "y": 4}}}, "stamp": 2.5}, 1.0
     )
@@ -87,14 +87,14 @@ def test_scroll_position_is_kept_across_messages(qtbot) -> None:
 
 def test_only_changed_values_are_marked(model) -> None:
     for path in (("stamp",), ("robots", "Pepper", "pose", "x"), ("list", 0)):
-        assert model.node(at(model, *path)).changed_s is None  # the first message marks nothing
+        assert model.node(at(model, *path)).changed_s is None  # the first message marks no changes
     told = QSignalSpy(model.dataChanged)
     model.set_value({**FIRST, "stamp": 1.6, "list": [True, "two", None]}, 7.0)
     assert model.node(at(model, "stamp")).changed_s == 7.0
     assert model.node(at(model, "list", 0)).changed_s == 7.0  # 1 and true differ in JSON
     assert model.node(at(model, "list", 1)).changed_s is None
     assert model.node(at(model, "robots", "Pepper", "pose", "x")).changed_s is None
-    assert told.count() == 2  # one for each container with changes
+    assert told.count() == 2  # one signal per container with changes
 
 
 def test_nan_followed_by_nan_is_not_a_change() -> None:

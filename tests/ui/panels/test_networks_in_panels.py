@@ -211,7 +211,7 @@ def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look
     ros.tell(MasterLost("", REASON))
     ticks(window, panel, 2)
     assert panel.live.accessibleName() == "not responding"
-    for _ in range(80):  # who is connected goes on, without a master
+    for _ in range(80):  # connected nodes continue without a master
         for sink in ros.sinks:
             sink("ros /blackboard", [message("/blackboard", b'{"x": 8}')])
         ticks(window, panel)
@@ -264,6 +264,6 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look,
         data = ("ROS 1", "/camera", "/blackboard", "/arm", "arm", "studio", "std_msgs/String", "String")
         assert [text for text in said if untranslated(text, *data)] == []
         assert [untranslated(made.networks.words.text(), "ROS 1")] == [[]]  # type: ignore[attr-defined]
-    faults = [fault for fault in clipped(made) if f"at {9 - OUT_OF_SIGHT}," not in fault]  # no title's place
+    faults = [fault for fault in clipped(made) if f"at {9 - OUT_OF_SIGHT}," not in fault]  # not the title
     assert faults == []
     made.dispose()

@@ -92,6 +92,6 @@ def test_newly_opened_panel_shows_the_robot_immediately(qtbot, panel) -> None:
     qtbot.addWidget(made)
     for widget in made.header_widgets():
         widget.setParent(made)
-    made.show()  # the next tick is not waited for
+    made.show()  # without waiting for the next tick
     assert not made.empty.isVisible(), "for a moment it would say that no robot is connected"
     made.dispose()

@@ -107,7 +107,7 @@ def test_arrow_keys_expand_and_collapse(panel, window) -> None:
     QTest.keyClick(panel.table, Qt.Key.Key_Right)
     assert len(shown(panel)) == 5
     QTest.keyClick(panel.table, Qt.Key.Key_Down)
-    QTest.keyClick(panel.table, Qt.Key.Key_Right)  # a topic has nothing to open
+    QTest.keyClick(panel.table, Qt.Key.Key_Right)  # a topic has no children
     assert panel.table.currentIndex().row() == 1
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert window.opened == ["/odom"]

@@ -29,7 +29,7 @@ BASES = {
     "table_panel",
     "no_robot",
     "row_actions",
-}  # no panels themselves
+}  # modules without a panel
 NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
 
 
@@ -103,7 +103,7 @@ def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
 
 @pytest.mark.parametrize(
     "name", sorted(set(NAMES) - {"behaviour"})
-)  # its page of the web says it: test_guidance
+)  # covered by test_guidance for the web page
 def test_empty_panel_suggests_next_steps(qtbot, qapp, name) -> None:
     from PySide6.QtWidgets import QLabel
 

@@ -48,20 +48,20 @@ def test_behaviour_is_checked_only_after_an_edit(panel, window) -> None:
     panel.refresh()
     document.edits += 1
     panel.refresh()
-    assert panel.rows == rows  # the same problems: the same rows
+    assert panel.rows == rows  # unchanged problems keep their rows
     document.found = (Problem("error", None, None, "x", "x is not known."), *document.found)
     panel.refresh()
-    assert len(panel.rows) == 2  # nothing was edited
+    assert len(panel.rows) == 2  # not checked again without an edit
     document.edits += 1
     panel.refresh()
     assert len(panel.rows) == 3
     assert panel.chip.status == "error"
     assert panel.rows[0].buttons == []
-    assert panel.rows[1:] == rows  # those that were there stay
+    assert panel.rows[1:] == rows  # existing rows are reused
     document.found = document.found[1:2]
     document.edits += 1
     panel.refresh()
-    assert panel.rows == rows[:1]  # what is cured goes
+    assert panel.rows == rows[:1]  # fixed problems are removed
 
 
 def test_panel_without_problems_shows_an_empty_state(qtbot, qapp) -> None:

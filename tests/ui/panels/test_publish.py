@@ -157,7 +157,7 @@ def test_robot_command_topic_requires_another_confirmation(window, panel) -> Non
     ticks(window, panel)
     press(panel.strip.let)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
-    press(panel.form.send)  # in this turn the person knows
+    press(panel.form.send)  # still armed: no second question
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
     acting.disarm()
     press(panel.form.send)

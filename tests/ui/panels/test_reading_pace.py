@@ -16,7 +16,7 @@ def test_first_updates_pass_in_a_burst_and_later_updates_are_throttled() -> None
     assert MAX_UPDATE_HZ * 10 - 2 <= let_through(pace, 100.0, 10.0) <= MAX_UPDATE_HZ * 10 + 2
     assert [pace.try_acquire(200.0) for _turn in range(MAX_BURST + 1)] == [True] * MAX_BURST + [
         False
-    ]  # after a pause
+    ]  # the full burst after a pause
 
 
 def test_throttle_can_be_reset_and_external_updates_count() -> None:

@@ -227,7 +227,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     whole, shown = picture(1).size_bytes, size_text(sum(sizes))
     assert (
         details.about.text() == f"{group_digits(1000)} messages, about {shown}"
-    )  # a picture can be no table
+    )  # images can't be exported as a table
     details.format.set_value("mcap")
     details.format.changed.emit("mcap")
     assert details.about.text() == f"{group_digits(1001)} messages, about {size_text(sum(sizes) + whole)}"
@@ -268,7 +268,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     assert window.toasts == ["No matching topics in this recording"]
     details.topics.show_patterns((), ())
     details.topics.changed.emit()
-    details.pick.setChecked(True)  # the same from a list
+    details.pick.setChecked(True)  # the same with the list of topics
     assert [details.list.model.key_of(topic) for topic in details.list._matching_topics()] == [
         "/a",
         "/b",
@@ -290,14 +290,14 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     details.list.all.click()
     assert details.part().topics is None
     details.topics.show_patterns(("/a",), ())
-    details.topics.changed.emit()  # what is typed is checked in the list
+    details.topics.changed.emit()  # typed patterns are checked in the list
     assert details.list._names == {"/a"}
     details.times.set_value("clock")
     details.times.changed.emit("clock")
     begin, end = (clock_text(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
     assert details.part_words.text() == f"{begin} to {end}, 1 of 3 topics"
     assert strip.begin.accessibleDescription() == begin
-    QTest.keyClick(strip.end, Qt.Key.Key_Home)  # a handle stops at the other one
+    QTest.keyClick(strip.end, Qt.Key.Key_Home)  # handles can't cross
     assert strip.begin_ns == strip.end_ns
     QTest.mouseDClick(strip.begin, Qt.MouseButton.LeftButton)
     assert strip.is_all_selected
@@ -325,7 +325,7 @@ def test_empty_folder_and_missing_folder_suggest_next_steps(qtbot, panel, window
     qtbot.waitUntil(lambda: says("doesn't exist"))
     (tmp_path / "stick").mkdir()
     qtbot.waitUntil(lambda: says("No recordings yet"))
-    panel.empty.findChildren(Button)[-1].click()  # nothing to record: the connection doctor knows why
+    panel.empty.findChildren(Button)[-1].click()  # nothing to record: opens the connection doctor
     assert window.asked_why == [(panel, "")]
 
 

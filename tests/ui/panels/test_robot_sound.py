@@ -44,7 +44,7 @@ def test_mute_button_shows_the_reason_for_a_missing_voice(panel, window) -> None
     panel.refresh()
     assert "This computer has no voice for English." in panel.sound.toolTip()
     assert panel.sound.accessibleDescription() == "This computer has no voice for English."
-    press(panel.sound)  # who has muted them knows why they are silent
+    press(panel.sound)  # while muted, the missing voice doesn't matter
     assert "no voice" not in panel.sound.toolTip()
 
 

@@ -54,7 +54,7 @@ def test_unchanged_state_is_not_repainted(panel, window, monkeypatch) -> None:
     asked: list[int] = []
     monkeypatch.setattr(panel.view, "update", lambda: asked.append(1))
     link = window.session.fleet.links[0]
-    link.drawing = dict(link.drawing)  # another message that says the same
+    link.drawing = dict(link.drawing)  # another message with equal content
     panel.refresh()
     assert asked == []
     link.drawing = drawing(x=1.0)
@@ -82,7 +82,7 @@ def test_robot_without_recent_state_is_grey_and_has_no_speech_bubble(panel, wind
     grey = panel.view.grab().toImage()
     link.drawing = drawing()
     panel.view.show_state(link.drawing)
-    assert panel.view.grab().toImage() == grey  # there is no bubble
+    assert panel.view.grab().toImage() == grey  # no speech bubble
     monkeypatch.undo()
     link.is_connected, link.is_unresponsive, link.drawing = True, False, drawing(speech="Hello!")
     panel.refresh()

@@ -121,7 +121,7 @@ def test_only_the_try_button_of_the_focused_card_is_filled(qtbot, panel) -> None
 
 
 def test_actions_are_searched(panel) -> None:
-    QTest.keyClicks(panel.finder, "lights")  # the category of two
+    QTest.keyClicks(panel.finder, "lights")  # the category of both actions
     assert [name for name, card in panel.cards.items() if card.isVisibleTo(panel)] == ["light", "emotion"]
     panel.finder.setText("fly")
     assert panel.none.isVisible()

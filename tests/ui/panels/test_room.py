@@ -91,7 +91,7 @@ def test_each_object_is_dragged_over_the_floor(panel, window, name) -> None:
     assert (after[1] > before[1]) == (before[1] <= 0)
     panel.refresh()
     assert next((t.x, t.y) for t in panel.view.state.objects if t.name == name) == after
-    assert window.session.changes("Pepper") == []  # it is everybody's room
+    assert window.session.changes("Pepper") == []  # the room belongs to no single robot
 
 
 def test_dragged_object_keeps_its_offset_to_the_mouse_and_stops_at_the_walls(panel, window) -> None:
@@ -131,7 +131,7 @@ def test_click_on_the_turtle_robot_presses_the_bumper_on_that_side(panel, window
     window.session.fleet.links[1].drawing = of_turtle(theta_deg=at)
     panel.refresh()
     toes = point(panel, "Turtle/body") + QPoint(0, round(panel.view.height() / 286 * 31 * 1.1))
-    QTest.mouseClick(panel.view, LEFT, pos=toes)  # towards the person, low on its body
+    QTest.mouseClick(panel.view, LEFT, pos=toes)  # on the viewer's side, low on the body
     assert window.session.changes("Turtle") == [{"happen": "bump", "side": side}]
 
 
@@ -140,7 +140,7 @@ def test_double_click_and_keyboard_press_the_bumper_and_a_drag_does_not(panel, w
     QTest.mouseClick(panel.view, LEFT, pos=place)
     QTest.mouseDClick(panel.view, LEFT, pos=place)
     QTest.mouseRelease(panel.view, LEFT, pos=place)
-    front = {"happen": "bump", "side": "front"}  # from above
+    front = {"happen": "bump", "side": "front"}  # click from above
     assert window.session.changes("Turtle") == [front, front]
     panel.view.chosen = "Turtle/body"
     QTest.keyClick(panel.view, Qt.Key.Key_Space)
@@ -177,7 +177,7 @@ def test_object_selected_with_tab_is_moved_and_removed_by_keyboard(panel, window
     panel.view.chosen = "Turtle/body"
     QTest.keyClick(panel.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
     assert window.session.changes("Turtle") == [{"move": "robot", "x": 0.92, "y": -1.2}]
-    QTest.keyClick(panel.view, Qt.Key.Key_Delete)  # a robot is not a thing
+    QTest.keyClick(panel.view, Qt.Key.Key_Delete)  # robots can't be deleted
     assert window.session.changes("Turtle") == []
 
 

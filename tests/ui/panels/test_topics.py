@@ -128,7 +128,7 @@ def test_slash_focuses_the_filter_which_finds_names_types_and_nodes(qtbot, panel
 
 def test_sorting_keeps_the_selection_and_changing_values_are_sorted_once_per_second(panel, window) -> None:
     panel.show_topic("/odom")
-    panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  #: the largest first
+    panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  # descending
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
     assert panel.table.selected_key() == "/odom"
     moved = QSignalSpy(panel.model.layoutChanged)
@@ -163,7 +163,7 @@ def test_enter_opens_a_topic_and_arrow_keys_move(panel, window) -> None:
     panel.table.select_key("/joint_states")
     QTest.keyClick(panel.table, Qt.Key.Key_Down)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
-    assert window.opened == ["/lidar/scan"]  # the next by name, the order at first
+    assert window.opened == ["/lidar/scan"]  # the next one in the default order, by name
 
 
 @pytest.mark.parametrize(
@@ -217,7 +217,7 @@ def test_columns_are_selected_in_a_menu_and_restored_with_the_layout(qtbot, pane
     columns, _others = panel.more_actions()
     menu = columns.menu()
     by_words = {action.text(): action for action in menu.actions()}
-    assert "Topic" not in by_words  # it names the row
+    assert "Topic" not in by_words  # the topic column can't be hidden
     assert [words for words, action in by_words.items() if action.isChecked()] == [
         "Type", "Publishers", "Rate over time", "Rate /s", "Bandwidth", "Age", "Loss",
     ]  # fmt: skip
@@ -254,7 +254,7 @@ def test_tooltips_report_the_number_of_messages_not_shown(panel, window) -> None
 def test_empty_panel_links_to_the_connection_doctor(qtbot, panel, window) -> None:
     assert panel.doctor.isHidden()
     panel.filter.setText("nothing like this")
-    assert panel.doctor.isHidden()  # the filter is the reason
+    assert panel.doctor.isHidden()  # empty because of the filter
     empty = Window(Session())
     bare = empty.make(PANEL)
     qtbot.addWidget(bare)
@@ -351,7 +351,7 @@ def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_selects_the_par
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert panel.model.rowCount() < whole
     assert window.opened == []
-    panel.show_topic("/robot/depth")  # what is asked for is never in a closed folder
+    panel.show_topic("/robot/depth")  # the folder of a requested topic is expanded
     assert panel.table.selected_key() == "/robot/depth"
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert window.opened == ["/robot/depth"]

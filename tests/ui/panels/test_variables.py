@@ -77,7 +77,7 @@ def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, w
     ticks(window, panel, 2)
     assert shown(panel)[0] == ("score", "4")
     assert panel.when.text() == "Final values"
-    window.session.runs.run()  # while the robots are asked nothing begins anew
+    window.session.runs.run()  # the last values stay until the robots have replied
     now[0] += 1
     ticks(window, panel, 2)
     assert panel.model.cell_at(0, 1).role == "textSecondary"
@@ -107,7 +107,7 @@ def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
     assert enabled == {
         "Show next to the blocks": True,
         "Show where it is used": True,
-        "Change the value": False,  # nothing runs
+        "Change the value": False,  # no program is running
         "Rename": True,
         "Delete": True,
     }

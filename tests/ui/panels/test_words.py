@@ -34,7 +34,7 @@ from tools import words
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 Show = Callable[[str, Session], AbstractContextManager[tuple[Dock, PanelWidget]]]
-CHOSEN = "robots.Pepper.pose.y"  # in the inspector
+CHOSEN = "robots.Pepper.pose.y"  # selected in the inspector
 PLOTTED = ("robots.Pepper.pose.x", "robots.Pepper.pose.y", "robots.Pepper.emotion", "happy")
 SHOWING = frozenset({
     "Button", "EmptyAction", "EmptyState", "FilterField", "IconButton", "LinkButton", "Menu", "Panel",
@@ -63,7 +63,7 @@ def rows_of(model: QAbstractItemModel, above: QModelIndex | None = None) -> Iter
     """Return the texts of all cells of a model, including child rows."""
     above = QModelIndex() if above is None else above
     for row in range(model.rowCount(above)):
-        # a list model does not tell its one column
+        # QAbstractListModel.columnCount is private
         for column in range(1 if isinstance(model, QAbstractListModel) else model.columnCount(above)):
             index = model.index(row, column, above)
             yield from (text for role in SAID if isinstance(text := index.data(role), str))
@@ -74,7 +74,7 @@ def said_by(widget: QWidget) -> Iterator[tuple[str, str]]:
     """Return pairs of location and text for a widget, its lists and its menus."""
     yield from texts_of(widget)
     for view in widget.findChildren(QAbstractItemView):
-        is_message = isinstance(view, TreeView)  # whose keys and values are its own
+        is_message = isinstance(view, TreeView)  # its keys and values are data
         if view.model() is not None and not is_message and not isinstance(view, QHeaderView):
             yield from ((f"{type(view).__name__} row", text) for text in rows_of(view.model()))
 
@@ -159,7 +159,7 @@ def data_of(session: Session) -> Iterator[str]:
         yield from (alert.title, alert.detail, alert.button or "")
     for finding in session.doctor.findings:
         yield from (finding.sentence, finding.fix, finding.command)
-    yield "nep doctor"  # what is typed into a terminal
+    yield "nep doctor"  # a terminal command
     yield from named_in(session.alarms.rules)
     for document in session.documents:
         yield from (document.name, "NAO")
@@ -175,7 +175,7 @@ def shown(qtbot, theme: Theme) -> Show:
     @contextmanager
     def show(name: str, session: Session) -> Iterator[tuple[Dock, PanelWidget]]:
         with shown_panel(qtbot, theme, name, session) as (dock, widget):
-            for _each in range(2):  # layouts come to rest
+            for _each in range(2):  # until the layouts settle
                 qtbot.wait(20)
             yield dock, widget
 

@@ -61,7 +61,7 @@ def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
 
 
 def settle(window: MainWindow) -> None:
-    for _ in range(STATUS_REFRESH_TICKS):  # Qt lays out what lies in what was laid out
+    for _ in range(STATUS_REFRESH_TICKS):  # nested layouts settle after several passes
         window.tick()
         QApplication.processEvents()
 
@@ -89,7 +89,7 @@ def test_banner_covers_no_control_and_moves_no_layout(
     show(window, layout)
     before = places(window)
     say(window)
-    if (layout, size) == ("developer", SMALL):  # its tools leave no room: the status bar tells
+    if (layout, size) == ("developer", SMALL):  # no room for a banner: shown in the status bar
         assert "1 alert" in window.status.texts()
         return
     assert window.banner.isVisible()

@@ -67,7 +67,7 @@ def named(path: Path) -> Iterator[tuple[str, int]]:
             continue
         called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         given = [keyword.value for keyword in node.keywords if keyword.arg in KEYWORDS]
-        if called == "add_argument":  # the command line's
+        if called == "add_argument":  # argparse, not a command of the window
             continue
         if called == "setProperty" and list(said(node.args[0], constants)) == ["command"]:
             given.append(node.args[1])
@@ -88,7 +88,7 @@ def modules() -> list[Path]:
 def is_known(words: str) -> bool:
     """Return whether the command table contains an id or a pattern with "{}"."""
     id, colon, argument = words.partition(":")
-    if id == "{}" and colon:  # the menu of a tab: its commands are looked at where they are listed
+    if id == "{}" and colon:  # menu of a tab: its commands are checked where they are listed
         return True
     if not colon and "{}" in id:
         return bool([known for known in IDS if fnmatch(known, id.replace("{}", "*"))])

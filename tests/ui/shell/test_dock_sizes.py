@@ -50,7 +50,7 @@ def test_side_columns_keep_their_width_at_every_window_size(
     commands.run("layout.developer")
     names = ("topics", "inspector")
     for size, wanted in (((1440, 900), (640, 330)), ((1920, 1080), (815, 417))):
-        window.resize(*size)  # in the large one names of topics have more room, and so has a message
+        window.resize(*size)  # a large window has more room for topic names and messages
         qtbot.waitUntil(
             lambda wanted=wanted: all(
                 abs(a - b) <= 4 for a, b in zip(widths(window, *names), wanted, strict=True)

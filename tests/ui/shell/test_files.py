@@ -169,7 +169,7 @@ def test_undo_does_not_overwrite_changes_of_another_program(commands, window, tm
     press_toast(window)
     assert path.read_bytes() == before + b"\n"
     assert names(window) == ["Mine (previous version)"]
-    assert window.session.document.path is None  # a copy: saving it writes over neither of them
+    assert window.session.document.path is None  # a copy: saving overwrites neither version
     assert window.session.document.workspace == BLOCKS
 
 

@@ -173,7 +173,7 @@ def test_first_key_that_moves_the_focus_shows_the_ring(qtbot, place: QWidget, th
     for button in buttons:
         place.layout().addWidget(button)
     QTest.qWait(1)
-    buttons[0].setFocus()  # as a page does that begins, or a dialog that closes
+    buttons[0].setFocus()  # like a new page or a closed dialog
     assert not ring.isVisible()
     for other in (Qt.Key.Key_A, Qt.Key.Key_Shift, Qt.Key.Key_Escape, Qt.Key.Key_F12):
         QTest.keyClick(place.windowHandle(), other)
@@ -197,7 +197,7 @@ def test_hiding_a_clicked_widget_shows_no_focus_ring_on_the_next_widget(
     QTest.qWait(1)
     at = second.mapTo(place, second.rect().center())
     QTest.mouseClick(place.windowHandle(), Qt.MouseButton.LeftButton, pos=at)
-    second.hide()  # Qt moves the focus on and calls it a Tab
+    second.hide()  # Qt moves the focus with the reason Tab
     qtbot.waitUntil(first.hasFocus)
     assert ring.target is None
     QTest.keyClick(place.windowHandle(), Qt.Key.Key_Home)

@@ -41,7 +41,7 @@ def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch
     assert len(editor.done) == 1
     editor.done[0]()
     qtbot.waitUntil(lambda: closed == [True], timeout=documents.MAX_FLUSH_MS - 100)
-    qtbot.wait(documents.MAX_FLUSH_MS)  # its own end of waiting comes, too, and closes nothing twice
+    qtbot.wait(documents.MAX_FLUSH_MS)  # the timeout follows and closes nothing twice
     assert closed == [True]
 
 

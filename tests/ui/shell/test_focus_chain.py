@@ -35,7 +35,7 @@ def window(qtbot) -> QWidget:
 def test_deleting_a_queried_widget_keeps_other_widgets_of_the_focus_chain_valid(window: QWidget) -> None:
     first, second = window.findChildren(QLineEdit)
     area = window.findChildren(QScrollArea)[0]
-    header = area.viewport()  # made by Qt, not by Python: what PySide would call deleted
+    header = area.viewport()  # created by Qt: PySide would mark its wrapper as deleted
     assert list(tab_stops(window, first)) == [area, second]
     assert list(tab_stops(window, first, forward=False)) == [second, area]
     step = next_in_focus_chain(first)

@@ -25,7 +25,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 FOLDER = resources.path("guide")
 PAGES = sorted(path.name for path in (FOLDER / "en").glob("*.md"))
 LANGUAGES = sorted(folder.name for folder in FOLDER.iterdir())
-MAX_SIZE, PICTURES_OF_A_LANGUAGE = 110_000, 750_000  # bytes: they are part of the download
+MAX_SIZE, PICTURES_OF_A_LANGUAGE = 110_000, 750_000  # bytes; included in the download
 MAX_NAME_LENGTH = 40
 TITLES = ["The window", "Blocks", "Robots", "The virtual room", "When something is wrong", "Keys", "Saving"]
 

@@ -91,7 +91,7 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     commands.run("layout.open")
     assert answers.asked[-1].startswith("layout ")
     assert set(window.bench.open_names()) == {"topics", "console"}
-    assert window.toast.text == "Opened the layout “Developer 2”"  # that name is the built-in one's
+    assert window.toast.text == "Opened the layout “Developer 2”"  # “Developer” is a built-in layout
     window.toast.button.click()
     assert set(window.bench.open_names()) == before
     assert window.saved_layouts.all() == ()
@@ -99,10 +99,10 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     saved["open"].append("teleport")
     file.write_bytes(encode_layout("Arm", "developer", saved))
     for name in ("Arm", "Arm 2"):
-        commands.files.open_all([file])  # a drop, or the command line
+        commands.files.open_all([file])  # like a drop or the command line
         assert window.toast.text == f"Opened the layout “{name}”. Unknown panels were skipped: teleport"
         assert set(window.bench.open_names()) == {"topics", "console"}
-    file.write_bytes(encode_layout("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
+    file.write_bytes(encode_layout("Arm", "developer", {**saved, "docks": ""}))  # Qt can't restore them
     commands.files.open_all([file])
     assert window.toast.text == "Can't open Mine.nep-layout: the file is damaged"
     assert set(window.bench.open_names()) == {"topics", "console"}

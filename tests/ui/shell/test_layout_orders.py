@@ -17,9 +17,9 @@ from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 
-# The blocks before their web view is there: a panel in which nothing takes the keyboard.
+# Stands in for the blocks panel before its web view exists: nothing in it takes the focus.
 BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
-STOPS = 3  # in each panel: its first one, and what a person reaches next
+STOPS = 3  # number of tab stops to check in each panel
 
 
 class Layouts(QStackedWidget):
@@ -79,7 +79,7 @@ def test_every_panel_of_one_layout_survives_switching_to_the_other_layout(
     for name in layouts.panels:
         bench = layouts.switch(first)
         if (first, name) == ("developer", "behaviour"):
-            continue  # has its own layout
+            continue  # covered by its own layout
         dock = bench.open(name)
         assert isinstance(dock, Dock)
         layouts.settle()
@@ -98,7 +98,7 @@ def test_every_panel_of_one_layout_survives_switching_to_the_other_layout(
 
 def test_robot_cards_survive_switching_tabs_and_layouts(layouts: Layouts) -> None:
     bench = layouts.switch("developer")
-    dock = bench.open("robots")  # a tab beside Topics
+    dock = bench.open("robots")  # a tab next to Topics
     layouts.settle()
     bench.focus_panel(dock)
     for name in ("topics", "robots", "topics", "robots"):

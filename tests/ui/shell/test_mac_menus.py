@@ -32,7 +32,7 @@ def all_entries(window: MainWindow) -> list[QAction]:
         found.append(title)
         menu = title.menu()
         assert isinstance(menu, QMenu)
-        menu.aboutToShow.emit()  # the lists in it are filled when it opens
+        menu.aboutToShow.emit()  # lists in the menu are filled when it opens
         menu.aboutToHide.emit()
         found += entries(menu)
     return found

@@ -377,7 +377,7 @@ def test_narrow_window_tabifies_panels_and_wide_window_separates_panels(
     qtbot.waitUntil(lambda: docks["camera"] in bench.tabifiedDockWidgets(docks["robot"]))
     window.resize(1440, 900)
     qtbot.waitUntil(lambda: docks["camera"].y() > docks["robot"].y())
-    QTest.qWait(50)  # Qt would make a tab again when control returns to the event loop
+    QTest.qWait(50)  # Qt would tab the docks again when control returns to the event loop
     assert bench.tabifiedDockWidgets(docks["robot"]) == []
     assert docks["sensors"].y() > docks["camera"].y()
 

@@ -21,7 +21,7 @@ def test_holding_alt_underlines_the_mnemonics(qtbot, window: MainWindow) -> None
     for kind, shown in ((QEvent.Type.KeyPress, True), (QEvent.Type.KeyRelease, False)):
         QApplication.sendEvent(window.windowHandle(), QKeyEvent(kind, Qt.Key.Key_Alt, Qt.AltModifier))
         assert bar.shows_mnemonics == shown
-        if shown:  # when Alt is let go alone, Qt gives the bar the keyboard
+        if shown:  # after Alt alone is released, Qt focuses the bar
             assert bar.grab().toImage() != before
 
 

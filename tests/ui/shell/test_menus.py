@@ -12,7 +12,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox
 from app.ui.widgets.menus import ContextMenuFilter, Menu, round_region
 
-# without a screen nothing can grab the keyboard, which every popup asks for
+# on the offscreen platform, popups can't grab the keyboard
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -53,10 +53,10 @@ def test_text_check_marks_and_shortcuts_are_painted(qtbot, theme: Theme) -> None
         middle = image.copy(rect.left() + 24, rect.top(), 60, rect.height())
         right = image.copy(rect.right() - 60, rect.top(), 56, rect.height())
         looks.append((left, middle, right))
-    assert looks[0][0] != looks[1][0]  # the check
-    assert looks[0][1] == looks[1][1]  # the words stand in one column
-    assert looks[0][2] != looks[1][2]  # the key
-    assert looks[0][1] != looks[2][1]  # what is off is paler
+    assert looks[0][0] != looks[1][0]  # the check mark
+    assert looks[0][1] == looks[1][1]  # texts are aligned in one column
+    assert looks[0][2] != looks[1][2]  # the shortcut
+    assert looks[0][1] != looks[2][1]  # disabled items are paler
     menu.close()
 
 
@@ -70,7 +70,7 @@ def test_every_menu_entry_has_a_mnemonic(qtbot, theme: Theme) -> None:
         menu = shown(qtbot, theme, place, *made)
         QTest.keyClick(menu, key)
         menu.close()
-    assert done == ["Cortar", "Copiar", "Última"]  # what is off is not chosen
+    assert done == ["Cortar", "Copiar", "Última"]  # disabled items can't be chosen
 
 
 def test_mnemonic_opens_a_submenu(qtbot, theme: Theme) -> None:

@@ -62,7 +62,7 @@ def test_permission_question_names_the_moving_actions_and_the_stop_key(window) -
     assert "“move” and “turn” move Rover." in question.sentence.text()
     assert "F12" in question.sentence.text()
     assert question.always.text() == "Always for Rover"
-    assert question.y() > 200  # the run bar's Stop and the robot's own stay free
+    assert question.y() > 200  # covers neither the run bar's Stop nor the robot's
     assert window.focusWidget() is question.not_now
     assert question.accessibleName() == "Allow Rover to move?"
 
@@ -169,7 +169,7 @@ def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) 
 def test_permission_question_has_its_final_size_when_first_shown(qtbot, tmp_path) -> None:
     window = Window(tmp_path)
     qtbot.addWidget(window)
-    window.question._theme.apply()  # the words grow when the question is polished
+    window.question._theme.apply()  # polishing the question enlarges its text
     window.show()
     window.ask("move", "turn")
     first = window.question.height()

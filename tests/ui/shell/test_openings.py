@@ -28,7 +28,7 @@ from app.ui.theme.theme import Theme
 from tests.ui.panels.test_behaviour import Editor
 from tests.ui.shell_parts import Answers, free_address
 
-# without a screen nothing can grab the keyboard, which every popup asks for
+# on the offscreen platform, popups can't grab the keyboard
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -90,7 +90,7 @@ def close_what_is_open(window: QWidget) -> None:
 
 
 def leaves_nothing(window: QWidget, open_it: Callable[[], object], times: int = TIMES) -> None:
-    for _ in range(2):  # what is made once may stay
+    for _ in range(2):  # warm-up: objects created once may remain
         open_it()
         settle()
         close_what_is_open(window)
@@ -226,7 +226,7 @@ def test_toasts_and_banners_leak_no_objects(window: MainWindow) -> None:
         window.session.alerts.raise_alert(
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )
-        for _ in range(STATUS_REFRESH_TICKS):  # the status bar tells of alerts, too
+        for _ in range(STATUS_REFRESH_TICKS):  # until the status bar shows the alerts, too
             window.tick()
         window.session.alerts.resolve("x")
         window.tick()

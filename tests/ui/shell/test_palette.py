@@ -62,7 +62,7 @@ def test_available_commands_rank_above_unavailable_commands() -> None:
 
 def test_scattered_letters_do_not_match() -> None:
     assert found("Show the inside of every panel that is open", query="hif") == []
-    assert found("Close the behaviour", query="tour") == []  # it would close a tab on Enter
+    assert found("Close the behaviour", query="tour") == []  # Enter would close a tab
 
 
 @pytest.mark.parametrize(

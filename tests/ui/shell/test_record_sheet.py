@@ -168,7 +168,7 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
     assert tokens() == [("/arm/*", False), ("*camera*", False)]
     QTest.keyClick(field.edit, Qt.Key.Key_Return)
     assert tokens() == [("/arm/*", False), ("*camera*", False), ("/arm/raw", True)]
-    QTest.keyClicks(field.edit, "/arm/* ")  # it is there already
+    QTest.keyClicks(field.edit, "/arm/* ")  # already in the list
     assert field.edit.text() == ""
     choice = recorder.session.recordings.choice
     assert (choice.patterns, choice.excluded) == (("/arm/*", "*camera*"), ("/arm/raw",))
@@ -277,7 +277,7 @@ def test_texts_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, record
     recorder.session.recordings.set_ring_settings(RingSettings(is_on=True))
     recorder.say("ring")
     sheet.show_state()
-    qtbot.wait(50)  # Qt lays out later
+    qtbot.wait(50)  # Qt defers layouts
     topics = [topic.name for topic in recorder.session.topics.existing_topics()]
     assert [text for _where, text in said_by(sheet) if untranslated(text, "GB", *topics)] == []
     assert clipped(sheet) == []

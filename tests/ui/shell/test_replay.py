@@ -256,7 +256,7 @@ def test_mouse_seeks_selects_lanes_and_zooms_in_the_timeline(qtbot, window, sess
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(20, y))
     assert replay.chosen == "/camera"
     assert replay.player.position_ns == at_ns
-    x = canvas.x_of(at_ns)  # the dock may have got its size meanwhile
+    x = canvas.x_of(at_ns)  # the dock may have been resized in between
     place = QPointF(x, 60)
     turned = QWheelEvent(
         place, canvas.viewport().mapToGlobal(place), QPoint(), QPoint(0, 240), Qt.MouseButton.NoButton,
@@ -298,7 +298,7 @@ def test_image_panels_show_images_at_the_playhead(qtbot, window, session, path, 
     image = window.bench.docks["image"].panel
     go_to(qtbot, window, whole[40][0])
     until(qtbot, window, lambda: image._message() is not None and image._message().seq == 35)
-    go_to(qtbot, window, whole[2][0])  # before the first
+    go_to(qtbot, window, whole[2][0])  # before the first image
     until(qtbot, window, lambda: image._stream.picture is None and image.pages.currentIndex() == 0)
 
 

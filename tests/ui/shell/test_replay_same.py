@@ -131,7 +131,7 @@ class Studio:
         self.panel("image", ImagePanel).show_topic(CAMERA)
         self.panel("plot", PlotPanel).plot_field(NUMBERS, "x")
         self.panel("plot", PlotPanel).plot_field(NUMBERS, "y")
-        for name in ("image", "plot"):  # behind a tab they would look at nothing
+        for name in ("image", "plot"):  # hidden behind a tab, they would watch no topics
             self.window.bench.docks[name].setFloating(True)
         docks = self.window.bench.docks
         self.until(lambda: docks["image"].is_displayed() and docks["plot"].is_displayed())

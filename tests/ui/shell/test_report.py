@@ -201,7 +201,7 @@ def test_dismissed_crash_is_not_offered_again(window: MainWindow, session: Sessi
     window.banner.banner.close_button.click()
     window.tick()
     assert not window.banner.isVisible()
-    session.alerts.resolve(ALERT_ID)  # as at the next start
+    session.alerts.resolve(ALERT_ID)  # as after a restart
     show_crash_alert(session.alerts, CrashReports())
     assert not session.alerts.has(ALERT_ID)
 
@@ -245,7 +245,7 @@ def test_texts_are_translated_and_fit(
     assert sheet is not None
     answers.path = tmp_path / "report.zip"
     written(qtbot, sheet)
-    qtbot.wait(50)  # Qt lays out later
+    qtbot.wait(50)  # Qt defers layouts
     data = (str(tmp_path), "report", "zip", "Esc", session.document.name, *str(tmp_path).split("/"))
     assert [text for _where, text in said_by(sheet) if untranslated(text, *data)] == []
     assert clipped(sheet) == []

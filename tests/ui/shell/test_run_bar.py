@@ -79,7 +79,7 @@ def tools(qtbot, theme: Theme) -> ToolBar:
 )
 def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, stop, look) -> None:
     bar.show_view(VIEWS[state])
-    can_press = run or state == "running"  # it is Restart then
+    can_press = run or state == "running"  # the button is Restart while running
     assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (can_press, pause, step)
     assert bar.run.kind == ("run" if run else "plain")
     assert bar.stop.text() == stop
@@ -87,7 +87,7 @@ def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, sto
     assert bar.result.appearance == look
     assert bar.confirm.isVisible() == (state == "unanswered")
     assert bar.sentence.accessibleName() == f"{VIEWS[state].title}. {VIEWS[state].detail}"
-    assert (bar.sentence.colour_role == "text") == (state != "unanswered")  # else red
+    assert (bar.sentence.colour_role == "text") == (state != "unanswered")  # otherwise red
 
 
 @pytest.mark.parametrize("status", ["ok", "off", "error"])
@@ -215,7 +215,7 @@ def test_long_success_result_is_shortened_to_make_room_for_an_error(qtbot, bar: 
     bar.show_view(fault)
     qtbot.waitUntil(lambda: bar.sentence.width() >= 180)
     assert bar.result.toolTip() == good
-    bar.show_view(replace(fault, result_status="error"))  # what is not good is never shortened for it
+    bar.show_view(replace(fault, result_status="error"))  # an error result is never shortened
     qtbot.waitUntil(lambda: bar.result.width() >= bar.result.sizeHint().width())
 
 

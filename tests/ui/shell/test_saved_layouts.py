@@ -184,7 +184,7 @@ def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands:
     path = shown.session.settings.path
     keep_as(shown, commands, "One")
     path.unlink()
-    path.mkdir()  # as a disk that can't be written
+    path.mkdir()  # stands for a disk that can't be written
     keep_as(shown, commands, "Two")
     assert shown.toast.text == "Can't save layout “Two”. It will be lost when Studio closes."
     assert "Two" in menu(shown, commands)

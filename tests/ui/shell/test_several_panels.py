@@ -111,7 +111,7 @@ def test_additional_panel_opens_next_to_the_first_with_a_number_and_its_own_topi
     assert second.isAncestorOf(QApplication.focusWidget())
     second.panel.show_topic("/cmd")
     assert (first.panel.subtitle(), second.panel.subtitle()) == ("/odom", "/cmd")
-    # the first is higher than wide: one is above the other, and they have about the same height
+    # taller than wide: the split is vertical, with about equal heights
     qtbot.waitUntil(lambda: abs(first.height() - second.height()) < 0.2 * first.height())
     assert first.x() == second.x()
 

@@ -104,7 +104,7 @@ def test_text_navigation_keys_are_handled_by_the_text_field(
         QTest.keyClick(each, Qt.Key.Key_Down, held)
     assert (left, number.text()) == ([], "5")
     for each in (field, words, number):
-        QTest.keyClick(each, Qt.Key.Key_Down, Qt.KeyboardModifier.KeypadModifier)  # as arrows of a Mac come
+        QTest.keyClick(each, Qt.Key.Key_Down, Qt.KeyboardModifier.KeypadModifier)  # like a Mac's arrow keys
     assert (left, number.text()) == (["filter", "console"], "4")
 
 
@@ -132,7 +132,7 @@ def test_a_single_shortcut_or_all_shortcuts_can_be_reset(keys: Shortcuts, tmp_pa
     keys.reset("file.open")
     assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
     keys.swap("file.open", "Ctrl+S")
-    keys.assign("file.new", "Ctrl+S")  # "Open" has none now, and "Save" that of "Open"
+    keys.assign("file.new", "Ctrl+S")  # "Open" has no shortcut now, "Save" has Ctrl+O
     keys.reset("file.open")
     assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ())
     assert keys.keys_of("file.new") == ("Ctrl+S",)
@@ -194,7 +194,7 @@ def test_invalid_shortcuts_are_rejected_with_a_reason(
     assert bool(refusal) == bool(said)
 
 
-# -- the sheet ------------------------------------------------------------------------------------
+# -- shortcut sheet -------------------------------------------------------------------------------
 
 
 @pytest.fixture

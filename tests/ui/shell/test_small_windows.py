@@ -39,10 +39,10 @@ SIZES = (
     (1920, 1080),
 )
 TEXT = (100, 150, 200)
-TILES, NAMES, NARROW = 52, 196, 760  # px: the toolbox of a narrow page, of a wide one, and which is narrow
+TILES, NAMES, NARROW = 52, 196, 760  # px: toolbox width (narrow, wide page); width limit of a narrow page
 MIN_CANVAS = 420
-SETTLE_MS, RESTS = 15, 3  # a turn, and in how many of them nothing moves when all has its place
-# The blocks without their web view, which has tests of its own.
+SETTLE_MS, RESTS = 15, 3  # wait time, and waits without a moved widget until the layout is settled
+# Stands in for the blocks panel, whose web view has its own tests.
 BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
 
 
@@ -100,7 +100,7 @@ def overlaps(window: MainWindow) -> Iterator[str]:
     for bar in bars:
         if (
             bar.isVisible() and not bar.visibleRegion().isEmpty()
-        ):  # not those that Qt moved away, behind a tab
+        ):  # not in docks behind a tab, which Qt moves off-screen
             yield from _pairs([child for child in bar.children() if isinstance(child, QWidget)])
     if window.bench is not None:
         docks = window.bench.docks.values()
@@ -306,7 +306,7 @@ def test_status_chip_in_a_narrow_title_loses_its_text_before_the_tabs_do(
     qtbot.waitUntil(lambda: (front.width(), behind.width()) == names)
     assert chip.width() == chip.full_width()
 
-    chip.set("virtual, ready, and moving")  # longer, in a title that keeps its size
+    chip.set("virtual, ready, and moving")  # longer, while the title keeps its size
     qtbot.waitUntil(lambda: chip.width() == chip.icon_only_width())
     assert (front.width(), behind.width()) == names
     assert chip.toolTip() == "virtual, ready, and moving"
@@ -324,9 +324,9 @@ STOP = QRect(780, 50, 230, 52)
 @pytest.mark.parametrize(
     ("menu", "goes_to"),
     [
-        (QRect(10, 40, 300, 500), (10, 40)),  # covers nothing: it stays
+        (QRect(10, 40, 300, 500), (10, 40)),  # covers nothing: not moved
         (QRect(700, 40, 300, 500), (480, 40)),  # left of Stop
-        (QRect(60, 60, 900, 300), (60, 102)),  # too wide for that: below it
+        (QRect(60, 60, 900, 300), (60, 102)),  # too wide for the left: below Stop
     ],
 )
 def test_menu_that_would_cover_stop_is_moved(menu: QRect, goes_to: tuple[int, int]) -> None:
@@ -336,7 +336,7 @@ def test_menu_that_would_cover_stop_is_moved(menu: QRect, goes_to: tuple[int, in
 
 def test_menu_that_is_too_wide_to_avoid_stop_is_narrowed() -> None:
     assert geometry_beside_stop(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
-    early = QRect(100, 50, 230, 52)  # left of this there is no room for words
+    early = QRect(100, 50, 230, 52)  # no room for text left of it
     assert geometry_beside_stop(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
 
 

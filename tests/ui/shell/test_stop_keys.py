@@ -186,7 +186,7 @@ def test_no_widget_in_the_window_is_modal() -> None:
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in MODAL
     ]
-    # the speaker's loop is that of its own thread, and a drag's lasts until its button or a key is pressed
+    # the speaker's loop has its own thread; a drag's loop ends with its mouse button or with a key
     assert sorted(found) == [
         "application.py: application.exec",
         "field_drag.py: drag.exec",
@@ -213,7 +213,7 @@ def test_stop_works_during_drag_and_drop_of_a_field(
     drag_field(window, "/odom", "speed", press=lambda name: commands.run(f"key:{name}"))
     qtbot.waitUntil(lambda: stops == ["stop"])
     assert ended == ["cancelled"]
-    QTest.keyClick(window, Qt.Key.Key_A)  # its filter has gone
+    QTest.keyClick(window, Qt.Key.Key_A)  # the event filter was removed
     assert ended == ["cancelled"]
 
 

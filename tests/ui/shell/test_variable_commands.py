@@ -51,7 +51,7 @@ def sheet_of(window: MainWindow) -> NameSheet:
 def typed(sheet: NameSheet, words: str) -> NameSheet:
     sheet.field.selectAll()
     QTest.keyClick(sheet.field, Qt.Key.Key_Delete)
-    sheet.field.insert(words)  # QTest has no keys for other scripts
+    sheet.field.insert(words)  # QTest can't type other scripts
     sheet.field.textEdited.emit(words)
     return sheet
 

@@ -173,7 +173,7 @@ def test_refresh_of_many_pages_emits_signals_only_for_the_changed_page_and_topic
     sheet.model.dataChanged.connect(lambda *_args: told.append(1))
     server.change_topic(7, rate_hz=2.0)
     sheet.refresh()
-    assert len(told) == 2  # the page and its topic; nothing else is repainted
+    assert len(told) == 2  # only the rows of the page and its topic are repainted
 
 
 def test_new_token_disconnects_pages_and_undo_restores_the_previous_token(desk: Desk) -> None:
@@ -333,7 +333,7 @@ def test_texts_are_translated_and_fit(
     )  # fmt: skip
     token = desk.sheet.access.token.text()
     assert [text for _where, text in said_by(desk.sheet) if untranslated(text, *data, token)] == []
-    qtbot.waitUntil(lambda: clipped(desk.sheet) == [])  # Qt lays out later
+    qtbot.waitUntil(lambda: clipped(desk.sheet) == [])  # Qt defers layouts
 
 
 def test_sheet_is_placed_at_the_right_edge_below_the_stop_button(qtbot, theme: Theme, window) -> None:

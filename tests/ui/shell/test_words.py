@@ -48,7 +48,7 @@ from tests.ui.shell.test_files import changed, saved
 from tests.ui.shell.test_motion_permission import ROVER
 from tests.ui.shell_parts import NAMES, PANELS, Answers, robots_in
 
-# without a screen nothing can grab the keyboard, which every popup asks for
+# on the offscreen platform, popups can't grab the keyboard
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
 pytest_plugins = ["tests.ui.shell_fixtures"]
 SETTLE_MS = 20
@@ -179,7 +179,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
 def test_all_texts_of_the_window_are_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     found: set[str] = set()
     paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
-    languages = [name for _code, name in i18n.selectable_languages()]  # each is called what it calls itself
+    languages = [name for _code, name in i18n.selectable_languages()]  # each in its own language
     system = f"{platform.system()} {platform.release()} ({platform.machine()})"
 
     def look(what: str, root: QWidget) -> None:

@@ -101,7 +101,7 @@ def test_termination_signal_closes_the_window_cleanly(qtbot, window: MainWindow,
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ignored_sighup_is_not_overridden(window: MainWindow) -> None:
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # like nohup
     try:
         close_on_signals(window, Run())
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN

@@ -141,7 +141,7 @@ def test_widgets_of_the_first_paint_use_the_bundled_fonts(
     application = make_application()
     fonts.load()
     application.setStyleSheet("")
-    application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
+    application.setFont(QFont("DejaVu Serif"))  # as set by the system, before our style is applied
     journal = Journal(tmp_path / "journal")
     journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
     monkeypatch.setattr("app.core.documents.journal._is_running", lambda _pid, _born_s: False)

@@ -16,7 +16,7 @@ from app.ui.overrides import NEUTRAL_RESULTS
 
 
 def wrong_number() -> object:
-    return int("x")  # made in C: what ended the process
+    return int("x")  # raised in C, which used to end the process
 
 
 def no_attribute() -> object:
@@ -43,7 +43,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_widget_with_raising_overrides_is_still_shown(qtbot, fail, told: list[str]) -> None:
     class Bad(QWidget):
         def paintEvent(self, _event: QPaintEvent) -> None:
-            painter = QPainter(self)  # still active when it fails
+            painter = QPainter(self)  # still active when fail() raises
             painter.drawLine(0, 0, 9, 9)
             fail()
 
@@ -67,7 +67,7 @@ def test_widget_with_raising_overrides_is_still_shown(qtbot, fail, told: list[st
     window.removeEventFilter(bad)
     count = len(told)
     bad.resize(20, 20)
-    assert bad.grab().width() > 0  # paints: its painter of the time before is gone
+    assert bad.grab().width() > 0  # the painter of the failed paint event was ended
     assert len(told) > count
     assert bad.isVisible()
 
@@ -118,7 +118,7 @@ def test_exception_in_a_method_that_is_no_qt_override_propagates(qapp) -> None:
 
 def test_every_qt_override_is_guarded() -> None:
     """A camelCase name is a Qt override: it must be guarded or known to need no guard."""
-    # Qt does not call them (pyqtgraph does, where it paints), or a table of Qt has them (a protocol).
+    # Not called by Qt: called by pyqtgraph while painting, or only declared in a protocol of Qt methods.
     ours = {"setText", "installEventFilter", "insertWidget", "pictureOfCarried", "columnWidth"}
     ours |= {"tickSpacing", "tickStrings"}
     found: set[str] = set()

@@ -30,7 +30,7 @@ def test_software_rendering_is_selected_without_a_gpu_unless_set_by_the_user(
 def test_linux_gpu_is_detected_by_its_render_device(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(graphics, "GPU_DEVICE_PATTERNS", (str(tmp_path / "renderD*"),))
     assert not graphics.has_graphics_processor("linux")
-    (tmp_path / "card0").touch()  # what only shows a screen computes nothing
+    (tmp_path / "card0").touch()  # a display device without a renderer
     assert not graphics.has_graphics_processor("linux")
     (tmp_path / "renderD128").touch()
     assert graphics.has_graphics_processor("linux")

@@ -199,7 +199,7 @@ def test_socket_is_in_the_runtime_folder_with_one_per_studio_folder(runtime: Pat
 def test_runtime_folder_that_is_linked_missing_relative_or_open_to_others_is_not_used(
     runtime: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wrong: str
 ) -> None:
-    home = runtime / "home"  # a short name: with several workers that of `tmp_path` is too long for a socket
+    home = runtime / "home"  # short, because `tmp_path` of an xdist worker is too long for a socket path
     if wrong == "open":
         runtime.chmod(0o777)
     elif wrong == "linked":

@@ -86,7 +86,7 @@ def test_every_icon_used_in_the_code_is_shipped() -> None:
     root = Path(icons.__file__).parents[2]
     named = {name for path in root.rglob("*.py") for name in given.findall(path.read_text("utf-8"))}
     assert len(named) > 50
-    assert named - {"dot", "error", "behaviour"} <= icons.names()  # a disc, a colour, a layout
+    assert named - {"dot", "error", "behaviour"} <= icons.names()  # not icons: a disc, a colour, a layout
 
 
 def test_every_icon_svg_paints_visible_pixels(qapp) -> None:

@@ -93,7 +93,7 @@ def test_panels_clip_no_text(qtbot, theme: Theme, full: bool, percent: int, long
     faults = []
     for name in SIZES:
         if name == "behaviour":
-            continue  # its page is of the web; its bar is in test_behaviour_tabs
+            continue  # a web page; its bar is tested in test_behaviour_tabs
         session = FakeSession.full() if full else FakeSession()
         with shown_panel(qtbot, theme, name, session) as (dock, _widget):
             settle(qtbot, dock, longer=longer)
@@ -113,7 +113,7 @@ def test_action_card_can_be_used_without_horizontal_scrolling_at_every_text_size
     dock = Dock(theme, panel, widget, "comfortable")  # type: ignore[arg-type]
     qtbot.addWidget(dock)
     dock.resize(width, 600)
-    with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
+    with qtbot.waitExposed(dock):  # hidden panels aren't updated
         dock.show()
     dock.front = True
     qtbot.waitUntil(dock.is_displayed)

@@ -157,7 +157,7 @@ def test_style_sheet_has_no_object_names_and_no_unfilled_placeholders(theme: The
 
 
 def test_colours_are_defined_only_in_the_tokens() -> None:
-    # A robot's drawing, its lamps and boxes on a picture have colours that no theme changes.
+    # Colours of a robot's drawing, lamps and detection boxes are independent of the theme.
     own = {path.name for path in UI.glob("robot_*.py")} | {
         "choices.py",
         "picture_boxes.py",

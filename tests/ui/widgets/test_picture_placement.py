@@ -20,7 +20,7 @@ def place_of(place: PicturePlacement, at: QPointF) -> tuple[float, float]:
 def test_image_is_fitted_and_centred_by_default_and_may_fill_the_view() -> None:
     place = PicturePlacement()
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
-    assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # too much would be cut
+    assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # filling would crop too much
     assert place.area(VIEW, QSizeF(640, 420), fill=True).height() == 300
     place.rotate(90)
     assert place.area(VIEW, PICTURE) == QRectF(125, 0, 150, 300)
@@ -51,7 +51,7 @@ def test_panning_moves_the_image_with_the_mouse_up_to_its_edge() -> None:
     assert place_of(place, QPointF(150, 80)) == pytest.approx(before)
     place.move(1e6, 1e6, VIEW, PICTURE)
     assert place.area(VIEW, PICTURE).topLeft() == QPointF(0, 0)
-    place.move(-10, -10, VIEW, PICTURE)  # at once, not after the way beyond the edge
+    place.move(-10, -10, VIEW, PICTURE)  # immediately: the movement beyond the edge isn't accumulated
     assert place.area(VIEW, PICTURE).topLeft() == QPointF(-10, -10)
 
 
@@ -78,11 +78,11 @@ def test_flipped_image_rotates_in_the_same_direction(turns: int) -> None:
     corner = QPointF(0, 0)
     for place in (upright, flipped):
         place.rotate(90 * turns)
-    # a quarter to the right brings the upper left corner to the upper right
+    # a rotation to the right moves the upper left corner to the upper right
     seen = [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][turns - 1]
     mapped = upright.orientation().map(corner)
     assert (round(mapped.x(), 6), round(mapped.y(), 6)) == seen
-    mapped = flipped.orientation().map(QPointF(1, 0))  # it was seen at the upper left
+    mapped = flipped.orientation().map(QPointF(1, 0))  # flipped: shown at the upper left
     assert (round(mapped.x(), 6), round(mapped.y(), 6)) == seen
 
 

@@ -105,7 +105,7 @@ def test_click_and_return_open_a_row_and_slash_emits_filter_requested(qtbot, vie
 def test_click_on_a_header_sorts_and_a_second_click_reverses_the_order(qtbot, view) -> None:
     with qtbot.waitSignal(view.order_changed):
         view.horizontalHeader().sectionClicked.emit(1)
-    assert (view.order.column, view.order.is_descending) == (COLUMNS[1], True)  # figures: the largest first
+    assert (view.order.column, view.order.is_descending) == (COLUMNS[1], True)  # numbers: descending first
     view.horizontalHeader().sectionClicked.emit(1)
     assert view.order.is_descending is False
 
@@ -159,7 +159,7 @@ def test_cell_that_changed_during_another_repaint_is_repainted(qapp, view, model
     row = model.row_at(model.index(0, 0))
     row.rate = 7.5
     view.viewport().repaint()
-    row.rate = 2.0  # as the view was told it last
+    row.rate = 2.0  # the value of the last refresh
     brush.painted = QRegion()
     view.refresh_visible()
     qapp.processEvents()
@@ -178,7 +178,7 @@ def test_cache_of_painted_cells_is_bounded(qapp, view, model) -> None:
 def test_stretch_column_takes_the_remaining_width(view) -> None:
     assert view.columnWidth(0) == view.viewport().width() - view.columnWidth(1)
     view.resize(150, 200)
-    assert view.columnWidth(0) == 100  # never narrower than its own width
+    assert view.columnWidth(0) == 100  # not below its own width
 
 
 def test_row_height_follows_the_density(view) -> None:
@@ -199,7 +199,7 @@ def test_column_shown_by_the_user_is_not_hidden_when_space_is_short(view) -> Non
     choice.show("own", True)
     assert choice.fitting_columns([100, 60, 60], 120) == {0, 2}
     choice.show("name", False)
-    assert choice.fitting_columns([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
+    assert choice.fitting_columns([100, 60, 60], 300) == {0, 1, 2}  # the first column names the row
 
 
 def test_column_visibility_is_saved_and_invalid_state_is_ignored() -> None:

@@ -385,7 +385,7 @@ def test_tab_moves_through_rows_and_not_into_a_combo_box_popup(qtbot) -> None:
     choice = QComboBox()
     choice.addItems(["left", "right"])
     dropped = choice.view()
-    column.column.insertWidget(0, choice)  # a warning of Qt fails the test
+    column.column.insertWidget(0, choice)  # a Qt warning would fail the test
     assert dropped.window() is not choice.window()
     assert tab_stops_of(choice) == [choice]
 

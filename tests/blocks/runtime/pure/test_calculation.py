@@ -55,14 +55,14 @@ def worked_out(name: str, *values: object) -> object:
         ("rounded_to", (3.14159, 2), 3.14),
         ("rounded_to", (1.005, 2), 1.01),
         ("rounded_to", (2.5, 0), 3),
-        ("rounded_to", (-2.5, 0), -2),  # as "round" does: halves go up
+        ("rounded_to", (-2.5, 0), -2),  # halves are rounded up, as by “round”
         ("rounded_to", (1234, -2), 1200),
         ("rounded_to", (LARGE, 2), LARGE),
         ("rounded_to", (1e-300, 400), 0),
         ("smaller", (2, -LARGE), -LARGE),
         ("larger", (2, -LARGE), 2),
         ("limited", (120, 0, 100), 100),
-        ("limited", (-1, 100, 0), 0),  # limits in the other order
+        ("limited", (-1, 100, 0), 0),  # limits in reverse order
         ("limited", (50, 0, 100), 50),
         ("mapped", (50, 0, 100, 0, 1), 0.5),
         ("mapped", (0, 0, 1023, 4, 0), 4),

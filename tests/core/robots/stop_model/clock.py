@@ -15,8 +15,8 @@ SETTLE_LIMIT_S = 30.0
 """Real time in seconds after which a simulation is assumed to be deadlocked."""
 _END = float("inf")
 _MIN_S = 1e-6
-_LOOK_S = 0.0005  # real seconds between two looks whether all threads rest
-_AFTER_END_S = 0.05  # real seconds, so that threads that are being closed do not spin
+_LOOK_S = 0.0005  # real seconds between checks that all threads are idle
+_AFTER_END_S = 0.05  # real seconds, to keep closing threads from spinning
 
 
 def _never() -> bool:
@@ -109,7 +109,7 @@ class SimulatedClock:
         *,
         is_held: bool = False,
     ) -> bool:
-        # Rounded up: a rest of a span that is too small to add would never pass.
+        # Rounded up: a timeout too small to change the time would never expire.
         deadline = _END if timeout_s is None else self._now + max(_MIN_S, timeout_s)
         me = threading.current_thread()
         waiter = _Waiter(me, deadline, is_ready, wake, is_frozen)

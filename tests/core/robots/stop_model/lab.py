@@ -75,7 +75,7 @@ class SimulatedLab:
             self.settle()
             self.after_step()
 
-    # -- robots and people
+    # -- robots and users
 
     def start_robot(self, name: str, *, connects_late: bool = False) -> SimulatedRobot:
         """Start a robot process; other participants notice it in the next `settle`."""
@@ -104,7 +104,7 @@ class SimulatedLab:
         while runs.state.state == "stopping":
             self.advance(GRAPH_POLL_S)
 
-    # -- what was sent
+    # -- sent messages
 
     def stops_received(self, robot: SimulatedRobot) -> int:
         """Return the number of stops that the robot's process has received."""

@@ -33,7 +33,7 @@ from tests.core.robots.stop_model.network import (
 )
 
 GRAPH_POLL_S = 0.4
-ALIVE_S = GRAPH_POLL_S  # at the same moments, so that fewer have to be simulated
+ALIVE_S = GRAPH_POLL_S  # equal to the graph interval, so that fewer moments are simulated
 
 
 class SimulatedHeartbeat:
@@ -171,7 +171,7 @@ class SimulatedStudio:
         for subscriber in stopper:
             subscriber.sink(messages)
 
-    # -- what a person does
+    # -- user actions
 
     def allow(self) -> None:
         """Give the permission to move robots if Studio asks for it."""

@@ -75,7 +75,7 @@ def sine(begin: float, end: float, step: float = 0.05) -> list[tuple[float, obje
 
 def drawn(panel: PlotPanel, colour: QColor) -> list[int]:
     """Return the columns of the plot area that contain a colour, in logical pixels."""
-    if panel.canvas.height() % 2:  # the middle of what is shown lies between two rows: none has its colour
+    if panel.canvas.height() % 2:  # a centred line would be blended over two pixel rows
         panel.canvas.resize(panel.canvas.width(), panel.canvas.height() - 1)
         panel._draw()
     image = panel.canvas.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
@@ -322,7 +322,7 @@ def test_zoom_stays_within_the_range_of_floats() -> None:
     assert view.visible_range(-7.0, 99.0) == (-7.0, 4.0)
 
 
-# -- A and B -----------------------------------------------------------------------------------------------
+# -- cursors A and B ---------------------------------------------------------------------------------------
 
 
 def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
@@ -355,7 +355,7 @@ def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     assert panel.canvas.cursors == {}
 
 
-# -- the table ---------------------------------------------------------------------------------------------
+# -- table -------------------------------------------------------------------------------------------------
 
 
 def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, window) -> None:
@@ -411,7 +411,7 @@ def test_table_shows_the_values_of_the_curves(value, words) -> None:
     assert value_text(value) == words
 
 
-# -- adding ------------------------------------------------------------------------------------------------
+# -- adding curves -----------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -490,7 +490,7 @@ def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) 
     assert window.session.watched == []
 
 
-# -- from elsewhere ----------------------------------------------------------------------------------------
+# -- fields from other panels ------------------------------------------------------------------------------
 
 
 def test_field_is_added_by_drag_and_drop() -> None:
@@ -510,7 +510,7 @@ def test_topic_without_known_fields_prompts_for_the_field(panel) -> None:
     assert panel.add.text() == "/odom.x"
 
 
-# -- one over another --------------------------------------------------------------------------------------
+# -- XY mode -----------------------------------------------------------------------------------------------
 
 
 def test_second_curve_is_plotted_against_the_first_in_xy_mode(panel) -> None:
@@ -551,7 +551,7 @@ def test_largest_and_smallest_numbers_are_drawn_in_xy_mode(panel, values) -> Non
     assert len(path[2]) > 1
 
 
-# -- kept, exported ----------------------------------------------------------------------------------------
+# -- saving and exporting ----------------------------------------------------------------------------------
 
 
 def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, window) -> None:
