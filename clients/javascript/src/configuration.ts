@@ -6,13 +6,13 @@ const MODES = ["one2many", "many2one", "many2many"] as const;
 /** Neither side binds; the default mode of nep-js 0.1.1. */
 type Mode = (typeof MODES)[number] | "connect";
 
-/** Connected through a master; made by `Node.hybrid`. */
+/** Connection through a master; returned by `Node.hybrid`. */
 export interface HybridConfiguration {
   readonly kind: "hybrid";
   readonly master: string;
 }
 
-/** Connected to one address without a master; made by `Node.direct`. */
+/** Connection to one address without a master; returned by `Node.direct`. */
 export interface DirectConfiguration {
   readonly kind: "direct";
   readonly ip: string;
@@ -22,7 +22,7 @@ export interface DirectConfiguration {
   readonly wire: "original" | "native";
 }
 
-/** A configuration as programs for nep-js 0.1.1 write it out instead of calling `direct`, `master` or `hybrid`. */
+/** Configuration object of programs for nep-js 0.1.1 that don't call `direct`, `master` or `hybrid`. */
 export interface OriginalConfiguration {
   readonly network: string;
   readonly transport?: string;
@@ -32,18 +32,21 @@ export interface OriginalConfiguration {
   readonly master_ip?: string;
 }
 
-/** How a publisher or subscriber is connected. */
+/** Configuration of how a publisher or subscriber connects. */
 export type Configuration = HybridConfiguration | DirectConfiguration;
 
-/** What a direct connection speaks. */
+/** Wire options of a direct connection. */
 export interface DirectOptions {
-  /** Frames that are sent: `A` (default) for the original NEP up to 0.5.4.5, `B` from 0.5.4.8 on. Both are received. */
+  /**
+   * Generation of the frames sent: `A` (default) for the original NEP up to 0.5.4.5, `B` from 0.5.4.8 on.
+   * Both are received.
+   */
   readonly generation?: Generation;
-  /** `original` (default), or the `native` wire. */
+  /** Wire: `original` (default) or `native`. */
   readonly wire?: "original" | "native";
 }
 
-/** Return a direct configuration. @throws {NepError} for what is no address, port or mode. */
+/** Return a direct configuration. @throws {NepError} if the address, port or mode is invalid. */
 export function directConfiguration(
   ip: string,
   port: number | string,
@@ -66,7 +69,10 @@ export function directConfiguration(
   };
 }
 
-/** Return where a side of a direct connection binds or connects. In `many2many` a proxy of the original NEP binds both ports. */
+/**
+ * Return the endpoint of one side of a direct connection and whether it binds or connects.
+ * In `many2many`, a proxy of the original NEP binds both ports.
+ */
 export function attachment(
   direct: DirectConfiguration,
   isPublisher: boolean,

@@ -1,20 +1,20 @@
-/** Base class of all errors that this package raises. */
+/** Base class of all errors thrown by this package. */
 export class NepError extends Error {
   override get name(): string {
     return this.constructor.name;
   }
 }
 
-/** A topic name that the wire does not allow. */
+/** The topic name is invalid. */
 export class BadTopicError extends NepError {}
 
-/** A node name that the wire does not allow. */
+/** The node name is invalid. */
 export class BadNameError extends NepError {}
 
-/** The codes of {@link WireError}; the vectors in `tests/data/wire` use the same ones. */
+/** Code of a {@link WireError}; the vectors in `tests/data/wire` use the same codes. */
 export type WireErrorCode = string;
 
-/** Bytes that are not a message, a notice or a reply of the native wire. */
+/** Malformed message, notice or reply of the native wire. */
 export class WireError extends NepError {
   /** @param code Stable, machine-readable reason. */
   constructor(
@@ -25,13 +25,13 @@ export class WireError extends NepError {
   }
 }
 
-/** A payload that can't be encoded by the codec of its topic. */
+/** The payload can't be encoded by the codec of its topic. */
 export class EncodeError extends NepError {}
 
-/** A payload that can't be decoded by the codec of its message. */
+/** The payload can't be decoded by the codec of its message. */
 export class DecodeError extends NepError {}
 
-/** No master answered in time. */
+/** No master replied before the timeout. */
 export class MasterUnreachableError extends NepError {
   /** @param address Host and port of the master. */
   constructor(readonly address: string) {
@@ -39,22 +39,22 @@ export class MasterUnreachableError extends NepError {
   }
 }
 
-/** The master or a server did not carry out a request; the message says why. */
+/** The master or a server rejected a request; the message gives the reason. */
 export class RequestRefusedError extends NepError {}
 
 /** The node, publisher, subscriber, client or server is closed. */
 export class ClosedError extends NepError {}
 
-/** No server of the service was reached in time; nothing was sent. */
+/** No server of the service was reached before the timeout; nothing was sent. */
 export class NoServerError extends NepError {}
 
-/** The call was sent and no answer came in time; the server may still carry it out. */
+/** The call was sent, but no reply arrived before the timeout; the server may still execute it. */
 export class ServiceTimeoutError extends NepError {}
 
-/** The server ended while the call was under way; it may or may not have been carried out. */
+/** The server exited during the call, which may or may not have been executed. */
 export class ServerGoneError extends NepError {}
 
-/** The server's callback raised an error. */
+/** The callback of the server threw an error. */
 export class ServiceError extends NepError {
   /**
    * @param kind Class name of the error at the server.

@@ -34,7 +34,7 @@ import { isPattern } from "./wire/pattern.js";
 const LEAVE_S = 0.3;
 const DIRECT_WAIT_MS = 300; // without a master the number of peers is unknown
 
-/** How a node finds its master. */
+/** Options of a node. */
 export interface NodeOptions {
   /** Host and port of the master, such as `192.168.1.10:7780`. Default: `NEP_MASTER`, else `127.0.0.1:7780`. */
   readonly master?: string;
@@ -51,15 +51,15 @@ interface Closable {
 
 const openNodes = new Set<Node>();
 
-// Fires when only unreferenced timers are left: the program has ended, so deliver what is on its way and leave.
+// Emitted when only unreferenced timers are left, at the end of the program: deliver pending messages and leave.
 process.on("beforeExit", () => {
   for (const each of openNodes) void each.close();
 });
 
 /**
- * A program's place in the graph: makes publishers and subscribers, and keeps its lease with the master.
+ * Participant of the graph: creates publishers and subscribers, and renews its lease with the master.
  *
- * A program that only publishes ends when everything is delivered; one that subscribes stays until `close`.
+ * A program that only publishes exits when everything is delivered; one that subscribes runs until `close`.
  * Before `process.exit()`, await `close()`. Problems that no call can report are emitted as the event
  * `warning`, one sentence each; without a listener they go to `process.emitWarning`.
  *
@@ -70,7 +70,7 @@ process.on("beforeExit", () => {
  * for await (const message of node.subscribe("odometry")) console.log(message.payload);
  */
 export class Node extends EventEmitter<{ warning: [string] }> {
-  /** The node's id: 16 hexadecimal digits. */
+  /** Id of the node: 16 hexadecimal digits. */
   readonly id: string;
   private readonly record: NodeRecord;
   private readonly masterOf: string;
@@ -83,7 +83,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
 
   /**
    * @param name 1 to 200 bytes without control characters. Two nodes may have the same name.
-   * @throws {BadNameError | NepError} for a name or address that can't be one.
+   * @throws {BadNameError | NepError} if the name or the master's address is invalid.
    */
   constructor(
     readonly name: string,
@@ -117,7 +117,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   /**
    * Return a publisher that is connected to all registered subscribers: they receive the next message.
    *
-   * @throws {MasterUnreachableError} when no master answers in time.
+   * @throws {MasterUnreachableError} if no master replies before the timeout.
    * @throws {BadTopicError | RequestRefusedError}
    */
   publisher<T = unknown>(topic: string, options: PublisherOptions = {}): Promise<Publisher<T>> {
@@ -251,7 +251,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   // ---- services
 
   /**
-   * Answer the calls of a service. Resolves when the service is registered.
+   * Handle the calls of a service. Resolves when the service is registered.
    *
    * @throws {MasterUnreachableError | BadTopicError | RequestRefusedError}
    */
@@ -262,7 +262,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.makeServer(service, callback as ServiceCallback, this.masterWaitS).ready;
   }
 
-  /** Return a client of a service; there need not be a server yet. */
+  /** Return a client of a service; no server needs to exist yet. */
   client<Request = unknown, Answer = unknown>(service: string, options: ClientOptions = {}): Client<Request, Answer> {
     return this.makeClient<Request, Answer>(service, options);
   }
@@ -316,7 +316,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return client;
   }
 
-  /** Warn when there is no master, and when registering fails. */
+  /** Await a registration; emit a warning if there is no master or the registration fails. */
   private async patiently<R>(session: MasterSession, waitS: number | undefined, registered: Promise<R>): Promise<R> {
     const warnAfter = (): void =>
       this.warn(
@@ -335,7 +335,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
 
   // ---- names of the original NEP
 
-  /** Return a publisher at once. What is published before it is connected waits, also for a master. */
+  /** Return a publisher immediately. Messages are queued until it is connected, also while there is no master. */
   new_pub<T = unknown>(topic: string, type = "json", configuration?: Configuration | OriginalConfiguration): Publisher<T> {
     return this.makePublisher<T>(topic, { type }, undefined, this.configured(configuration));
   }
@@ -345,7 +345,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.new_pub<T>(topic, type, configuration);
   }
 
-  /** Subscribe; `callback` gets each decoded payload. Waits for a master as long as there is none. */
+  /** Subscribe; `callback` receives each decoded payload. Waits for a master without a time limit. */
   new_sub<T = unknown>(
     topic: string,
     type = "json",
@@ -366,7 +366,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.new_sub<T>(topic, type, callback, configuration);
   }
 
-  /** Answer the calls of a service. Waits for a master as long as there is none. */
+  /** Handle the calls of a service. Waits for a master without a time limit. */
   new_server<Request = unknown, Answer = unknown>(
     service: string,
     callback: ServiceCallback<Request, Answer>,
@@ -388,12 +388,12 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   }
 
   /**
-   * Connect to `ip:port` without a master, in the frames of the original NEP unless `options` say otherwise.
+   * Connect to `ip:port` without a master, with the frames of the original NEP unless `options` specify others.
    *
-   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to
-   *   a proxy, subscribers to `port + 1`. Without a mode both connect to `port`, as in nep-js 0.1.1: the other program
-   *   binds it.
-   * @throws {NepError} for what is no address, port or mode.
+   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both
+   *   connect to a proxy, subscribers to `port + 1`. Without a mode both connect to `port`, as in nep-js 0.1.1:
+   *   the other program binds it.
+   * @throws {NepError} if the address, port or mode is invalid.
    */
   direct(
     ip = LOOPBACK,
@@ -409,12 +409,12 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.hybrid(ip);
   }
 
-  // ---- the end
+  // ---- close
 
   /**
-   * Close all publishers and subscribers, deliver what is on its way, and leave the master.
+   * Close all publishers and subscribers, deliver pending messages, and leave the master.
    *
-   * @param timeoutS Seconds to wait for subscribers to take everything. Default: 2.
+   * @param timeoutS Seconds to wait until subscribers have received everything. Default: 2.
    */
   close(timeoutS?: number): Promise<void> {
     this.closed ??= this.finish(timeoutS);
@@ -432,7 +432,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.close();
   }
 
-  /** Begin to close at the end of a `using` block. */
+  /** Start to close at the end of a `using` block. */
   [Symbol.dispose](): void {
     void this.close();
   }

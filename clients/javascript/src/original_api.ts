@@ -1,4 +1,4 @@
-// The exports of nep-js 0.1.1 beside its Node. Their names and the order of their arguments are that package's.
+// Exports of nep-js 0.1.1 other than Node, with the same names and argument order.
 import type { Configuration, OriginalConfiguration } from "./configuration.js";
 import { NepError } from "./errors.js";
 import { Node } from "./node.js";
@@ -10,7 +10,7 @@ const MASTER_PORT = 7000;
 
 const nodes = new Map<string, Node>();
 
-/** Return the node of that name which the classes below share. */
+/** Return the node with this name, shared by the classes below. */
 function nodeNamed(name: string): Node {
   let node = nodes.get(name);
   if (!node || node.isClosed) {
@@ -20,7 +20,7 @@ function nodeNamed(name: string): Node {
   return node;
 }
 
-/** A publisher as nep-js 0.1.1 has it. In new programs use {@link Node.publisher}. */
+/** Publisher with the interface of nep-js 0.1.1. New programs use {@link Node.publisher}. */
 export class publisher<T = unknown> {
   private readonly inner: Publisher<T>;
 
@@ -43,7 +43,7 @@ export class publisher<T = unknown> {
   }
 }
 
-/** A subscriber as nep-js 0.1.1 has it. In new programs use {@link Node.subscribe}. */
+/** Subscriber with the interface of nep-js 0.1.1. New programs use {@link Node.subscribe}. */
 export class subscriber<T = unknown> {
   private readonly inner: Subscriber<T>;
 
@@ -63,7 +63,7 @@ export class subscriber<T = unknown> {
   }
 }
 
-/** A service client with the interface of nep-js 0.1.1, where it never worked. In new programs use {@link Node.client}. */
+/** Service client with the interface of nep-js 0.1.1, where it never worked. Use {@link Node.client} instead. */
 export class client<Request = unknown, Answer = unknown> {
   private readonly inner: Client<Request, Answer>;
 
@@ -75,7 +75,7 @@ export class client<Request = unknown, Answer = unknown> {
     this.inner = nodeNamed(node).client<Request, Answer>(topic);
   }
 
-  /** Call the service; the callback gets its answer. A call that fails is printed, as in nep-js 0.1.1. */
+  /** Call the service; the callback receives the reply. A failed call is logged, as in nep-js 0.1.1. */
   send_info(message: Request): void {
     this.inner.call(message).then(this.callback, (error: unknown) => console.error(error));
   }
@@ -85,23 +85,23 @@ export class client<Request = unknown, Answer = unknown> {
   }
 }
 
-/** What `masterRegister` is given: a REQ socket of `zeromq/v5-compat`. */
+/** REQ socket of `zeromq/v5-compat`, as passed to `masterRegister`. */
 export interface Requester {
   connect(address: string): unknown;
   on(event: "message", listener: (message: Buffer) => void): unknown;
   send(message: string): unknown;
 }
 
-/** The answer of an original master. */
+/** Reply of an original master to a registration. */
 export interface OriginalRegistration {
   readonly ip: string;
   readonly port: number;
 }
 
 /**
- * Register sockets of the program's own with an original master, or with the gateway of `nep master`.
+ * Register the program's own sockets with an original master, or with the gateway of `nep master`.
  *
- * @throws {NepError} if `requester` is no socket of `zeromq/v5-compat`.
+ * @throws {NepError} if `requester` is not a socket of `zeromq/v5-compat`.
  */
 export function masterRegister(
   node: string,

@@ -1,5 +1,5 @@
-// The backpack: stacks of blocks that a person keeps for other files, other Studios and the next start. The window
-// keeps what is in it (`app/core/documents/backpack.py`); all behaviours show the same.
+// Backpack: stacks of blocks kept for other files, other instances of Studio and the next start. The window
+// stores the contents (`app/core/documents/backpack.py`); all behaviours share them.
 import * as Blockly from 'blockly/core';
 import {countBlocks} from './bin';
 import {withoutTypeChecks} from './checker';
@@ -16,7 +16,7 @@ import {withLocalVariableIds} from './own_variables';
 import {t} from './words';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
-/** Room at the left of each stack for the button that takes it out, in units of the sheet. */
+/** Space to the left of each stack for its remove button, in workspace units of the sheet. */
 const GUTTER = 40;
 const BUTTON_SIZE = 30;
 const RETRY_MS = 60;
@@ -37,7 +37,7 @@ let sendRequest: (request: BackpackRequest) => void = () => undefined;
 let button: HTMLButtonElement | null = null;
 const backpacks = new Set<Backpack>();
 
-/** Beside the bin; one for all behaviours. */
+/** Returns the backpack button, which is next to the bin and shared by all behaviours. */
 export function backpackButton(): HTMLButtonElement {
   if (button) return button;
   button = document.createElement('button');
@@ -48,7 +48,7 @@ export function backpackButton(): HTMLButtonElement {
   return button;
 }
 
-/** The button says how many stacks are in it. */
+/** Updates the button's label with the number of stacks. */
 function updateButton(): void {
   const count = contents.length;
   const label = count ? t('Backpack ({count})', {count}) : t('Backpack: stores blocks to use in other files');
@@ -58,25 +58,25 @@ function updateButton(): void {
   button.classList.toggle('nepFull', count > 0);
 }
 
-/** The window says what is in it, the newest first. */
+/** Sets the contents of the backpack, newest first, as reported by the window. */
 export function setBackpackContents(items: readonly BackpackEntry[]): void {
   contents = items;
   updateButton();
   for (const backpack of backpacks) backpack.refresh();
 }
 
-/** Whether letting go there puts it into the backpack. */
+/** Returns true if dropping blocks here adds them to the backpack. */
 export function isOverBackpack({x, y}: {x: number; y: number}): boolean {
   const box = button?.getBoundingClientRect();
   return box !== undefined && box.width > 0 && x >= box.left && x < box.right && y >= box.top && y < box.bottom;
 }
 
-/** Shows that letting go there puts it in. */
+/** Highlights the button while a drop would add the dragged blocks to the backpack. */
 export function highlightBackpack(aims: boolean): void {
   button?.classList.toggle('nepOver', aims);
 }
 
-/** Whether this block is one of the backpack's own. */
+/** Returns true if this block is shown in the backpack's sheet. */
 export function isInBackpack(block: Blockly.Block): boolean {
   return sheetOf(block) instanceof BackpackSheet;
 }
@@ -90,7 +90,7 @@ export function addToBackpack(copied: CopiedItem | CopiedBlocks): void {
   if (blocks.length) sendRequest({do: 'put', blocks, count, notes});
 }
 
-/** The block with what hangs below it, or all blocks that are chosen with it. */
+/** Adds the block and the blocks below it to the backpack, or the whole selection if the block is part of it. */
 function addBlockToBackpack(block: Blockly.BlockSvg): void {
   const selected = getSelectedBlocksWith(block);
   const single = selected.length ? null : stateOf(block, true);
@@ -99,7 +99,7 @@ function addBlockToBackpack(block: Blockly.BlockSvg): void {
   addToBackpack({nepStudio: 'blocks', states: states.filter((state) => state !== null), notes});
 }
 
-/** Once for the page: the menus and the key; `ask` tells the window what is to be done with the backpack. */
+/** Registers the backpack's menu items and shortcut, once per page; `postRequest` sends requests to the window. */
 export function registerBackpack(postRequest: (json: string) => void, getBackpack: () => Backpack): void {
   sendRequest = (request) => postRequest(JSON.stringify(request));
   const canAddToBackpack = (block: Blockly.BlockSvg | null | undefined): block is Blockly.BlockSvg =>
@@ -121,7 +121,7 @@ export function registerBackpack(postRequest: (json: string) => void, getBackpac
   });
 }
 
-/** A stack that can't be made here, whatever is wrong with it, is shown grey and kept as it is. */
+/** Inflater that shows a stack which can't be created as a grey placeholder and keeps its state unchanged. */
 class TolerantBlockInflater extends Blockly.BlockFlyoutInflater {
   override createBlock({kind, ...state}: BlockInfo, workspace: Blockly.WorkspaceSvg): Blockly.BlockSvg {
     const before = new Set(workspace.getTopBlocks(false));
@@ -171,7 +171,7 @@ class BackpackSheet extends Sheet {
     if (id !== undefined) sendRequest({do: 'remove', id});
   }
 
-  /** Shows what is in it; what was scrolled to stays in sight, and the keys stay at their place. */
+  /** Renders the contents; keeps the scroll position and the focused place. */
   renderContents(): void {
     const flyoutWorkspace = this.getWorkspace();
     const focusedIndex = this.isVisible() ? this.focusedPlace : -1;
@@ -210,13 +210,13 @@ class BackpackSheet extends Sheet {
     return t('Close the backpack');
   }
 
-  /** Which of its stacks has the keys; -1: none. */
+  /** Index of the focused stack, or -1. */
   private get focusedPlace(): number {
     const block = focusedBlock()?.getRootBlock();
     return block ? [...this.ids.keys()].indexOf(block as Blockly.BlockSvg) : -1;
   }
 
-  /** By keys it is Delete, or the menu. */
+  /** Creates the remove button of a stack; hidden from screen readers, since Delete and the menu do the same. */
   private createRemoveButton(block: Blockly.BlockSvg): SVGGElement {
     const group = document.createElementNS(SVG_NS, 'g');
     group.setAttribute('class', 'nepTakeOut');
@@ -230,7 +230,7 @@ class BackpackSheet extends Sheet {
     drawIcon(icon, 'x', 18);
     icon.setAttribute('transform', 'translate(6, 6)');
     group.append(title, back, icon);
-    // The press is not the block's.
+    // Keeps the press from starting a drag of the block.
     group.addEventListener('pointerdown', (event) => {
       event.stopPropagation();
       event.preventDefault();
@@ -243,7 +243,7 @@ class BackpackSheet extends Sheet {
   }
 }
 
-/** The backpack as one behaviour shows it. */
+/** View of the backpack in one behaviour. */
 export class Backpack {
   private sheet: BackpackSheet | null = null;
   private timer = 0;
@@ -258,7 +258,7 @@ export class Backpack {
     disposeSheet(this.sheet);
   }
 
-  /** Opens the sheet, or closes it; `byKey`: the keys go to what is on top. */
+  /** Opens or closes the sheet; `byKey` moves the focus to the first stack. */
   toggle(byKey: boolean): void {
     const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
@@ -271,7 +271,7 @@ export class Backpack {
     sendRequest({do: 'look'});
   }
 
-  /** There are other things in it: an open sheet shows them, but not while the mouse holds one of them. */
+  /** Re-renders an open sheet after the contents changed, but not during a drag, which may hold one of its blocks. */
   refresh(): void {
     window.clearTimeout(this.timer);
     if (!this.sheet?.isVisible()) return;
@@ -285,7 +285,7 @@ export class Backpack {
     return sheet;
   }
 
-  /** Lays a copy free on the canvas, where it can be seen; it stays in the backpack. */
+  /** Adds a copy to the visible part of the canvas; the original stays in the backpack. */
   private addToWorkspace(block: Blockly.BlockSvg): void {
     const copied = stateOf(block, true);
     this.sheet?.hide();

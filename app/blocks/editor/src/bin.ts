@@ -1,18 +1,18 @@
-// What was deleted in a behaviour while it is open: it waits in the bin, newest first, and can be taken back.
+// Bin: the blocks deleted while a behaviour is open, newest first, which can be restored.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {Sheet, disposeSheet, createSheet} from './sheet';
 import {t} from './words';
 
 const MAX_ENTRIES = 50;
-/** Deletions that belong together come within this time. */
+/** Deletions within this time are reported together. */
 const DEBOUNCE_MS = 60;
 const SPACING = 40;
 const MAX_TRIES = 40;
 
 type State = Blockly.serialization.blocks.State;
 
-/** The bin's own part of the page: a button beside those for the zoom, one for all behaviours. */
+/** Bin button next to the zoom buttons, shared by all behaviours. */
 let button: HTMLButtonElement | null = null;
 
 export function binButton(): HTMLButtonElement {
@@ -24,7 +24,7 @@ export function binButton(): HTMLButtonElement {
   return button;
 }
 
-/** The button takes blocks that are dropped on it. */
+/** Delete area at the button. */
 class BinArea extends Blockly.DeleteArea {
   override id = 'nepBin';
 
@@ -34,7 +34,7 @@ class BinArea extends Blockly.DeleteArea {
   }
 }
 
-/** The sheet with what was deleted. */
+/** Sheet that shows the deleted blocks. */
 class BinSheet extends Sheet {
   onPick: (id: string) => void = () => undefined;
 
@@ -48,19 +48,19 @@ class BinSheet extends Sheet {
 }
 
 export interface BinListener {
-  /** A person has deleted so many blocks at once. */
+  /** Called when the user has deleted this number of blocks in one action. */
   deleted(count: number): void;
-  /** There is another number of deletions in the bin. */
+  /** Called when the number of entries has changed. */
   changed(): void;
 }
 
 export class Bin {
-  /** The oldest first. */
+  /** Deleted blocks, oldest first. */
   private entries: State[] = [];
-  /** What was taken out again: deleted once more it comes back here, even by Redo. */
+  /** Restored entries by block id: such a block returns to the bin when it is deleted again, even by Redo. */
   private readonly restored = new Map<string, State>();
   private readonly creationGroups = new Map<string, string>();
-  /** What goes to another behaviour. */
+  /** Ids of blocks that are being moved to another behaviour. */
   private readonly moves = new Set<string>();
   private last = {group: '', ids: [] as string[], count: 0};
   private timer = 0;
@@ -87,7 +87,7 @@ export class Bin {
     return this.entries.length;
   }
 
-  /** Another program is here. */
+  /** Empties the bin when another program is loaded. */
   clear(): void {
     this.entries = [];
     this.restored.clear();
@@ -102,12 +102,12 @@ export class Bin {
     disposeSheet(this.sheet);
   }
 
-  /** This block goes to another behaviour: its deletion here is no loss. */
+  /** Marks a block that moves to another behaviour, so that its deletion here isn't recorded. */
   markAsMoved(id: string): void {
     this.moves.add(id);
   }
 
-  /** Shows over the toolbox, or on the button, that letting go here deletes; null: it does not. */
+  /** Shows over the toolbox or on the button that dropping here deletes; null hides the hint. */
   showHint(mouse: Blockly.utils.Coordinate | null): void {
     const onButton = mouse !== null && this.area.getClientRect()?.contains(mouse.x, mouse.y) === true;
     this.hint.style.width = `${this.workspace.getMetricsManager().getAbsoluteMetrics().left}px`;
@@ -115,7 +115,7 @@ export class Bin {
     binButton().classList.toggle('nepOver', onButton);
   }
 
-  /** Opens the sheet, or closes it; `byKey`: the keys go to what was deleted last. */
+  /** Opens or closes the sheet; `byKey` moves the focus to the latest deletion. */
   toggle(byKey: boolean): void {
     const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
@@ -127,15 +127,15 @@ export class Bin {
     if (byKey) sheet.focusFirst();
   }
 
-  /** What was deleted last comes back to where it was. */
+  /** Restores the last deletion in place; returns true if the undo stack can do it instead. */
   undoLast(): boolean {
     const stack = this.workspace.getUndoStack();
-    if (stack[stack.length - 1]?.group === this.last.group) return true;  // undo does it
+    if (stack[stack.length - 1]?.group === this.last.group) return true;  // undo restores them
     for (const id of this.last.ids) this.restore(id, true);
     return false;
   }
 
-  /** Puts it on the canvas again: at its place (`exactly`), or where it can be seen and covers nothing. */
+  /** Restores a deleted block: at its old position if `exactly`, otherwise in view at a free position. */
   restore(id: string, exactly = false): void {
     const state = this.entries.find((entry) => entry.id === id);
     this.sheet?.hide();
@@ -210,10 +210,10 @@ export class Bin {
     const id = event.blockId ?? '';
     const state = event.oldJson;
     if (this.moves.delete(id)) return;
-    // A mend that hangs what was in it elsewhere has arranged the blocks; who wants them back undoes it.
+    // A fix that reconnects the child blocks elsewhere only rearranges them; Undo reverts it.
     if (!state || event.wasShadow || idsOf({...state, id}).some((blockId) => this.workspace.getBlockById(blockId))) return;
     const wasRestored = this.restored.delete(id);
-    // What never was more than a block in the hand is no loss, and an undone addition can be done again.
+    // A block discarded in the drag that created it is no loss, and Redo repeats an undone addition.
     const loss = event.recordUndo && (this.creationGroups.get(id) !== event.group || !event.group);
     this.creationGroups.delete(id);
     if (!loss && !wasRestored) return;
@@ -237,13 +237,13 @@ export class Bin {
   }
 }
 
-/** The block, those in it and those below it. */
+/** Returns the ids of the block, of the blocks inside it and of those below it. */
 function idsOf({id, inputs, next}: State): string[] {
   const inputBlocks = Object.values(inputs ?? {}).map((input) => input.block);
   return [id ?? '', ...[...inputBlocks, next?.block].flatMap((child) => child ? idsOf(child) : [])];
 }
 
-/** How many blocks a person sees in it: the grey values in the gaps are part of what holds them. */
+/** Returns the number of blocks without shadow blocks, which count as part of their parent. */
 export function countBlocks(state: State): number {
   const inputBlocks = Object.values(state.inputs ?? {}).map((input) => input.block);
   return [...inputBlocks, state.next?.block].reduce((sum, child) => sum + (child ? countBlocks(child) : 0), 1);

@@ -1,18 +1,19 @@
-// Where Blockly does work again and again that a page with a thousand blocks feels, done once or later.
+// Performance patches: work that Blockly repeats, noticeable with a thousand blocks, is cached or deferred.
 import * as Blockly from 'blockly/core';
 import {ensureDrawn} from './culling';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
 
-// ---- moving a block in the page keeps the keys on it
+// ---- moving an element without losing the focus
 
 interface WithMoveBefore {
   moveBefore?(node: Node, child: Node | null): void;
 }
 
 /**
- * A block that is put elsewhere in the page loses the keys, so Blockly gives them back, and each time the page is
- * laid out at once: five times for one drop. A web engine that can move an element as it is (since 2025) need not.
+ * Moves a connected element with `moveBefore()` where the browser has it (since 2025), which preserves the
+ * focus. Re-inserting a block loses the focus; Blockly then restores it and forces a layout each time, five
+ * times per drop.
  */
 const originalAppendChild = SVGElement.prototype.appendChild;
 SVGElement.prototype.appendChild = function <T extends Node>(this: SVGElement & WithMoveBefore, child: T): T {
@@ -24,8 +25,8 @@ SVGElement.prototype.appendChild = function <T extends Node>(this: SVGElement & 
 };
 
 /**
- * Before the next picture Blockly puts what lies over a block below it, one by one. Who copies several times within
- * one picture, by a key that is held, would lose the keys with the newest copy.
+ * The same for `insertBefore()`. Before the next frame Blockly reorders overlapping blocks one by one; several
+ * pastes within one frame (a held key) would lose the focus with the newest copy.
  */
 const originalInsertBefore = SVGElement.prototype.insertBefore;
 SVGElement.prototype.insertBefore = function <T extends Node>(this: SVGElement & WithMoveBefore, child: T, before: Node | null): T {
@@ -36,7 +37,7 @@ SVGElement.prototype.insertBefore = function <T extends Node>(this: SVGElement &
   return originalInsertBefore.call(this, child, before) as T;
 };
 
-// ---- who has the keys
+// ---- keyboard focus
 
 interface FocusManagerInternals {
   focusNode(node: Blockly.IFocusableNode): void;
@@ -44,7 +45,7 @@ interface FocusManagerInternals {
   setNodeToVisualPassiveFocus(node: Blockly.IFocusableNode): void;
 }
 
-/** The elements that carry one of Blockly's two marks, or did. Blockly looks through the whole page for them. */
+/** Elements that have or had one of Blockly's focus classes. Blockly searches the whole page for them. */
 const markedElements = new Set<Element>();
 const FOCUS_CLASSES = [Blockly.FocusManager.ACTIVE_FOCUS_NODE_CSS_CLASS_NAME,
   Blockly.FocusManager.PASSIVE_FOCUS_NODE_CSS_CLASS_NAME];
@@ -61,7 +62,7 @@ for (const name of ['setNodeToVisualActiveFocus', 'setNodeToVisualPassiveFocus']
 const originalFocusNode = focusManager.focusNode;
 focusManager.focusNode = function (node) {
   const element = node.canBeFocused() ? node.getFocusableElement() : null;
-  ensureDrawn(element);  // what is not drawn cannot have the keys
+  ensureDrawn(element);  // only a rendered element can have the focus
   if (node instanceof Blockly.Field && pendingAria.delete(node as AriaTarget)) node.recomputeAriaContext();
   originalFocusNode.call(this, node);
 };
@@ -83,7 +84,7 @@ Blockly.FocusableTreeTraverser.findFocusedNode = function (tree) {
   return null;
 };
 
-/** Blockly asks each block whether the element is its own. */
+/** Finds a block by its element instead of checking every block as Blockly does. */
 const originalLookUpFocusableNode = Blockly.WorkspaceSvg.prototype.lookUpFocusableNode;
 Blockly.WorkspaceSvg.prototype.lookUpFocusableNode = function (id) {
   if (!/_(field|connection)_/.test(id)) {
@@ -94,9 +95,9 @@ Blockly.WorkspaceSvg.prototype.lookUpFocusableNode = function (id) {
   return originalLookUpFocusableNode.call(this, id);
 };
 
-// ---- a block that is taken with the keys and hangs on nothing lies as far from the edge as a hand would put it
+// ---- position of a new block that was added by keyboard and isn't connected
 
-/** The signs at the left of a block are 20 wide. */
+/** Distance from the edge in workspace units; fits the signs at the left of a block, which are 20 wide. */
 const NEW_BLOCK_MARGIN = 48;
 
 interface BlockDragStrategyInternals {
@@ -110,19 +111,19 @@ dragStrategy.positionNewBlock = function (from, newBlock) {
   originalPositionNewBlock.call(this, from, newBlock);
 };
 
-// ---- the width of words
+// ---- width of text
 
 interface FieldInternals {
   textElement_: SVGTextElement | null;
   updateSize_(margin?: number): void;
 }
 
-/** While blocks are loaded: the font of each class of text. */
+/** Font of each CSS class of text, cached while blocks are loaded. */
 const fonts = new Map<string, {size: string; weight: string; family: string}>();
 
 /**
- * Blockly asks for the style of each new text, and each time the page works out anew the styles of all that was added.
- * All text of a class has one font, so it is asked once a load; what was measured is in Blockly's own cache then.
+ * Reads the font once per class and load. Blockly calls getComputedStyle() for each new text, which recalculates
+ * the style of all added elements; measured widths are in Blockly's own cache afterwards.
  */
 const fieldPrototype = Blockly.Field.prototype as unknown as FieldInternals;
 const originalUpdateSize = fieldPrototype.updateSize_;
@@ -142,20 +143,20 @@ function fontOf(text: SVGTextElement): {size: string; weight: string; family: st
   return {size: fontSize, weight: fontWeight, family: fontFamily};
 }
 
-// ---- words for screen readers
+// ---- labels for screen readers
 
 type AriaTarget = (Blockly.Field | Blockly.BlockSvg) & HasAriaContext;
 
-/** Blockly keeps a block's to itself. */
+/** Method of blocks that Blockly doesn't export. */
 interface HasAriaContext {
   recomputeAriaContext(): boolean | void;
 }
 
-/** Those whose words are not made yet: they are when nothing else is to be done, or when the keys come to them. */
+/** Targets whose ARIA labels are pending: computed when the page is idle, or when the target gets the focus. */
 const pendingAria = new Set<AriaTarget>();
 let deferDepth = 0;
 
-/** While `load` makes blocks, their words for screen readers wait and the fonts of texts are asked once. */
+/** Defers ARIA labels and caches fonts while `load` creates blocks. */
 export function withDeferredAria<T>(load: () => T): T {
   deferDepth += 1;
   try {
@@ -177,7 +178,7 @@ function scheduleAriaUpdate(): void {
 }
 
 function updatePendingAria(idle: IdleDeadline): void {
-  if (Blockly.Gesture.inProgress()) {  // nothing comes between a hand and its block
+  if (Blockly.Gesture.inProgress()) {  // never delay a drag
     window.setTimeout(scheduleAriaUpdate, GESTURE_RETRY_MS);
     return;
   }
@@ -194,7 +195,7 @@ function updatePendingAria(idle: IdleDeadline): void {
 
 const recomputeFieldAria = Blockly.Field.prototype.recomputeAriaContext;
 Blockly.Field.prototype.recomputeAriaContext = function () {
-  if (!this.getSvgRoot()) return false;  // before it is drawn Blockly throws an error here, and catches it
+  if (!this.getSvgRoot()) return false;  // before the field is rendered, Blockly throws an error here and catches it
   if (!deferDepth) return recomputeFieldAria.call(this);
   pendingAria.add(this);
   return false;
@@ -207,7 +208,7 @@ blockPrototype.recomputeAriaContext = function () {
   else recomputeBlockAria.call(this);
 };
 
-// ---- the arrow of a drop-down, a picture of its own in Blockly, which the page fetches and decodes for each
+// ---- arrow of drop-downs: a path instead of Blockly's image, which is fetched and decoded for each field
 
 const ARROW_PATH = 'M6 9.21a1.35 1.35 0 0 1-.94-.4L1.34 5.11a1.36 1.36 0 0 1 0-1.89c.53-.53 8.79-.53 9.32 0a1.36 1.36 0 0 1' +
   ' 0 1.89L6.96 8.81A1.35 1.35 0 0 1 6 9.21Z';
@@ -224,7 +225,7 @@ interface DropdownInternals {
   this.fieldGroup_?.append(this.svgArrow);
 };
 
-// ---- what a gap offers when it is empty: as JSON only, Blockly writes XML as well that nobody reads
+// ---- shadow blocks of empty inputs: saved as JSON only; Blockly writes XML as well, which is never read
 
 interface ConnectionInternals {
   shadowState: unknown;

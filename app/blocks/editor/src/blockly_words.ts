@@ -1,5 +1,5 @@
-// What Blockly itself shows or has read aloud, in our words: its own catalogue says "comment" where we say "note",
-// and is English in most languages. `tests/test_words_core.py` holds that nothing of what the bundle asks for is missing.
+// Our messages for Blockly's own text and screen reader labels. Blockly's catalogue differs from our terms
+// ("comment" for "note") and is English in most languages. `tests/test_words_core.py` checks for missing ones.
 import * as Blockly from 'blockly/core';
 import {lazy, t} from './words';
 
@@ -108,7 +108,7 @@ const MESSAGES: Readonly<Record<string, string>> = {
   SPACE_KEY: lazy('Space'),
 };
 
-/** Gives Blockly our words; its own stay where nobody has translated ours. */
+/** Replaces Blockly's messages with ours; without a translation of ours, Blockly's own message stays. */
 export function setBlocklyMessages(language: string): void {
   for (const [key, english] of Object.entries(MESSAGES)) {
     if (language === 'en' || t(english) !== english) Blockly.Msg[key] = t(english);

@@ -1,5 +1,5 @@
-// "Pause here": before such a block the program pauses. Kept in the block's data, which a Studio that knows no
-// breakpoints writes back as they are.
+// Breakpoints ("Pause here"): the program pauses before such a block. Stored in the block's data, which
+// versions of Studio without breakpoints preserve.
 import * as Blockly from 'blockly/core';
 import {drawIcon} from './icons';
 import {t} from './words';
@@ -22,12 +22,12 @@ export function hasBreakpoint(block: Blockly.Block): boolean {
   return dataOf(block)['pause'] === true;
 }
 
-/** Only what is done one after the other can be paused before. */
+/** Returns true for statement blocks; the program can't pause before a value. */
 export function canHaveBreakpoint(block: Blockly.Block): boolean {
   return block.previousConnection !== null;
 }
 
-/** One step of undo. */
+/** Undoable change of a block's breakpoint. */
 class BreakpointChange extends Blockly.Events.BlockBase {
   override type = 'nep_breakpoint';
 
@@ -45,7 +45,7 @@ class BreakpointChange extends Blockly.Events.BlockBase {
     const before = block.data;
     block.data = forward ? this.to : this.from;
     updateBreakpointMark(block);
-    Blockly.Events.fire(new BreakpointChange(block, before, block.data));  // undo itself is told to nobody
+    Blockly.Events.fire(new BreakpointChange(block, before, block.data));  // undo alone notifies no listeners
   }
 }
 

@@ -1,4 +1,4 @@
-// Sentences beside blocks: what failed, what a person is warned of.
+// Message bubbles beside blocks: errors and warnings.
 import * as Blockly from 'blockly/core';
 import {visibleBlockOf} from './folding';
 import {drawIcon} from './icons';
@@ -10,11 +10,11 @@ const SVG_NS = 'http://www.w3.org/2000/svg';
 const BUBBLE_WIDTH = 300;
 const GAP = 14;
 const VIEW_MARGIN = 8;
-/** A block's first row: a bubble of a long script stands by it. */
+/** Height of a block's first row: the bubble of a tall block is placed next to it. */
 const FIRST_ROW_HEIGHT = 64;
-/** The scrollbar, in pixels of the page. */
+/** Width of the scrollbar, in pixels of the page. */
 const SCROLLBAR_WIDTH = 15;
-/** Below this scale a sentence does not shrink any more. */
+/** Workspace scale below which bubbles stop shrinking. */
 const MIN_SCALE = 0.8;
 
 type TipSide = 'left' | 'top' | 'bottom';
@@ -28,7 +28,7 @@ interface Bubble {
 }
 const ICONS: Readonly<Record<BubbleKind, string>> = {error: 'circle-x', warning: 'triangle-alert'};
 
-/** One bubble a block, beside it and wholly in sight; it scales with the workspace, but not below what can be read. */
+/** One bubble per block, beside the block and fully in view; scales with the workspace down to a readable size. */
 export class Bubbles {
   private contents: ReadonlyMap<string, BubbleContent> = new Map();
   private readonly bubbles = new Map<string, Bubble>();
@@ -36,13 +36,13 @@ export class Bubbles {
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {}
 
-  /** Exactly these from now on, by the block's id. */
+  /** Replaces all bubbles; keys are block ids. */
   setContents(contents: ReadonlyMap<string, BubbleContent>): void {
     this.contents = contents;
     this.update();
   }
 
-  /** Blocks have moved or changed; a workspace without bubbles costs nothing. */
+  /** Schedules an update after blocks moved or changed; does nothing without bubbles. */
   scheduleUpdate(): void {
     if (this.placing || !(this.contents.size || this.bubbles.size)) return;
     this.placing = window.requestAnimationFrame(() => {
@@ -67,7 +67,7 @@ export class Bubbles {
     }
   }
 
-  /** At the right of its block; where the page ends there, below or above it: whole, and large enough to read. */
+  /** Positions a bubble to the right of its block, or below or above the block if there is no space. */
   private positionBubble(bubble: Bubble, block: Blockly.BlockSvg): void {
     const scale = this.workspace.getAbsoluteScale();
     const grown = Math.max(1, MIN_SCALE / scale);
@@ -77,7 +77,7 @@ export class Bubbles {
     const position = block.getRelativeToSurfaceXY();
     const row = Math.min(block.height, FIRST_ROW_HEIGHT);
     const isInSight = position.x < view.right && position.x + block.width > view.left && position.y < view.bottom && position.y + row > view.top;
-    // Not in part below the toolbox or its blocks, where its sentence is cut off.
+    // Hidden if its block is covered by the toolbox or flyout, which would cut the text off.
     bubble.group.style.visibility = isInSight ? '' : 'hidden';
     const clamp = (value: number, min: number, max: number) => isInSight ? Math.max(min, Math.min(max, value)) : value;
     const rightX = position.x + block.width + GAP;
@@ -93,7 +93,7 @@ export class Bubbles {
     bubble.group.setAttribute('transform', `translate(${x}, ${top}) scale(${grown})`);
   }
 
-  /** What of the workspace can be seen, without what the toolbox and its blocks cover. */
+  /** Returns the visible part of the workspace, without the area under the toolbox and flyout. */
   private visibleRect(): Blockly.utils.Rect {
     const scale = this.workspace.getAbsoluteScale();
     const view = this.workspace.getMetricsManager().getViewMetrics(true);
@@ -137,7 +137,7 @@ export class Bubbles {
   }
 }
 
-/** A rounded box with a small tip: at its left, or near its left corner above or below. */
+/** Returns the path of a rounded box with a tip at the left, or near the left corner at the top or bottom. */
 function bubblePath(width: number, height: number, tip: TipSide): string {
   const w = width - 16;
   const h = height - 16;

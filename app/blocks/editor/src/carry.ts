@@ -1,4 +1,4 @@
-// Chosen blocks and notes that go somewhere together: taken out of their scripts, which close behind them, and moved by one hand.
+// Dragging selected blocks and notes as a group: they are detached from their scripts, which close.
 import * as Blockly from 'blockly/core';
 
 type Block = Blockly.BlockSvg;
@@ -8,7 +8,7 @@ type Point = Blockly.utils.Coordinate;
 
 const {Coordinate} = Blockly.utils;
 
-/** Makes blocks that hang below each other a script of their own; what it returns puts them back. */
+/** Detaches consecutive blocks from their script; returns a function that puts them back. */
 export function detachRun(run: readonly Block[]): () => void {
   const [head, tail] = [run[0]!, run[run.length - 1]!];
   const above = (head.previousConnection ?? head.outputConnection)?.targetConnection ?? null;
@@ -28,7 +28,7 @@ export function detachRun(run: readonly Block[]): () => void {
   };
 }
 
-/** Deletes them; the scripts that they were in close. */
+/** Deletes blocks and notes; the scripts that contained them close. */
 export function removeAll(runs: readonly Block[][], notes: readonly Note[]): void {
   for (const run of runs) {
     detachRun(run);
@@ -37,7 +37,7 @@ export function removeAll(runs: readonly Block[][], notes: readonly Note[]): voi
   for (const note of notes) note.dispose();
 }
 
-/** The first is in the hand, the others keep their places beside it. */
+/** Group of dragged items: Blockly drags the head, the others follow at a constant distance. */
 export class DraggedGroup {
   readonly head: Item;
   private readonly others: {item: Item; from: Point}[];
@@ -64,25 +64,25 @@ export class DraggedGroup {
     for (const {item, from} of this.others) item.moveDuringDrag(Coordinate.sum(from, by));
   }
 
-  /** Where they are let go; undo takes back the whole way. */
+  /** Ends the drag at the drop position; undo reverts the whole move. */
   end(by: Point): void {
     this.returnToStart();
     for (const {item} of this.others) item.moveBy(by.x, by.y, ['drag']);
   }
 
-  /** The head is gone already. Undo brings them back to where they were taken. */
+  /** Deletes the other items after the head was deleted. Undo restores them at their start positions. */
   remove(): void {
     this.returnToStart();
     for (const {item} of this.others) item.dispose(false);
   }
 
-  /** As if nobody had touched them. */
+  /** Cancels the drag and reconnects all items as before. */
   revert(): void {
     this.returnToStart();
     for (const restore of [...this.putBack].reverse()) restore();
   }
 
-  /** Nobody is told of the way: it was only in the hand. */
+  /** Moves the items back to their start positions without events. */
   private returnToStart(): void {
     Blockly.Events.disable();
     for (const {item, from} of this.others) {

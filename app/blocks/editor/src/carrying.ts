@@ -1,5 +1,5 @@
-// Blocks or a note carried out of the page: the window sees where they are, and may take them to another behaviour.
-// When it shows another behaviour while they are held, they stay in the hand: back on the page, they are dragged there.
+// Dragging blocks or a note out of the page: the window follows the mouse and can move them to another
+// behaviour. If it shows that behaviour meanwhile, the drag continues there once the mouse is back on the page.
 import * as Blockly from 'blockly/core';
 import {countBlocks} from './bin';
 import {removeAll} from './carry';
@@ -12,44 +12,44 @@ import type {Tab} from './tab';
 
 type Point = Blockly.utils.Coordinate;
 
-/** What is in the hand. It is where it was before once it is let go outside of the page. */
+/** Items dragged out of the page. Dropped outside, they return to their original place. */
 export interface OutgoingDrag {
   copied: CopiedItem | CopiedBlocks;
-  /** How it goes to another behaviour: what comes from the toolbox was never here. */
+  /** Transfer to the other behaviour; blocks from the toolbox are `added`. */
   how: 'moved' | 'copied' | 'added';
-  /** The blocks at the top of what goes; none: it is a note. */
+  /** Top blocks of the dragged stacks; empty for a note. */
   heads: Blockly.BlockSvg[];
   place: Point;
-  /** Where the mouse holds it, from the corner of the first, in units of the canvas. */
+  /** Offset of the mouse from the corner of the first item, in workspace units. */
   grip: Point;
   isGone(): boolean;
-  /** Takes it away from where it is; its stack closes behind it. */
+  /** Deletes the originals; the stack around them closes. */
   remove(): void;
 }
 
 export interface CrossTabDragListener {
-  /** Something in the hand, of the behaviour `home`, is outside of the page there; not `out`: it is not any more. */
+  /** Called when items of the behaviour `home` are dragged outside the page; `out` is false when that ends. */
   carried(x: number, y: number, out: boolean, home: string): void;
-  /** How it looks, as a `data:` URL of a PNG with so many pixels in one of the page. */
+  /** Called with the drag image, a `data:` URL of a PNG with `ratio` image pixels per pixel of the page. */
   pictured(data: string, ratio: number): void;
-  /** It was let go there. */
+  /** Called when the items are dropped outside the page. */
   dropped(x: number, y: number): void;
-  /** So many blocks of the behaviour `from` are in the one that shows now; 0: it was a note. */
+  /** Called when `count` blocks have arrived from the behaviour `from`; 0 for a note. */
   brought(count: number, how: string, from: string): void;
 }
 
 interface UndoStep {
   tab: Tab;
   group: string;
-  /** The same without undo, when other edits came later. */
+  /** Reverts the change by an edit, used if the undo stack has later edits. */
   otherwise(): void;
 }
 
-/** What was held when another behaviour came to show: the mouse is still pressed. */
+/** Drag that continues after a switch to another behaviour while the mouse button is pressed. */
 interface HeldDrag {
   from: Tab;
   what: OutgoingDrag;
-  /** It lies on the page of the behaviour that shows, and is dragged there. */
+  /** Copy that is dragged in the shown behaviour, or null while the mouse is outside the page. */
   visit: VisitingCopy | null;
 }
 
@@ -57,11 +57,11 @@ interface VisitingCopy {
   tab: Tab;
   made: Item[];
   group: string;
-  /** The variables that were there before. */
+  /** Ids of the variables that existed before. */
   variables: ReadonlySet<string>;
 }
 
-/** How large a picture of what is carried is at most, in pixels of the page. */
+/** Maximum size of the drag image, in pixels of the page. */
 const MAX_PICTURE_WIDTH = 360;
 const MAX_PICTURE_HEIGHT = 240;
 
@@ -69,7 +69,7 @@ export function isOutsideViewport({x, y}: Point): boolean {
   return x < 0 || y < 0 || x >= window.innerWidth || y >= window.innerHeight;
 }
 
-/** What would leave the page with this; null: it stays. */
+/** Returns the drag of an item out of the page, or null if the item can't leave the page. */
 export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: boolean, mouse: Point): OutgoingDrag | null {
   const isOne = item instanceof Blockly.BlockSvg || item instanceof Blockly.comments.RenderedWorkspaceComment;
   const copied = isOne ? stateOf(item, true) : null;
@@ -87,7 +87,7 @@ export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: 
   };
 }
 
-/** The same of blocks and notes that were chosen together. */
+/** Returns the drag of selected blocks and notes out of the page. */
 export function createOutgoingGroupDrag(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean, mouse: Point): OutgoingDrag | null {
   const heads = runs.flatMap(([head]) => head ?? []);
   const first = heads[0] ?? notes[0];
@@ -109,21 +109,21 @@ export class CrossTabDrag {
   private frame = 0;
   private isReported = false;
   private pendingDrop: {tab: Tab; what: OutgoingDrag} | null = null;
-  /** What undoes the last one, the other behaviour first. */
+  /** Undo steps of the last drop, the target behaviour first. */
   private steps: UndoStep[] = [];
 
   private hand: HeldDrag | null = null;
-  /** Another behaviour comes to show, or what visits one goes: the ends of drags that follow are none of a person's. */
+  /** True while the tab is switched or a visiting copy is removed: drags that end then were not ended by the user. */
   private turning = false;
-  /** The newest picture that was asked for. */
+  /** Number of the latest requested drag image. */
   private picture = 0;
 
   constructor(private readonly window: CrossTabDragListener, private readonly getActiveTab: () => Tab) {}
 
-  /** Where the mouse is with these in the hand, while that is outside; told once in a frame. */
+  /** Tracks the mouse outside the page and notifies the window at most once per frame; null when it is back inside. */
   trackOutside(mouse: Point | null, items: readonly Item[] = []): void {
     if (this.turning) return;
-    if (mouse && this.hand?.visit) window.setTimeout(() => this.endVisit());  // not in the middle of its drag
+    if (mouse && this.hand?.visit) window.setTimeout(() => this.endVisit());  // only after the current drag event has been handled
     if (mouse && !this.mouse && items.length) void this.updateDragImage(items);
     this.mouse = mouse;
     if (mouse) this.frame ||= window.requestAnimationFrame(() => this.notifyPosition());
@@ -141,13 +141,13 @@ export class CrossTabDrag {
     this.window.dropped(Math.round(mouse.x), Math.round(mouse.y));
   }
 
-  /** Shows another behaviour. What is held outside of the page goes back to where it was, and stays in the hand. */
+  /** Shows another behaviour. Items dragged outside the page return to their place, but the drag continues. */
   switchTab(show: () => void): void {
     if (this.hand?.visit) this.endVisit();
     this.runWhileSwitching(show);
   }
 
-  /** A drag on the page has ended; that of a visitor has brought it here, or it is where it was. */
+  /** Handles the end of a drag on the page; completes the transfer if a visiting copy was dropped. */
   dragEnded(isPlaced: boolean, copies: boolean): void {
     const {hand} = this;
     if (this.turning || !hand?.visit) return;
@@ -157,7 +157,7 @@ export class CrossTabDrag {
     this.stopHolding();
     const how = copies && what.how === 'moved' ? 'copied' : what.how;
     const removes = how === 'moved' && !what.isGone();
-    if (tab === from) {  // it came back by a detour
+    if (tab === from) {  // back in the original behaviour
       if (removes) withEventGroup(group, what.remove);
       return;
     }
@@ -166,7 +166,7 @@ export class CrossTabDrag {
     this.window.brought(countCopiedBlocks(what.copied), how, from.key);
   }
 
-  /** Lays it free on the canvas of `to`, in sight and selected, and takes it away where it was. */
+  /** Inserts the dropped items into the visible part of `to`, selected; deletes the originals of a move. */
   dropInto(to: Tab): void {
     const {pendingDrop: held} = this;
     this.pendingDrop = null;
@@ -178,7 +178,7 @@ export class CrossTabDrag {
     this.window.brought(countCopiedBlocks(what.copied), what.how, from.key);
   }
 
-  /** Undoes the last `bring`, in both behaviours, after the edits of this frame have reached the lists of edits. */
+  /** Undoes the last drop in both behaviours, once this frame's edits have been added to the undo stacks. */
   undoDrop(): void {
     const {steps} = this;
     this.steps = [];
@@ -191,7 +191,7 @@ export class CrossTabDrag {
     }));
   }
 
-  // -- in the hand, while another behaviour shows
+  // -- drag while another behaviour is shown
 
   private startHolding(hand: HeldDrag): HeldDrag {
     window.addEventListener('pointermove', this.onMove, true);
@@ -200,7 +200,7 @@ export class CrossTabDrag {
     return hand;
   }
 
-  /** Nothing is in the hand any more; what it was is where it was. */
+  /** Ends the drag; the originals stay in place. */
   private stopHolding(): void {
     if (this.hand?.visit) this.endVisit();
     this.hand = null;
@@ -214,14 +214,14 @@ export class CrossTabDrag {
   private readonly onMove = (event: PointerEvent): void => {
     if (!this.hand || this.hand.visit) return;
     const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
-    if (!(event.buttons & 1)) this.stopHolding();  // it was let go where the page could not see it
+    if (!(event.buttons & 1)) this.stopHolding();  // released where the page receives no events
     else if (isOutsideViewport(mouse)) this.trackOutside(mouse);
     else this.startVisit(event, mouse);
   };
 
   private readonly onUp = (event: PointerEvent): void => {
     const {hand} = this;
-    if (!hand || hand.visit) return;  // the drag on the page ends by itself
+    if (!hand || hand.visit) return;  // Blockly ends the drag on the page
     const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
     if (isOutsideViewport(mouse)) this.dropOutside(hand.from, hand.what, mouse);
     else this.stopHolding();
@@ -231,7 +231,7 @@ export class CrossTabDrag {
     if (event.key === 'Escape' && this.hand && !this.hand.visit) this.stopHolding();
   };
 
-  /** The mouse is on the page of another behaviour: it has a copy in the hand there, which a person drags on. */
+  /** Starts dragging a copy in the shown behaviour when the mouse enters the page. */
   private startVisit(event: PointerEvent, mouse: Point): void {
     const hand = this.hand!;
     const tab = this.getActiveTab();
@@ -239,22 +239,22 @@ export class CrossTabDrag {
     const {scrollX, scrollY} = workspace;
     const {svgMath, Coordinate} = Blockly.utils;
     const dragPosition = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
-    // Never left of what is in sight, as under the toolbox: Blockly would scroll to it, and all else would move.
+    // Never start left of the visible area (under the toolbox): Blockly would scroll the canvas to the focused item.
     const {left, top} = visibleArea(workspace);
     const position = new Coordinate(Math.max(dragPosition.x, left), Math.max(dragPosition.y, top));
     const variables = new Set(workspace.getVariableMap().getAllVariables().map((variable) => variable.getId()));
     this.trackOutside(null);
-    Blockly.Events.setGroup(true);  // until it is let go: all of it is one step
+    Blockly.Events.setGroup(true);  // until the drop, so that the drag is one undo step
     const addedItems = pasteItems(hand.what.copied, workspace, position);
     const [first] = addedItems;
     if (!first) return this.stopHolding();
-    workspace.scroll(scrollX, scrollY);  // what has the keys is brought into sight, but the hand leads this one
+    workspace.scroll(scrollX, scrollY);  // revert the scroll to the focused item; the mouse determines its position
     hand.visit = {tab, made: addedItems, group: Blockly.Events.getGroup(), variables};
     const grip = Coordinate.sum(first.getRelativeToSurfaceXY(), hand.what.grip);
     startDragAt(first, svgMath.wsToScreenCoordinates(workspace, grip), event);
   }
 
-  /** Takes what visits a behaviour out of it again, as if it had never been there. */
+  /** Removes the visiting copy and all its traces from the shown behaviour. */
   private endVisit(): void {
     const visit = this.hand?.visit;
     if (!visit) return;
@@ -328,7 +328,7 @@ export class CrossTabDrag {
   }
 }
 
-/** What undoes that these were made. */
+/** Returns the step that undoes the creation of these items. */
 function createUndoStep(tab: Tab, group: string, items: readonly Item[]): UndoStep {
   return {tab, group, otherwise: () => withUndoGroup(() => items.forEach((item) => !item.isDeadOrDying() && item.dispose()))};
 }
@@ -343,7 +343,7 @@ function withEventGroup(group: string, change: () => void): void {
   }
 }
 
-/** How many blocks a person sees in it; 0: it is a note. */
+/** Returns the number of blocks, or 0 for a note. */
 function countCopiedBlocks(copied: CopiedItem | CopiedBlocks): number {
   if (copied.nepStudio === 'note') return 0;
   const states = copied.nepStudio === 'blocks' ? copied.states : [copied.state];

@@ -1,9 +1,9 @@
-// Which blocks may hold which.
+// Connection checks: which blocks can be connected.
 import * as Blockly from 'blockly/core';
 
 let lenient = false;
 
-/** Accepts every connection while blocks are made of what was saved: they are shown as they were, types or not. */
+/** Allows every connection while saved blocks are loaded, so that they are shown as saved whatever their types. */
 class Checker extends Blockly.ConnectionChecker {
   override doTypeChecks(a: Blockly.Connection, b: Blockly.Connection): boolean {
     return lenient || super.doTypeChecks(a, b);

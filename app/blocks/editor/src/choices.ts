@@ -1,17 +1,17 @@
-// Drop-downs whose options come from outside (robots, topics) and which never drop a value they do not know.
+// Drop-downs with options from outside (robots, topics), which keep a value that isn't among the options.
 import * as Blockly from 'blockly/core';
 import {t} from './words';
 
 export type Option = [string, string];
 
-/** The newest options of each source: "topics", "robots:pepper". */
+/** Latest options of each source, such as "topics" or "robots:pepper". */
 const sources = new Map<string, Option[]>();
 
 export function isOption(value: unknown): value is Option {
   return Array.isArray(value) && typeof value[0] === 'string' && typeof value[1] === 'string';
 }
 
-/** Remembers a source's options. True if they are new. */
+/** Stores a source's options. Returns true if they have changed. */
 export function setSource(source: string, options: Option[]): boolean {
   if (JSON.stringify(sources.get(source)) === JSON.stringify(options)) return false;
   sources.set(source, options);
@@ -24,11 +24,11 @@ export interface ChoiceConfig extends Blockly.FieldConfig {
   value?: string;
   topic?: string;
   text?: string;
-  /** The field of a message (of the topic in that field), not a topic. */
+  /** Name of the block's topic field; the choice is then a field of that topic's messages. */
   of?: string;
 }
 
-/** What people may type: the words of the last option, and those of the question. */
+/** Prompts for values that can be typed: the label of the last option, and the question. */
 const PROMPTS = {
   topic: {other: () => t('Other topic…'), name: () => t('Topic name')},
   field: {other: () => t('Other field…'), name: () => t('Field name')},
@@ -40,10 +40,10 @@ const OTHER_VALUE = '\u0000other';
 export class FieldChoice extends Blockly.FieldDropdown {
   private readonly staticOptions: Option[];
   private readonly source: string;
-  /** The value the block has although no option offers it. */
+  /** Current value, kept as an option even if the source doesn't offer it. */
   private retainedValue: string | null = null;
 
-  /** `typed`: what a person may type instead of choosing, or "". */
+  /** `typed` is the kind of value that can be typed instead of selected, or "". */
   constructor(config: ChoiceConfig, private readonly typed: keyof typeof PROMPTS | '' = '') {
     super(Blockly.Field.SKIP_SETUP);
     this.staticOptions = (config.options ?? []).filter(isOption);
@@ -55,17 +55,17 @@ export class FieldChoice extends Blockly.FieldDropdown {
     this.configure_(config);
   }
 
-  /** What is known to choose from now. */
+  /** Returns the options offered at the moment. */
   protected availableOptions(): Option[] {
     return (this.source && sources.get(this.source)) || this.staticOptions;
   }
 
-  /** What stands in the question for another one: it can be taken as it is, without a keyboard. */
+  /** Returns the default text of the prompt, which can be accepted without a keyboard. */
   protected promptDefault(): string {
     return this.value_ ?? '';
   }
 
-  /** Present options, always with the present value among them and never empty. */
+  /** Returns the current options; never empty, always including the current value. */
   private createOptions(): Option[] {
     const options: Option[] = [...this.availableOptions()];
     const value = this.retainedValue;
@@ -74,7 +74,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
     return options.length ? options : [['–', '']];
   }
 
-  /** Reads the source again; the value stays, its label may change. */
+  /** Rereads the source; the value stays, its label may change. */
   refresh(): void {
     const before = this.getText();
     this.getOptions(false);
@@ -115,7 +115,7 @@ export class FieldChoice extends Blockly.FieldDropdown {
   }
 }
 
-/** The name of a topic (or of a message's field): one that is known now, or any other that is typed. */
+/** Drop-down of topic names or of message fields; other names can be typed. */
 export class FieldTopic extends FieldChoice {
   constructor(config: ChoiceConfig) {
     super(config, config.of === undefined ? 'topic' : 'field');
@@ -126,7 +126,7 @@ export class FieldTopic extends FieldChoice {
   }
 }
 
-/** The name of a message that scripts send each other: one that a block has already, or a new one. */
+/** Drop-down of messages between scripts: names used by blocks, or a new one. */
 export class FieldBroadcast extends FieldChoice {
   private static readonly types = ['events_received', 'events_broadcast', 'events_broadcast_wait'];
 
@@ -142,7 +142,7 @@ export class FieldBroadcast extends FieldChoice {
     return [...names].filter(Boolean).sort((one, other) => one.localeCompare(other)).map((name) => [name, name]);
   }
 
-  /** The first of “message 1”, “message 2” and so on that no block has. */
+  /** Returns the first unused name of “message 1”, “message 2” and so on. */
   protected override promptDefault(): string {
     const usedNames = new Set(this.availableOptions().map(([, name]) => name));
     let number = 1;

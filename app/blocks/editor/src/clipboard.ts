@@ -1,5 +1,5 @@
-// Copying, cutting, pasting and duplicating blocks and notes. What is copied is text on the computer's clipboard, so
-// that it can be pasted in another tab, in another Studio, or sent to somebody. What is pasted lies free and in sight.
+// Copy, cut, paste and duplicate for blocks and notes. Copies are text on the system clipboard, so that they
+// can be pasted in other tabs and instances of Studio, or sent to others. Pasted items are free and in view.
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {findFreePosition, visibleArea, obstacles} from './free_place';
@@ -7,7 +7,7 @@ import {focusedBlock} from './help';
 import {type Item, type Note, getSelectedItemsWith, getSelectedBlocksWith, getSelectedNotesWith, deleteSelectionWith, groupIntoStacks, selectionOf} from './selection';
 import {type BlockState, unwrapUnknown, wrapUnknown} from './unknown_blocks';
 
-/** Every text of ours begins so; `app/ui/blockly/bridge.py` looks for it. */
+/** Prefix of every copied text; `app/ui/blockly/bridge.py` checks for it. */
 const JSON_PREFIX = '{"nepStudio":';
 
 export interface CopiedItem {
@@ -15,7 +15,7 @@ export interface CopiedItem {
   state: BlockState;
 }
 
-/** Several scripts, and notes, whose places beside each other stay. */
+/** Several scripts and notes with their relative positions. */
 export interface CopiedBlocks {
   nepStudio: 'blocks';
   states: BlockState[];
@@ -24,7 +24,7 @@ export interface CopiedBlocks {
 
 type Point = Blockly.utils.Coordinate;
 
-/** The computer's clipboard: the page itself may not read it. */
+/** System clipboard, which the page can't read itself. */
 export interface SystemClipboard {
   write(text: string): void;
   read(): Promise<string>;
@@ -33,7 +33,7 @@ export interface SystemClipboard {
 const PASTE_OFFSET = 34;
 
 export class Clipboard {
-  /** What was copied here: pasted when the computer's clipboard holds other things by now. */
+  /** Last copy made here, pasted if the system clipboard holds anything else. */
   private copied = '';
   private mouse: {x: number; y: number} | null = null;
 
@@ -42,7 +42,7 @@ export class Clipboard {
     document.documentElement.addEventListener('pointerleave', () => this.mouse = null);
   }
 
-  /** Whether there was something to copy. */
+  /** Copies the item or the selection; returns false if there was nothing to copy. */
   copy(item = focusedItem()): boolean {
     const copied = item && copyOf(item);
     if (!copied) return false;
@@ -58,7 +58,7 @@ export class Clipboard {
     return true;
   }
 
-  /** Beside the original. */
+  /** Pastes a copy beside the original. */
   duplicate(item = focusedItem()): boolean {
     if (!item || item.workspace.isFlyout) return false;
     const copied = copyOf(item);
@@ -66,7 +66,7 @@ export class Clipboard {
     return copied !== null;
   }
 
-  /** At a place of the page, else under the mouse, beside the block that has the keys, or in the middle. */
+  /** Pastes at the given position, or else under the mouse, beside the focused block or in the visible area. */
   async paste(pagePosition: {x: number; y: number} | null = null): Promise<void> {
     const read = parseClipboard(await this.system.read()) ?? parseClipboard(this.copied);
     if (!read) return;
@@ -84,20 +84,20 @@ export class Clipboard {
   }
 }
 
-/** The block or note that has the keys, also by a field or gap of it. */
+/** Returns the focused block or note; a focused field or slot counts as its block. */
 export function focusedItem(): Item | null {
   const node = Blockly.getFocusManager().getFocusedNode();
   return node instanceof Blockly.comments.RenderedWorkspaceComment ? node : focusedBlock();
 }
 
-/** `stack`: with the blocks that hang below it. */
+/** Returns the state of an item; `stack` includes the blocks below it. */
 export function stateOf(item: Item, stack = false): CopiedItem | null {
   const data = item.toCopyData(stack) as {blockState?: unknown; commentState?: unknown} | null;
   if (data?.blockState) return {nepStudio: 'block', state: unwrapUnknown(data.blockState as BlockState)};
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
 
-/** The item, or all that are chosen with it. */
+/** Returns a copy of the item, or of the selection that contains it. */
 function copyOf(item: Item): CopiedItem | CopiedBlocks | null {
   if (!getSelectedItemsWith(item).length) return stateOf(item);
   const copied = copyOfAll(groupIntoStacks(getSelectedBlocksWith(item)), getSelectedNotesWith(item));
@@ -111,7 +111,7 @@ export function copyOfAll(runs: readonly Blockly.BlockSvg[][], notes: readonly N
   return {nepStudio: 'blocks', states, ...(noteStates.length && {notes: noteStates})};
 }
 
-/** Blocks that hang below each other, without what hangs below them and is not chosen. */
+/** Returns the state of consecutive blocks, without the unselected blocks below them. */
 export function stateOfRun(run: readonly Blockly.BlockSvg[]): BlockState | null {
   let state: BlockState | null = null;
   for (const block of [...run].reverse()) {
@@ -125,7 +125,7 @@ function withoutPosition({x: _x, y: _y, ...rest}: BlockState): BlockState {
   return rest as BlockState;
 }
 
-/** What is on the clipboard, if it is ours. It may come from anywhere: whatever is in it has still to be made. */
+/** Parses clipboard text; null if it isn't ours. The source is untrusted: creating the blocks may still fail. */
 function parseClipboard(text: string): CopiedItem | CopiedBlocks | null {
   if (!text.startsWith(JSON_PREFIX)) return null;
   try {
@@ -154,13 +154,13 @@ function toWorkspaceCoordinates(workspace: Blockly.WorkspaceSvg, {x, y}: {x: num
   return Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Blockly.utils.Coordinate(x, y));
 }
 
-/** Whether the mouse is over the canvas itself, not over the toolbox or what floats. */
+/** Returns true if the point is over the canvas itself and not over the toolbox, flyout or an overlay. */
 function isOverCanvas(workspace: Blockly.WorkspaceSvg, {x, y}: {x: number; y: number}): boolean {
   const under = document.elementFromPoint(x, y);
   return under !== null && workspace.getParentSvg().contains(under) && !under.closest('.blocklyFlyout');
 }
 
-/** To the right of the stack that it is in, at its own height. */
+/** Returns the position to the right of the item's stack, at the height of the item. */
 function positionBeside(item: Item): Point {
   const stack = item instanceof Blockly.BlockSvg ? item.getRootBlock() : item;
   const {right} = (stack as Blockly.IBoundedElement).getBoundingRectangle();
@@ -177,7 +177,7 @@ export function withUndoGroup<T>(change: () => T): T {
   }
 }
 
-/** Makes it as one step that undo takes back, lets it lie free, and gives it the keys; none: it can't be made. */
+/** Creates the items in one undo step at a free position and focuses the first; returns [] if that fails. */
 export function pasteItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly.WorkspaceSvg, position: Point): Item[] {
   const existing = new Set<unknown>([...workspace.getTopBlocks(false), ...workspace.getTopComments()]);
   const {scrollX, scrollY} = workspace;
@@ -193,13 +193,13 @@ export function pasteItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly
       return [];
     }
   });
-  workspace.scroll(scrollX, scrollY);  // more on the canvas is no reason to move what is there
+  workspace.scroll(scrollX, scrollY);  // keep the view where it was
   if (pasted[0]) Blockly.getFocusManager().focusNode(pasted[0]);
   if (pasted.length > 1) selectionOf(workspace)?.select(pasted.flatMap(stackItems));
   return pasted;
 }
 
-/** The note, or the blocks of the stack. */
+/** Returns the note, or the blocks of the stack. */
 function stackItems(top: Item): Item[] {
   if (!(top instanceof Blockly.BlockSvg)) return [top];
   const blocks: Blockly.BlockSvg[] = [];
@@ -207,7 +207,7 @@ function stackItems(top: Item): Item[] {
   return blocks;
 }
 
-/** Together at a free place, as they were beside each other. */
+/** Moves the items together to a free position and keeps their layout. */
 function moveToFreePosition(items: Item[], position: Point): Item[] {
   Blockly.renderManagement.triggerQueuedRenders();
   const boxes = items.map((item) => (item as Blockly.IBoundedElement).getBoundingRectangle());

@@ -1,14 +1,14 @@
-// Scripts far outside the view are not drawn: with a thousand blocks that was most of what a drop, a step of a
-// scroll or a running block cost. They stay what they are; only their picture is left out until the view comes near.
+// Culling: scripts far outside the view aren't rendered. With a thousand blocks they were most of the cost of a
+// drop, a scroll or a highlighted block. The blocks stay in the workspace; only their SVG is left out.
 import * as Blockly from 'blockly/core';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
 const CULLED_CLASS = 'nepFar';
-/** How far outside the view scripts are drawn, in pixels: more than one turn of a wheel. */
+/** Distance from the view within which scripts are rendered, in pixels: more than one step of the mouse wheel. */
 const MARGIN = 240;
 
 export class Culling {
-  /** Each hidden script's wrapping: a <g> that is not displayed is laid out all the same, what is in an <svg> is not. */
+  /** Wrapper of each hidden script: an <svg>, because browsers compute the layout of a <g> even when not displayed. */
   private readonly hidden = new Map<Blockly.BlockSvg, Element>();
   private waiting = 0;
 
@@ -23,12 +23,12 @@ export class Culling {
     });
   }
 
-  /** Looks again before the next picture. */
+  /** Schedules an update for the next frame. */
   scheduleUpdate(): void {
     this.waiting ||= window.requestAnimationFrame(() => this.update());
   }
 
-  /** Leaves these out until `look`: what is being loaded is drawn once its place is known. */
+  /** Hides blocks until the next `update()`, such as blocks being loaded, whose position isn't known yet. */
   hide(blocks: Iterable<Blockly.BlockSvg>): void {
     for (const block of blocks) this.setDrawn(block, false);
   }
@@ -44,8 +44,8 @@ export class Culling {
     const tops = new Set(this.workspace.getTopBlocks(false));
     for (const [block, wrapping] of this.hidden) if (!tops.has(block)) this.unwrap(block, wrapping);
     for (const block of tops) {
-      // A script in the hand goes where it likes, one that loses its picture would lose the keys, a note is put
-      // beside the picture of its block.
+      // Always render a dragged script, one with the focus (which it would lose), and one with icons, because
+      // notes are positioned relative to them.
       this.setDrawn(block, renderRect.intersects(block.getBoundingRectangle()) || block.isDragging() ||
         block.getSvgRoot().contains(focused) || block.getDescendants(false).some((descendant) => descendant.getIcons().length));
     }
@@ -65,14 +65,14 @@ export class Culling {
     this.hidden.set(block, wrapper);
   }
 
-  /** In the place of the wrapping, so that what lies over what stays; Blockly may have taken the script out of it. */
+  /** Puts the script back in place of its wrapper to keep the z-order; Blockly may have moved it already. */
   private unwrap(block: Blockly.BlockSvg, wrapping: Element): void {
     wrapping.replaceWith(...wrapping.childNodes);
     this.hidden.delete(block);
   }
 }
 
-/** Draws the script that holds this element, at once. */
+/** Renders the script that contains this element immediately. */
 export function ensureDrawn(element: Element | null | undefined): void {
   const wrapping = element?.closest(`.${CULLED_CLASS}`);
   wrapping?.replaceWith(...wrapping.childNodes);

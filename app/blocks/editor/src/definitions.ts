@@ -1,4 +1,4 @@
-// Block definitions from the window: registering them, and knowing what changed.
+// Registers the window's block definitions and detects changes.
 import * as Blockly from 'blockly/core';
 import {type Option, isOption, setSource} from './choices';
 
@@ -22,7 +22,7 @@ export interface BlockDefinition {
 
 const definitionsByType = new Map<string, {definition: BlockDefinition; key: string}>();
 
-/** The types whose blocks show a live value. */
+/** Returns the types of blocks that show a live value. */
 export function sensorTypes(): ReadonlySet<string> {
   return liveTypes;
 }
@@ -33,7 +33,7 @@ export function definitionOf(type: string): BlockDefinition | null {
   return definitionsByType.get(type)?.definition ?? null;
 }
 
-/** All args of all message rows. */
+/** Returns the args of all message rows. */
 export function argsOf(definition: BlockDefinition): BlockArg[] {
   const rows = Object.keys(definition).filter((name) => /^args\d+$/.test(name));
   return rows.flatMap((name) => definition[name] as BlockArg[]);
@@ -53,7 +53,7 @@ export function fieldNames(definition: BlockDefinition): Set<string> {
   return new Set(fields.map((arg) => arg.name ?? ''));
 }
 
-/** Registers all definitions; says which types are new or differ, and whether a source's options changed. */
+/** Registers all definitions; returns the new or changed types, and whether the options of any source changed. */
 export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<string>; sources: boolean} {
   const changed = new Set<string>();
   let sources = false;
@@ -74,7 +74,7 @@ export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<stri
   return {changed, sources};
 }
 
-/** Options by themselves: `{"topics": [["/faces", "/faces"], …]}`; true if any is new. */
+/** Updates options alone, such as `{"topics": [["/faces", "/faces"], …]}`; returns true if any changed. */
 export function defineSources(all: Record<string, Option[]>): boolean {
   return Object.entries(all).map(([name, options]) => setSource(name, options)).some(Boolean);
 }
@@ -83,7 +83,7 @@ function sourceOf(arg: BlockArg): string {
   return arg.source ?? (arg.type === 'field_topic' && arg['of'] === undefined ? 'topics' : '');
 }
 
-/** The definition as text, without the options which fields read again by themselves. */
+/** Returns the definition as text, without the options that fields reread themselves. */
 function keyOf(definition: BlockDefinition): string {
   return JSON.stringify(definition, function (this: unknown, name: string, value: unknown) {
     const owner = this as BlockArg;
@@ -104,7 +104,7 @@ function register(definition: BlockDefinition): void {
   };
 }
 
-/** Lets a gap be there only while a field has one value. */
+/** Shows an input only while a field has one value. */
 function showInputWhen(block: Blockly.Block, name: string, [fieldName, wanted]: [string, string]): void {
   const field = block.getField(fieldName);
   const show = (value: unknown) => {
@@ -120,7 +120,7 @@ function showInputWhen(block: Blockly.Block, name: string, [fieldName, wanted]: 
   show(field?.getValue());
 }
 
-/** A value block that is nothing but a text field gets “ ” around it. */
+/** Adds “ ” around a value block that consists only of a text field. */
 function withQuotes(definition: BlockDefinition): BlockDefinition {
   const args = definition['args0'] as BlockArg[] | undefined;
   const only = args?.length === 1 ? args[0] : undefined;

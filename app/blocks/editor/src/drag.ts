@@ -1,4 +1,4 @@
-// A block in the hand: how near is near, where letting go deletes, and how it leaves the flyout.
+// Dragging of blocks: snap radius, delete areas, selections, and drags out of the flyout or out of the page.
 import * as Blockly from 'blockly/core';
 import {highlightBackpack, isOverBackpack, isInBackpack, addToBackpack} from './backpack';
 import {DraggedGroup} from './carry';
@@ -6,27 +6,27 @@ import {type Item, getSelectedBlocksWith, isNote, getSelectedNotesWith, groupInt
 import {sheetOf} from './sheet';
 import {type OutgoingDrag, isOutsideViewport, createOutgoingDrag, createOutgoingGroupDrag} from './carrying';
 
-/** How near a gap has to be, in pixels of the screen; one that is offered already holds a little further. */
+/** Snap radius in screen pixels; larger for the connection being previewed, so that it is kept a little longer. */
 const SNAP_RADIUS = 28;
 const CONNECTING_SNAP_RADIUS = 36;
 const DEFAULT_CONFIG = {...Blockly.config};
 
 export interface DragListener {
-  /** Letting go of a block of the canvas here, on the page, would delete it; null: it would not. */
+  /** Called with the mouse position while a drop would delete the dragged block, otherwise with null. */
   overDelete(mouse: Blockly.utils.Coordinate | null): void;
-  /** A block was let go on the canvas and joined nothing; where the mouse was on the page. */
+  /** Called when a block was dropped on the canvas without connecting; `mouse` is relative to the page. */
   letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
-  /** A block was put down with the keys and joined nothing; what had them when it was taken from the toolbox. */
+  /** Called when a block was placed by keyboard without connecting; `insertionTarget` had the focus before. */
   putDown(block: Blockly.BlockSvg, insertionTarget: Blockly.IFocusableNode): void;
-  /** Where the mouse is with these in the hand while it is outside of the page; null: it is not. */
+  /** Called with the mouse position while items are dragged outside the page, otherwise with null. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
-  /** It was let go there, and went back to where it was. */
+  /** Called when items were dropped outside the page and have returned to their place. */
   letGoOutside(drag: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
-  /** The drag is over; `placed`: something lies or hangs where it was let go. `copies`: Ctrl was held. */
+  /** Called when the drag has ended; `isPlaced` is false if it was reverted, `copies` is true if Ctrl was pressed. */
   ended(isPlaced: boolean, copies: boolean): void;
 }
 
-/** What comes from another behaviour with the mouse, which is still pressed: over the toolbox it goes back there. */
+/** Items dragged here from another behaviour; dropped on the toolbox, they return there. */
 const visitingItems = new WeakSet<object>();
 
 const listeners = new WeakMap<Blockly.Workspace, DragListener>();
@@ -35,17 +35,17 @@ export function setDragListener(workspace: Blockly.WorkspaceSvg, listener: DragL
   listeners.set(workspace, listener);
 }
 
-/** How far a mouse moves at least, in pixels, that drags; far enough for any radius of Blockly's. */
+/** Length of the synthetic mouse move that starts a drag, in pixels; exceeds every drag radius of Blockly. */
 const DRAG_DISTANCE = 60;
 
-/** Lets the mouse, which is pressed already, hold this as if it had been pressed on it `at` that place of the page. */
+/** Starts dragging an item with the pointer that is already down, as if pressed at `position` on the page. */
 export function startDragAt(item: Item, position: Blockly.utils.Coordinate, {pointerId, pointerType}: PointerEvent): void {
   const like = (type: string, x: number) => new PointerEvent(type,
     {clientX: x, clientY: position.y, pointerId, pointerType, isPrimary: true, button: 0, buttons: 1, cancelable: true});
   const downEvent = like('pointerdown', position.x);
   visitingItems.add(item);
   Blockly.Touch.clearTouchIdentifier();
-  Blockly.Touch.checkTouchIdentifier(downEvent);  // Blockly listens to the pointer that was pressed
+  Blockly.Touch.checkTouchIdentifier(downEvent);  // make Blockly follow this pointer
   const gesture = item.workspace.getGesture(downEvent);
   if (item instanceof Blockly.BlockSvg) gesture?.handleBlockStart(downEvent, item);
   else gesture?.handleCommentStart(downEvent, item);
@@ -53,30 +53,30 @@ export function startDragAt(item: Item, position: Blockly.utils.Coordinate, {poi
   gesture?.handleMove(like('pointermove', position.x + DRAG_DISTANCE));
 }
 
-/** Blockly keeps what a drag would join to itself. */
+/** Blockly doesn't export the connection candidate of a drag. */
 interface HasDragStrategy {
   dragStrategy?: {connectionCandidate?: unknown};
 }
 
 class Dragger extends Blockly.dragging.Dragger {
-  /** The zoom of the flyout that the block came from; 0: it was on the canvas. */
+  /** Scale of the flyout that the block came from, or 0 for a block of the canvas. */
   private readonly flyoutScale = this.draggable instanceof Blockly.BlockSvg && this.draggable.workspace.isFlyout ?
     this.draggable.workspace.scale : 0;
-  /** What it came out of: it closes, so that all of the canvas is there for it. */
+  /** Sheet that the block came from; it closes so that the whole canvas is free for the drop. */
   private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
   private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isInBackpack(this.draggable);
   private readonly isVisitor = visitingItems.has(this.draggable);
   private isGripAdjusted = false;
   private hasEnded = false;
-  /** What had the keys on the canvas when a block was taken from the toolbox with them. */
+  /** Node of the canvas that had the focus when a block was taken from the toolbox by keyboard. */
   private insertionTarget: Blockly.IFocusableNode | null = null;
-  /** The other blocks and notes that were chosen go along. */
+  /** Other selected blocks and notes, which are dragged along. */
   private carried: DraggedGroup | null = null;
 
   override onDragStart(event?: PointerEvent | KeyboardEvent): Blockly.IDraggable {
     this.attachSelection();
     if (this.flyoutScale && event instanceof KeyboardEvent) this.insertionTarget = passivelyFocusedNode(this.draggable.workspace);
-    // Ctrl takes one block out of its script; of several each is out already.
+    // Ctrl detaches a single block from its script; the blocks of a group are detached already.
     const dragged = super.onDragStart(this.carried && event instanceof PointerEvent ? undefined : event);
     this.carried?.start();
     this.sheet?.hide();
@@ -94,11 +94,11 @@ class Dragger extends Blockly.dragging.Dragger {
     this.draggable = this.carried.head;
   }
 
-  /** How far the one in the hand is from where it was taken, in units of the canvas. */
+  /** Offset of the dragged item from its start position, in workspace units. */
   private get offset(): Blockly.utils.Coordinate {
     const {draggable, startLoc} = this;
     const position = draggable.getRelativeToSurfaceXY();
-    // Blockly moves what was let go onto the grid only after the next picture.
+    // Blockly snaps a dropped block to the grid only after the next frame.
     const grid = draggable instanceof Blockly.BlockSvg && !draggable.isDragging() && !draggable.getParent() ?
       draggable.workspace.getGrid() : null;
     return Blockly.utils.Coordinate.difference(grid?.shouldSnap() ? grid.alignXY(position) : position, startLoc);
@@ -117,7 +117,7 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   override onDragEnd(event?: PointerEvent | KeyboardEvent): void {
-    if (this.hasEnded) return;  // the block that goes with the end of a gesture ends the gesture once more
+    if (this.hasEnded) return;  // deleting the block at the end of a gesture ends the gesture again
     this.hasEnded = true;
     const {listener} = this;
     const mouse = event instanceof PointerEvent ? mousePosition(event) : null;
@@ -161,7 +161,7 @@ class Dragger extends Blockly.dragging.Dragger {
     }
     if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
     const before = Blockly.Events.getGroup();
-    Blockly.Events.setGroup(group);  // what follows from the drop is undone with it
+    Blockly.Events.setGroup(group);  // edits caused by the drop belong to its undo step
     listener?.letGo(draggable, mouse);
     Blockly.Events.setGroup(before);
   }
@@ -181,7 +181,7 @@ class Dragger extends Blockly.dragging.Dragger {
     listener?.ended(false, false);
   }
 
-  /** Outside of the page, and on the backpack, nothing is deleted: it goes back to where it was, to the toolbox if it came from there. */
+  /** Prevents deletion outside the page and on the backpack: the block returns to its place or to the toolbox. */
   protected override wouldDeleteDraggable(mouse: Blockly.utils.Coordinate,
     draggable: Blockly.IDraggable & Blockly.IDeletable): boolean {
     if (this.isDroppedElsewhere(mouse)) return this.flyoutScale > 0;
@@ -192,18 +192,18 @@ class Dragger extends Blockly.dragging.Dragger {
     return this.isDroppedElsewhere(mouse) ? !this.flyoutScale : this.isVisitorOverDeleteArea(mouse) || super.shouldReturnToStart(mouse, draggable);
   }
 
-  /** Whether what came from another behaviour is over what deletes: it was never here, so it goes back there. */
+  /** Returns true if an item from another behaviour is over a delete area; it returns there and isn't deleted. */
   private isVisitorOverDeleteArea(mouse: Blockly.utils.Coordinate): boolean {
     return this.isVisitor && Blockly.isDeletable(this.draggable) && super.wouldDeleteDraggable(mouse, this.draggable);
   }
 
-  /** What is in the hand, each with what hangs below it. */
+  /** Dragged items, each including the blocks below it. */
   private get items(): readonly Item[] {
     if (this.carried) return [...this.carried.runs.map(([head]) => head!), ...this.carried.notes];
     return [this.draggable as unknown as Item];
   }
 
-  /** Whether what is let go there goes elsewhere, and back to where it was here. */
+  /** Returns true if a drop here transfers the items elsewhere, so that they return to their place on this canvas. */
   private isDroppedElsewhere(mouse: Blockly.utils.Coordinate): boolean {
     return this.isDraggedOutside(mouse) || this.canDropIntoBackpack(mouse);
   }
@@ -212,7 +212,7 @@ class Dragger extends Blockly.dragging.Dragger {
     return (this.draggable instanceof Blockly.BlockSvg || Boolean(this.carried?.runs.length)) && isOverBackpack(mouse);
   }
 
-  /** Whether it is outside of the page there, as blocks and notes may be. */
+  /** Returns true if blocks or notes are dragged outside the page. */
   private isDraggedOutside(mouse: Blockly.utils.Coordinate): boolean {
     return isOutsideViewport(mouse) && (this.draggable instanceof Blockly.BlockSvg ||
       this.draggable instanceof Blockly.comments.RenderedWorkspaceComment);
@@ -230,7 +230,7 @@ class Dragger extends Blockly.dragging.Dragger {
     return listeners.get(this.draggable.workspace);
   }
 
-  /** The radius is the screen's, whatever the zoom. */
+  /** Sets the snap radius, which is constant in screen pixels at any zoom. */
   private setSnapRadius(): void {
     const {scale} = this.draggable.workspace;
     Blockly.config.snapRadius = SNAP_RADIUS / scale;
@@ -242,16 +242,16 @@ class Dragger extends Blockly.dragging.Dragger {
     this.notifyOverDelete(null);
     this.listener?.outside(null);
     highlightBackpack(false);
-    // How it is moved by keys is said no longer than it is moved.
+    // Remove the hint about moving by keyboard once the move has ended.
     document.querySelector('.blocklyToast[data-toast-id$="MoveHint"]')?.remove();
   }
 
-  /** The flyout has a zoom of its own: what is under the mouse there is under it here. */
+  /** Compensates for the flyout's own scale, so that the mouse stays at the same point of the block. */
   private compensateFlyoutScale(event: PointerEvent, delta: Blockly.utils.Coordinate): void {
     if (this.isGripAdjusted || !this.flyoutScale || !(this.draggable instanceof Blockly.BlockSvg)) return;
     this.isGripAdjusted = true;
     const {workspace} = this.draggable;
-    const corner = Blockly.utils.svgMath.wsToScreenCoordinates(workspace, this.startLoc.clone());  // it scales what it is given
+    const corner = Blockly.utils.svgMath.wsToScreenCoordinates(workspace, this.startLoc.clone());  // it modifies its argument
     const ratio = workspace.scale / this.flyoutScale;
     const shift = (mouse: number, from: number) => (mouse - from) * (1 - ratio) / workspace.scale;
     this.startLoc = Blockly.utils.Coordinate.sum(this.startLoc, new Blockly.utils.Coordinate(
@@ -262,19 +262,19 @@ class Dragger extends Blockly.dragging.Dragger {
     return Blockly.isDeletable(this.draggable) && this.wouldDeleteDraggable(mousePosition(event), this.draggable);
   }
 
-  /** What comes from the flyout and goes back there was never on the canvas. */
+  /** Reports the delete area; not for a block from the flyout, which was never on the canvas. */
   private notifyOverDelete(mouse: Blockly.utils.Coordinate | null): void {
     this.listener?.overDelete(this.flyoutScale || this.isVisitor ? null : mouse);
   }
 }
 
-/** What has the keys on the canvas of a flyout as soon as they come back to it. */
+/** Returns the node of the canvas that gets the focus back when it leaves the flyout. */
 function passivelyFocusedNode(flyout: Blockly.WorkspaceSvg): Blockly.IFocusableNode | null {
   const canvas = flyout.targetWorkspace;
   return canvas && Blockly.FocusableTreeTraverser.findFocusedNode(canvas);
 }
 
-/** What was put back is nothing to undo. Blockly lists edits after the next frame. */
+/** Removes a reverted group from the undo stack, after the next frame, when Blockly has added it. */
 export function discardUndoGroup(workspace: Blockly.WorkspaceSvg, group: string): void {
   window.requestAnimationFrame(() => window.setTimeout(() => {
     const steps = workspace.getUndoStack();
@@ -282,7 +282,7 @@ export function discardUndoGroup(workspace: Blockly.WorkspaceSvg, group: string)
   }));
 }
 
-/** Blockly moves what was let go onto the grid, some only after the next picture: not what is where it was. */
+/** Disables snapping to the grid until rendering has finished, so that a reverted item returns exactly. */
 function suspendGridSnap(item: Blockly.IDraggable): () => void {
   const snappable = item as {snapToGrid?: () => void};
   snappable.snapToGrid = () => undefined;

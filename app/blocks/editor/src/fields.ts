@@ -1,4 +1,4 @@
-// The fields that Blockly does not have: icon, live value, colour chip.
+// Custom fields: icon, button, live value, colour.
 import * as Blockly from 'blockly/core';
 import {drawIcon, iconName} from './icons';
 import {lazy, t} from './words';
@@ -14,7 +14,7 @@ interface IconConfig extends Blockly.FieldConfig {
   alt?: string;
 }
 
-/** A Lucide icon, white on the block; the category's icon when the name is not one of ours. */
+/** Lucide icon in white; the category's icon if the name is unknown. */
 export class FieldIcon extends Blockly.FieldImage {
   constructor(private readonly icon: string, private readonly side: number, alt: string) {
     super(BLANK_IMAGE, side, side, alt);
@@ -32,7 +32,7 @@ export class FieldIcon extends Blockly.FieldImage {
     this.value_ = value;
   }
 
-  /** A picture says nothing that the block's words do not. */
+  /** Returns no label, because the block's text already describes it. */
   override computeAriaLabel(): string {
     return '';
   }
@@ -50,7 +50,7 @@ export class FieldButton extends Blockly.FieldImage {
     this.setTooltip(label);
   }
 
-  /** In the flyout it is part of the block: what is dragged out can be changed. */
+  /** Makes the button part of the block in the flyout: a block can be changed after it was dragged out. */
   override isClickableInFlyout(): boolean {
     return false;
   }
@@ -76,16 +76,16 @@ export class FieldButton extends Blockly.FieldImage {
   }
 }
 
-/** Words which the window sets while a sensor sends ("84 %"): never saved, never undone. */
+/** Live value of a sensor ("84 %"), set by the window; neither saved nor undoable. */
 export class FieldLive extends Blockly.FieldLabel {
   override SERIALIZABLE = false;
 
-  /** Shows the text; costs nothing when it is the same, little when it is as wide. Fires no event. */
+  /** Shows the text without firing an event; free if the text is the same, cheap if its width is. */
   show(text: string, old = false): void {
     this.fieldGroup_?.classList.toggle('nepOld', old);
     if (text === this.value_) return;
     const normalizeDigits = (value: string) => value.replace(/\d/g, '0');
-    const hasSameWidth = normalizeDigits(text) === normalizeDigits(String(this.value_ ?? ''));  // figures are all as wide
+    const hasSameWidth = normalizeDigits(text) === normalizeDigits(String(this.value_ ?? ''));  // all digits have the same width
     this.value_ = text;
     if (hasSameWidth && this.textContent_) this.textContent_.nodeValue = this.getDisplayText_();
     else this.forceRerender();
@@ -115,7 +115,7 @@ const PALETTE: readonly [string, string][] = [
 const COLUMNS = 5;
 const CHIP_SIZE = {width: 39, height: 23};
 
-/** The name of the palette's colour that is most like this one. */
+/** Returns the name of the palette colour nearest to this one. */
 function nearestColourName(colour: string): string {
   const parts = (hex: string) => [1, 3, 5].map((start) => parseInt(hex.slice(start, start + 2), 16));
   const target = parts(colour);
@@ -124,7 +124,7 @@ function nearestColourName(colour: string): string {
   return PALETTE.reduce((best, other) => (distance(other) < distance(best) ? other : best))[0];
 }
 
-/** A colour "#rrggbb" as a chip; clicking it opens a small palette with a field for any other. */
+/** Colour field "#rrggbb", shown as a chip; a click opens a small palette with an input for any other colour. */
 export class FieldColourChip extends Blockly.Field {
   override SERIALIZABLE = true;
   override EDITABLE = true;
@@ -168,7 +168,7 @@ export class FieldColourChip extends Blockly.Field {
     this.recomputeAriaContext();
   }
 
-  /** Where the palette points to; without this it would be the whole block. */
+  /** Returns the bounds of the chip, to which the palette points; the default is the whole block. */
   override getScaledBBox(): Blockly.utils.Rect {
     const box = (this.chip ?? document.body).getBoundingClientRect();
     return new Blockly.utils.Rect(box.top, box.bottom, box.left, box.right);
@@ -216,7 +216,7 @@ export class FieldColourChip extends Blockly.Field {
     (box.querySelector('[aria-pressed=true]') as HTMLElement | null ?? other).focus();
   }
 
-  /** Arrows go from colour to colour, Tab to the field below and back, Esc leaves all as it was. */
+  /** Handles the arrow keys (between colours), Tab (to the input and back) and Escape (closes without a change). */
   private onPaletteKey(event: KeyboardEvent, box: HTMLElement): void {
     event.stopPropagation();
     const swatches = [...box.querySelectorAll('button')];

@@ -1,36 +1,36 @@
-// The blocks of the open category: always as large, as wide as they need, and open as long as the person wants.
+// Flyout with a constant scale and a width that fits its blocks; it can be pinned open.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {t} from './words';
 
-/** The zoom of a canvas when it is new, and of the flyout at any time. */
+/** Initial scale of a canvas and constant scale of the flyout. */
 export const DEFAULT_SCALE = 0.8;
 
 const MIN_WIDTH = 312;
-/** Most categories fit into it: while it stays open, the canvas beside keeps its place from one to the next. */
+/** Minimum width while pinned; fits most categories, so that the canvas doesn't move when the category changes. */
 const PINNED_WIDTH = 400;
-/** As much of the page it has from the start while it stays open. */
+/** Maximum share of the page that `PINNED_WIDTH` may take. */
 const PINNED_SHARE = 1 / 3;
-/** What is wider, as a list with its items, widens it for its own category only. */
+/** Width above which contents, such as a list with its items, widen the flyout for their own category only. */
 const MAX_STICKY_WIDTH = 500;
-/** As much of the page it takes at most; what is wider is scrolled to. */
+/** Maximum share of the page; wider contents can be scrolled. */
 const MAX_WIDTH_SHARE = 0.45;
 const HEADER_HEIGHT = 40;
 const SCROLLBAR_MARGIN = 2.5;
 
 export class Flyout extends Blockly.VerticalFlyout {
   override readonly CORNER_RADIUS: number = 0;
-  /** Calls when a person wants it to stay open, or not. */
+  /** Called when the user pins or unpins the flyout. */
   onPin: (keeps: boolean) => void = () => undefined;
   protected readonly header = document.createElement('div');
   private readonly title = document.createElement('span');
   private readonly button = this.createHeaderButton();
-  /** So much below it is left free. */
+  /** Height of the free area below the flyout. */
   protected readonly footerHeight: number = 0;
-  /** A class for the style sheet. */
+  /** CSS class. */
   protected readonly name: string = 'nepCategory';
   private horizontalScrollbar: Blockly.Scrollbar | null = null;
-  /** While it stays open, the width that its widest usual category wanted: a narrow one would pull the canvas along. */
+  /** Widest usual category while pinned; kept for narrower ones so that the canvas doesn't move. */
   private stickyWidth = 0;
 
   override init(target: Blockly.WorkspaceSvg): void {
@@ -50,12 +50,12 @@ export class Flyout extends Blockly.VerticalFlyout {
     return DEFAULT_SCALE;
   }
 
-  /** What it takes of the canvas. */
+  /** Returns the width that the flyout takes from the canvas. */
   override getWidth(): number {
     return this.isVisible() ? super.getWidth() : 0;
   }
 
-  /** Whether it stays open: then the canvas is what lies beside it. */
+  /** True if the flyout stays open, in which case the canvas is beside it. */
   get isPinned(): boolean {
     return !this.autoClose;
   }
@@ -69,12 +69,12 @@ export class Flyout extends Blockly.VerticalFlyout {
     this.updateOverlayOffset();
   }
 
-  /** Says above the blocks what they are. */
+  /** Sets the title above the blocks. */
   setTitle(text: string): void {
     this.title.textContent = text;
   }
 
-  /** Whether the keys are on one of its own buttons. */
+  /** True if the focus is on a button of the header. */
   get hasFocus(): boolean {
     return this.header.contains(document.activeElement);
   }
@@ -86,7 +86,7 @@ export class Flyout extends Blockly.VerticalFlyout {
     this.updateOverlayOffset();
   }
 
-  /** What floats over the canvas keeps beside it while it stays open. */
+  /** Moves overlays of the canvas beside the pinned flyout. */
   protected updateOverlayOffset(): void {
     if (this.targetWorkspace.getInjectionDiv().closest('[hidden]')) return;
     document.documentElement.style.setProperty('--flyout', `${this.isPinned ? this.getWidth() : 0}px`);
@@ -155,14 +155,14 @@ export class Flyout extends Blockly.VerticalFlyout {
     this.header.className = `nepFlyoutHead ${this.name}`;
     this.svgGroup_?.classList.add(this.name);
     this.header.hidden = true;
-    // The keys stay where they are: a flyout that loses them closes.
+    // Keep the focus where it is: a flyout that loses it closes.
     this.header.onpointerdown = (event) => event.preventDefault();
     this.header.append(this.title, this.button);
     this.header.style.height = `${HEADER_HEIGHT}px`;
     container.append(this.header);
   }
 
-  /** The one in its head. */
+  /** Creates the button in the header. */
   protected createHeaderButton(): HTMLButtonElement {
     const pin = document.createElement('button');
     const label = t('Pin the block list');
@@ -179,10 +179,10 @@ export class Flyout extends Blockly.VerticalFlyout {
 export const FLYOUT = 'nep';
 Blockly.registry.register(Blockly.registry.Type.FLYOUTS_VERTICAL_TOOLBOX, FLYOUT, Flyout);
 
-// Its buttons ("New variable") are as high as the others of Studio, in pixels at its scale.
+// Gives flyout buttons ("New variable") the height of Studio's other buttons, in pixels at the flyout's scale.
 Blockly.FlyoutButton.TEXT_MARGIN_X = 16;
 Blockly.FlyoutButton.TEXT_MARGIN_Y = 11;
 Blockly.FlyoutButton.BORDER_RADIUS = 8;
 
-/** A click on a field in the flyout opens it: the chosen value is what is dragged out next. */
+/** Opens fields in the flyout on a click, so that a value can be set before the block is dragged out. */
 Blockly.Field.prototype.isClickableInFlyout = () => true;

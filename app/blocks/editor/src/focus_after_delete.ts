@@ -1,21 +1,21 @@
-// Where the keys go when the block that had them is deleted: to a place that Delete cannot remove. Blockly gives them
-// to the next block, and a second Delete by an unsure finger takes that away as well.
+// Focus after the focused block was deleted: moves to a node that Delete can't remove. Blockly focuses the
+// next block, which an accidental second Delete would remove as well.
 import * as Blockly from 'blockly/core';
 
-/** The block that has the keys, itself or by a field or gap of it. */
+/** Returns the focused block; a focused field or slot counts as its block. */
 function focusedSourceBlock(): Blockly.Block | null {
   const node = Blockly.getFocusManager().getFocusedNode();
   if (node instanceof Blockly.BlockSvg) return node;
   return node instanceof Blockly.Field || node instanceof Blockly.RenderedConnection ? node.getSourceBlock() : null;
 }
 
-/** Whether the block is `top` or inside of it; what hangs below `top` stays when a stack is healed. */
+/** Returns true if the block is `top` or a descendant of it. */
 function isWithin(block: Blockly.Block | null, top: Blockly.Block): boolean {
   for (let ancestor = block; ancestor; ancestor = ancestor.getParent()) if (ancestor === top) return true;
   return false;
 }
 
-/** Somebody who goes by keys stays at the place where the block was; for the mouse nothing is selected any more. */
+/** Returns the connection where the block was if the keyboard is in use, otherwise the workspace. */
 function fallbackFocusNode(block: Blockly.BlockSvg): Blockly.IFocusableNode {
   const {workspace} = block;
   const root = workspace.getWorkspaceFocusTarget() ?? workspace;
@@ -30,7 +30,7 @@ Blockly.BlockSvg.prototype.dispose = function (this: Blockly.BlockSvg, heal?: bo
     isWithin(focusedSourceBlock(), this);
   const nextFocus = leaves ? fallbackFocusNode(this) : null;
   originalDispose.call(this, heal, animate);
-  // After Blockly's own choice, which comes with a timeout as well.
+  // Blockly moves the focus in a timeout as well; ours has to run after it.
   if (nextFocus) window.setTimeout(() => moveFocus(nextFocus, workspace));
 };
 

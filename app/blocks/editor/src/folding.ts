@@ -1,7 +1,7 @@
-// Blocks that are folded up to one line: by their menu, or by a double click beside their fields.
+// Collapsing of blocks by their menu or by a double click beside their fields.
 import * as Blockly from 'blockly/core';
 
-/** Whether folding shows less: the block holds others, or has room for some. */
+/** Returns true if collapsing hides anything: the block contains blocks or has a statement slot. */
 export function canCollapse(block: Blockly.BlockSvg): boolean {
   const below = block.getNextBlock();
   return block.getChildren(false).some((child) => !child.isShadow() && child !== below) ||
@@ -15,7 +15,7 @@ export function setCollapsed(block: Blockly.BlockSvg, folded: boolean): void {
   Blockly.Events.setGroup(group);
 }
 
-/** The block that is seen in the place of this one: itself, or the outermost folded one around it. */
+/** Returns the block shown in place of this one: itself, or the outermost collapsed block around it. */
 export function visibleBlockOf(block: Blockly.BlockSvg): Blockly.BlockSvg {
   let visible = block;
   for (let ancestor = block.getSurroundParent(); ancestor; ancestor = ancestor.getSurroundParent()) if (ancestor.isCollapsed()) visible = ancestor;
@@ -24,7 +24,7 @@ export function visibleBlockOf(block: Blockly.BlockSvg): Blockly.BlockSvg {
 
 const DOUBLE_CLICK_MS = 450;
 
-/** Fields, buttons and notes have clicks of their own: only what is clicked beside them is told as the block's. */
+/** Collapses or expands a block on a double click; Blockly reports clicks on fields and notes separately. */
 export function collapseOnDoubleClick(workspace: Blockly.WorkspaceSvg): void {
   let [id, at] = ['', 0];
   workspace.addChangeListener((event) => {

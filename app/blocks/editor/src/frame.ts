@@ -1,15 +1,15 @@
-// A frame drawn on the canvas chooses the blocks and notes that it touches: with Shift, or after a press of its button.
+// Marquee selection of blocks and notes: drag on the canvas with Shift, or after a click on its button.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {ctrl} from './keys';
 import {type Item, type Selection, areasOf, isNote, selectionOf} from './selection';
 import {t} from './words';
 
-/** How near the edge of the canvas the view moves along, and how far a picture, in pixels. */
+/** Distance from the edge of the canvas at which the view scrolls, and scroll step per frame, in pixels. */
 const SCROLL_MARGIN = 28;
 const SCROLL_STEP = 14;
 
-/** Pressed: the next drag on the canvas draws a frame, also without Shift. One for all behaviours. */
+/** Marquee button, shared by all behaviours: while pressed, the next drag on the canvas selects without Shift. */
 let button: HTMLButtonElement | null = null;
 
 export function marqueeButton(): HTMLButtonElement {
@@ -37,11 +37,11 @@ function setArmed(armed: boolean): void {
 
 interface MarqueeDrag {
   pointer: number;
-  /** Where it began on the canvas, which the view may leave. */
+  /** Start in workspace coordinates, which may scroll out of view. */
   start: Blockly.utils.Coordinate;
   mouse: {x: number; y: number};
   areas: ReturnType<typeof areasOf>;
-  /** What was chosen before and stays: Ctrl or Shift adds. */
+  /** Items selected before, which Ctrl or Shift extends. */
   kept: Item[];
   found: Item[];
 }
@@ -67,7 +67,7 @@ export class Marquee {
 
   private begin(event: PointerEvent): void {
     if (event.button !== 0 || !event.isPrimary || !(event.shiftKey || isArmed()) || !isCanvasElement(event.target)) return;
-    event.stopPropagation();  // else the canvas would be moved
+    event.stopPropagation();  // otherwise the drag would scroll the canvas
     event.preventDefault();
     const injectionDiv = this.workspace.getInjectionDiv();
     injectionDiv.setPointerCapture(event.pointerId);
@@ -95,7 +95,7 @@ export class Marquee {
     this.selection.select([...drawing.kept, ...drawing.found]);
   }
 
-  /** Leaves chosen what was chosen before. */
+  /** Cancels the drag and restores the previous selection. */
   private cancel(): void {
     window.cancelAnimationFrame(this.waiting);
     this.waiting = 0;
@@ -131,7 +131,7 @@ export class Marquee {
     this.selection.setSelectedItems([...drawing.kept, ...drawing.found]);
   }
 
-  /** Whether the view moved along, as the mouse is at its edge. */
+  /** Scrolls if the mouse is near the edge; returns true if the view moved. */
   private autoScroll({x, y}: {x: number; y: number}): boolean {
     const view = this.workspace.getParentSvg().getBoundingClientRect();
     const left = view.left + this.workspace.getMetricsManager().getAbsoluteMetrics().left;
@@ -147,7 +147,7 @@ export class Marquee {
   }
 }
 
-/** The canvas itself, no block, note or flyout. */
+/** Returns true for the canvas itself: not a block, note or flyout. */
 function isCanvasElement(target: EventTarget | null): boolean {
   return target instanceof Element && !target.closest('.blocklyFlyout') &&
     (target.classList.contains('blocklyMainBackground') || target.classList.contains('blocklySvg') ||
@@ -156,7 +156,7 @@ function isCanvasElement(target: EventTarget | null): boolean {
 
 const SELECT_ALL = 'nepChooseAll';
 
-/** All blocks and notes of the shown behaviour: whole scripts, but for values that are inside of others. */
+/** Selects all notes and the outer blocks of all scripts, which include the blocks inside them. */
 export function selectAll(workspace: Blockly.WorkspaceSvg): void {
   const items: Item[] = workspace.getTopComments().filter(isNote);
   for (const top of workspace.getTopBlocks(true)) {
@@ -177,5 +177,5 @@ export function registerSelectAll(): void {
   });
 }
 
-/** The shortcut that menus show. */
+/** Name of the shortcut, shown in menus. */
 export const SELECT_ALL_SHORTCUT = SELECT_ALL;

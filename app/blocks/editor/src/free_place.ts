@@ -1,23 +1,23 @@
-// A place on the canvas where something new lies free: near where it is wanted, on nothing else, in sight.
+// Search for a free visible position for new blocks and notes, near the requested one.
 import * as Blockly from 'blockly/core';
 
 const {Rect, Coordinate} = Blockly.utils;
 type Box = Blockly.utils.Rect;
 type Point = Blockly.utils.Coordinate;
 
-/** Between what is new and what is there: more than Blockly's reach of a connection, so that nothing seems to hang on it. */
+/** Gap to existing items; larger than Blockly's snap radius, so that nothing looks connected. */
 const GAP = 34;
 const STEP = 28;
 const MAX_RINGS = 60;
 
-/** What is on the canvas, in its units: whole stacks and notes. */
+/** Returns the bounds of all stacks and notes except `but`, in workspace units. */
 export function obstacles(workspace: Blockly.WorkspaceSvg, but: ReadonlySet<unknown>): Box[] {
   return [...workspace.getTopBlocks(false), ...workspace.getTopComments()]
     .filter((item) => !but.has(item))
     .map((item) => (item as Blockly.IBoundedElement).getBoundingRectangle());
 }
 
-/** The part of the canvas that can be seen, in its units; what the open toolbox covers cannot. */
+/** Returns the visible part of the canvas, which excludes the toolbox, in workspace units. */
 export function visibleArea(workspace: Blockly.WorkspaceSvg): Box {
   const {left, top, width, height} = workspace.getMetricsManager().getViewMetrics(true);
   const margin = 12 / workspace.scale;
@@ -32,14 +32,14 @@ function rectAt(position: Point, width: number, height: number): Box {
   return new Rect(position.y, position.y + height, position.x, position.x + width);
 }
 
-/** Whether it can be seen as far as its size allows: a tall stack at least with its beginning. */
+/** Returns true if the box is in view as far as its size allows; of a tall stack, the top is enough. */
 function isVisibleIn(box: Box, view: Box): boolean {
   const requiredWidth = Math.min(box.getWidth(), view.getWidth());
   const requiredHeight = Math.min(box.getHeight(), view.getHeight() / 2);
   return box.left >= view.left && box.left + requiredWidth <= view.right && box.top >= view.top && box.top + requiredHeight <= view.bottom;
 }
 
-/** Rings of places around the one that is wanted, the nearest first. */
+/** Yields rings of positions around the center, nearest first. */
 function* positionsAround(center: Point): Generator<Point> {
   yield center;
   for (let ring = 1; ring <= MAX_RINGS; ring += 1) {
@@ -53,7 +53,7 @@ function* positionsAround(center: Point): Generator<Point> {
   }
 }
 
-/** The free place nearest to `wanted` that can be seen; when all that can be seen is full, the nearest free one. */
+/** Returns the free visible position nearest to `target`, or the nearest free one if the whole view is full. */
 export function findFreePosition(target: Point, size: {width: number; height: number}, others: Box[], view: Box,
   gap = GAP): Point {
   let hidden: Point | null = null;

@@ -1,4 +1,4 @@
-// The functions of a behaviour: uses follow their function, and the toolbox offers them.
+// Functions of a behaviour: keeps calls in sync with their definitions and lists the functions in the toolbox.
 import * as Blockly from 'blockly/core';
 import {CALLS, type CallBlock, type DefinitionBlock, FieldFunctionInput, definitionsOf, freshName,
   functionName, updateCall} from './mutators';
@@ -7,7 +7,7 @@ import {Toolbox} from './toolbox';
 export const FUNCTIONS = 'functions';
 
 export class Functions {
-  /** What there was when it was last looked at: ids, names, inputs. */
+  /** Ids, names and inputs of the functions at the last check. */
   private snapshot = '';
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
@@ -15,7 +15,7 @@ export class Functions {
     workspace.registerToolboxCategoryCallback(FUNCTIONS, () => this.flyoutContents());
   }
 
-  /** Another program is here. */
+  /** Updates everything after another program was loaded. */
   refresh(): void {
     this.snapshot = this.takeSnapshot();
     this.renameInputs();
@@ -30,7 +30,7 @@ export class Functions {
     if (!creates && event.type !== Blockly.Events.BLOCK_CHANGE && event.type !== Blockly.Events.BLOCK_DELETE) return;
     const now = this.takeSnapshot();
     if (now === this.snapshot && !(creates && this.callBlocks().length)) return;
-    // What follows from an undo is no step of its own.
+    // Keep the update in the group of its cause; after an undo it isn't recorded.
     const recording = Blockly.Events.getRecordUndo();
     const group = Blockly.Events.getGroup();
     Blockly.Events.setRecordUndo(event.recordUndo);
@@ -50,7 +50,7 @@ export class Functions {
     return CALLS.flatMap((type) => this.workspace.getBlocksByType(type, false)) as CallBlock[];
   }
 
-  /** A copy of a function gets a name of its own. */
+  /** Gives a copied function a unique name. */
   private makeNamesUnique(event: Blockly.Events.BlockCreate): void {
     const createdIds = new Set(event.ids ?? []);
     const all = definitionsOf(this.workspace);
@@ -82,7 +82,7 @@ export class Functions {
     }
   }
 
-  /** The uses of each function, and its inputs. */
+  /** Returns the static blocks, and each function's call blocks and inputs. */
   private flyoutContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
     const staticItems = toolbox instanceof Toolbox ? toolbox.contentsOf(FUNCTIONS) : [];

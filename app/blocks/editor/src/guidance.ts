@@ -1,4 +1,4 @@
-// What helps a person begin: the words on an empty canvas, and a ring round the block that comes next.
+// Onboarding: the hints on an empty canvas, and a ring around the next block to use.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {formatShortcut} from './keys';
@@ -13,13 +13,13 @@ const RELEVANT_EVENTS = new Set<string>([
   Blockly.Events.TOOLBOX_ITEM_SELECT,
 ]);
 
-/** What the window knows: the words of "when started", and whether there is a robot. */
+/** State from the window: the label of the "when started" block, and whether there is a robot. */
 export interface EmptyCanvasInfo {
   first: string;
   robot: boolean;
 }
 
-/** A block to take, by its type; its name, and where to put it, in the person's words. */
+/** Block type to point at, with its display name and the hint where to put it. */
 export interface PointerTarget {
   block: string;
   name: string;
@@ -37,7 +37,7 @@ function isVisible(rect: DOMRect): boolean {
   return rect.width > 0 && rect.height > 0;
 }
 
-/** The words on an empty canvas. Only its buttons take the mouse: a block can be dropped anywhere on it. */
+/** Hints on an empty canvas. Only the buttons receive mouse events, so that a block can be dropped anywhere. */
 export class EmptyCanvas {
   private readonly box = createElement('aside', 'nepBegin');
   private readonly dropTarget = createElement('div', 'nepBeginPlace');
@@ -69,7 +69,7 @@ export class EmptyCanvas {
     this.scheduleUpdate();
   }
 
-  /** Looks after what may have made the canvas empty, or ended that; once a frame at most. */
+  /** Updates the hints, at most once per frame, after events that can make the canvas empty or fill it. */
   watch(workspace: Blockly.WorkspaceSvg): void {
     const toolbox = workspace.getInjectionDiv().querySelector('.blocklyToolbox');
     if (toolbox) new ResizeObserver(() => this.scheduleUpdate()).observe(toolbox);
@@ -116,7 +116,7 @@ export class EmptyCanvas {
   }
 }
 
-/** A ring round the category that has a block, then round the block itself, until it is on the canvas. */
+/** Ring around the category of a block, then around the block itself, until the block is on the canvas. */
 export class BlockPointer {
   private readonly ring = createElement('div', 'nepRing');
   private readonly bubble = createElement('div', 'nepRingBubble');
@@ -145,7 +145,7 @@ export class BlockPointer {
     this.update();
   }
 
-  /** The keys go to the category that has it. */
+  /** Focuses the category that contains the block. */
   focusCategory(): void {
     const category = this.target && findCategory(this.getWorkspace(), this.target.block);
     if (!category) return;
@@ -175,7 +175,7 @@ export class BlockPointer {
     if (this.bubble.textContent !== text) this.bubble.textContent = text;
   }
 
-  /** Who uses the keys is told of keys. */
+  /** Returns the hint; it mentions keys if the keyboard is in use. */
   private hintText(isOpen: boolean, {name, then}: PointerTarget, category: string): string {
     const byKeys = isKeyboardLed();
     if (isOpen) return byKeys ? t('Press Enter to pick it up and Enter again to place it') : then;
@@ -200,14 +200,14 @@ export class BlockPointer {
   }
 }
 
-/** The block of this type in the open category. */
+/** Returns the block of this type in the open category. */
 function findFlyoutBlock(workspace: Blockly.WorkspaceSvg, type: string): Element | null {
   const flyout = workspace.getFlyout();
   if (!flyout?.isVisible()) return null;
   return flyout.getWorkspace().getTopBlocks(false).find((block) => block.type === type)?.pathObject.svgPath ?? null;
 }
 
-/** The category that has a block of this type. */
+/** Returns the category that contains a block of this type. */
 function findCategory(workspace: Blockly.WorkspaceSvg, type: string): Blockly.ToolboxCategory | null {
   for (const item of workspace.getToolbox()?.getToolboxItems() ?? []) {
     if (!(item instanceof Blockly.ToolboxCategory)) continue;

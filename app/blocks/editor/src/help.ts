@@ -1,4 +1,4 @@
-// Help for one block: a card in the page, made of what the window tells about each block.
+// Help card for a block, with the texts from the window.
 import * as Blockly from 'blockly/core';
 import {iconElement, iconName} from './icons';
 import {isUnknown} from './unknown_blocks';
@@ -7,13 +7,13 @@ import {t} from './words';
 
 export interface BlockHelp {
   title: string;
-  /** What a sentence calls the block: “walk”; "" when it is only signs. */
+  /** Name of the block in a sentence, such as “walk”; "" if its label has only symbols. */
   name: string;
   does: string;
   more: string;
   gaps: [string, string][];
   example: string;
-  /** Other words that people look for it by: those of their language, and English ones; what may be chosen on it. */
+  /** Search terms: synonyms in the user's language and in English, and the options of the block's fields. */
   words: string;
   english: string;
   choices: string[];
@@ -29,13 +29,13 @@ export function helpFor(type: string): BlockHelp | null {
   return Object.hasOwn(helpByType, type) ? helpByType[type] ?? null : null;
 }
 
-/** The block that the keys go to: selected, or in the toolbox, or the one of a field or gap. */
+/** Returns the focused block, on the canvas or in the toolbox; a focused field or slot counts as its block. */
 export function focusedBlock(): Blockly.BlockSvg | null {
   const node = Blockly.getFocusManager().getFocusedNode();
   const source = node instanceof Blockly.BlockSvg ? node :
     node instanceof Blockly.Field || node instanceof Blockly.RenderedConnection ? node.getSourceBlock() : null;
   let block = source instanceof Blockly.BlockSvg ? source : null;
-  // The grey value in a gap is part of what holds it.
+  // A shadow block counts as part of its parent.
   while (block?.isShadow() && block.getParent()) block = block.getParent();
   return block;
 }
@@ -44,7 +44,7 @@ export class HelpCard {
   private card: HTMLElement | null = null;
   private back: Blockly.IFocusableNode | null = null;
 
-  /** Shows the help of this block; false when there is none. */
+  /** Shows the help of this block; returns false if there is none. */
   show(block: Blockly.BlockSvg | null): boolean {
     const help = block ? isUnknown(block) ? unknownBlockHelp(block) : helpFor(block.type) : null;
     if (!block || !help) return false;
@@ -111,7 +111,7 @@ function createElement(tag: string, name: string, text = ''): HTMLElement {
   return node;
 }
 
-/** “Help” in the context menu of every block that has some. */
+/** Registers “Help” in the context menu of blocks that have a help text. */
 export function registerHelpMenu(show: (block: Blockly.BlockSvg) => void): void {
   Blockly.ContextMenuRegistry.registry.register({
     id: 'nepHelp',

@@ -1,4 +1,4 @@
-// A sentence in a box next to a place on the canvas; it goes after some seconds, at the next click or when the view moves.
+// Hint near a position on the canvas; hides after some seconds, at the next click or when the view moves.
 import * as Blockly from 'blockly/core';
 
 const DISPLAY_MS = 6000;
@@ -21,7 +21,7 @@ export class Hint {
     workspace.getInjectionDiv().addEventListener('pointerdown', () => this.hide(), true);
   }
 
-  /** The hint of a tab's workspace. */
+  /** Returns the hint of a workspace. */
   static of(workspace: Blockly.Workspace | null | undefined): Hint | null {
     return (workspace && hints.get(workspace)) ?? null;
   }
@@ -30,7 +30,7 @@ export class Hint {
     window.clearTimeout(this.timer);
   }
 
-  /** Shows a sentence below this place of the page, or above it where there is no room. */
+  /** Shows the text below this position on the page, or above it if there is no space. */
   show(text: string, position: Blockly.utils.Coordinate): void {
     window.clearTimeout(this.timer);
     this.box.textContent = text;
@@ -50,7 +50,7 @@ export class Hint {
     this.box.textContent = '';
   }
 
-  /** Where the box is in the page. */
+  /** Bounds of the hint on the page. */
   get bounds(): DOMRect {
     return this.box.getBoundingClientRect();
   }

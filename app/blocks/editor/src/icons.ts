@@ -4,7 +4,7 @@ import {categoryIcon} from './tokens';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
 
-/** Filled glyphs of our own, on the same 24 x 24 grid. */
+/** Our own filled glyphs, on the same 24 x 24 grid. */
 const FILLED_ICONS: Readonly<Record<string, string>> = {
   'quote-open':
     '<path d="M10.6 5.2C6 6.6 3 10 3 14.3 3 17 4.600 18.800 6.900 18.800c2.100 0 3.600-1.500 3.600-3.500' +
@@ -18,17 +18,17 @@ const FILLED_ICONS: Readonly<Record<string, string>> = {
     ' 3.400-4 4.200z"/>',
 };
 
-/** The name itself if there is such an icon, else the icon of the category (block style). */
+/** Returns the name if such an icon exists, otherwise the icon of the category (block style). */
 export function iconName(name: string, style: string): string {
   if (Object.hasOwn(lucide, name) || Object.hasOwn(FILLED_ICONS, name)) return name;
   const fallback = categoryIcon(style);
   return Object.hasOwn(lucide, fallback) ? fallback : 'circle-dot';
 }
 
-/** Each icon is parsed once; a page with a thousand blocks copies it. */
+/** Parsed icons, which are cloned for each use. */
 const iconCache = new Map<string, SVGElement>();
 
-/** Fills `group` with the icon, scaled to `size` units; colours come from CSS. */
+/** Fills `group` with the icon, scaled to `size` units and coloured by CSS. */
 export function drawIcon(group: Element, name: string, size: number): void {
   const key = `${size} ${name}`;
   let drawn = iconCache.get(key);
@@ -45,7 +45,7 @@ export function drawIcon(group: Element, name: string, size: number): void {
   group.replaceChildren(drawn.cloneNode(true));
 }
 
-/** A free-standing <svg> of the icon for HTML (toolbox, buttons). */
+/** Returns the icon as an <svg> element for HTML (toolbox, buttons). */
 export function iconElement(name: string, size: number, stroke = 2): SVGSVGElement {
   const svg = document.createElementNS(SVG_NS, 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');

@@ -1,10 +1,10 @@
-// What the window tells the page, in its order. A long program takes a second to make, in which the page paints nothing:
-// the canvas is covered first, so that nobody takes the blocks of before for those of the new title.
+// Queue of messages from the window, processed in order. Loading a long program blocks painting for about a
+// second: the canvas is covered first, so that the old blocks aren't shown under the new title.
 import {t} from './words';
 
-/** A program as long as this may take longer than an eye blinks. */
+/** Payload length above which loading can be noticeably slow. */
 const LARGE_PAYLOAD_LENGTH = 12_000;
-/** A page that nobody sees paints nothing: it waits no longer than this. */
+/** Fallback for a hidden page, which is never painted. */
 const HIDDEN_PAGE_TIMEOUT_MS = 100;
 
 export class Inbox {

@@ -1,5 +1,5 @@
-// What is inside a folded block and must not be forgotten there: notes, and "Pause here". The folded block has a small
-// mark for each kind; the mark unfolds it and leads to the first block that is meant.
+// Marks on a collapsed block for what is hidden inside: notes and breakpoints ("Pause here"). One mark for
+// each kind; a click expands the block and moves to the first hidden block of that kind.
 import * as Blockly from 'blockly/core';
 import {hasBreakpoint} from './breakpoints';
 import {setCollapsed, visibleBlockOf} from './folding';
@@ -11,7 +11,7 @@ type Block = Blockly.BlockSvg;
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
 const MARK_SIZE = 22;
-/** Right of the block; of a value, which has another block there, over its corner. */
+/** Distance to the right of the block; on a value block the marks are over its corner, as its right is occupied. */
 const MARK_MARGIN = 6;
 const MARK_SPACING = 4;
 
@@ -28,22 +28,22 @@ const MARK_KINDS: readonly MarkKind[] = [
     words: (blocks) => t('Contains a note: {text}', {text: blocks.map(getNoteText).filter(Boolean).join(' · ')})},
 ];
 
-/** Folded blocks, each with the marks that it shows. */
+/** Marks shown on each collapsed block. */
 const marksByBlock = new Map<Block, SVGElement[]>();
 
-/** All that is hidden inside of a folded block, in the order of reading; not what hangs below it. */
+/** Returns the blocks hidden in a collapsed block in reading order, without the blocks below it. */
 function hiddenBlocks(block: Block): Block[] {
   const below = new Set(block.getNextBlock()?.getDescendants(false) ?? []);
   return block.getDescendants(true).filter((descendant) => descendant !== block && !below.has(descendant));
 }
 
-/** The first block of this kind that is hidden in a folded one. */
+/** Returns the first block of this kind that is hidden in a collapsed block. */
 export function findHidden(block: Block, name: MarkKind['name']): Block | null {
   const kind = MARK_KINDS.find((candidate) => candidate.name === name)!;
   return block.isCollapsed() ? hiddenBlocks(block).find(kind.is) ?? null : null;
 }
 
-/** Unfolds whatever hides it, as one step, and gives it the keys. */
+/** Expands all blocks that hide this one, in one undo step, and focuses it. */
 export function revealBlock(block: Block): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
@@ -99,7 +99,7 @@ Blockly.BlockSvg.prototype.renderEfficiently = function (this: Block) {
   if (this.isCollapsed() || marksByBlock.has(this)) updateMarks(this);
 };
 
-/** Keeps the marks true while what is inside of folded blocks changes. */
+/** Updates the marks when the blocks inside collapsed blocks change. */
 export function registerInsideMarks(workspace: Blockly.WorkspaceSvg): void {
   let waiting = 0;
   workspace.addChangeListener((event) => {

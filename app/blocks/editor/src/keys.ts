@@ -1,6 +1,6 @@
-// The keys of the page. Blockly gives bare letters to many of its commands (D duplicates, C tidies): whoever types
-// into nothing would change the program, so that each has Ctrl, Shift or Alt beside it here, or no key.
-// `app/ui/shell/actions/shortcuts.py` lists them for people.
+// Keyboard shortcuts of the page. Blockly assigns bare letters to many commands (D duplicates, C cleans up), so
+// that typing outside a text field would edit the program; here each shortcut has a modifier key, or is removed.
+// `app/ui/shell/actions/shortcuts.py` lists the shortcuts for users.
 import * as Blockly from 'blockly/core';
 import type {Clipboard} from './clipboard';
 import {deleteByKey} from './selection';
@@ -13,7 +13,7 @@ type Keys = NonNullable<Shortcut['keyCodes']>;
 
 const registry = Blockly.ShortcutRegistry.registry;
 
-/** Ctrl, on a Mac Cmd, with a key. */
+/** Returns the key with Ctrl, or Cmd on a Mac. */
 export function ctrl(key: number, ...more: number[]): string {
   return registry.createSerializedKey(key, [KeyCodes.CTRL_CMD, ...more]);
 }
@@ -32,16 +32,16 @@ const SHORTCUT_KEYS: Readonly<Record<string, Keys>> = {
   [names.FOCUS_WORKSPACE]: [ctrl(KeyCodes.B, KeyCodes.SHIFT)],
   [names.NEXT_STACK]: [alt(KeyCodes.DOWN)],
   [names.PREVIOUS_STACK]: [alt(KeyCodes.UP)],
-  // In the toolbox, where these are asked before the two above.
+  // For the toolbox, where Blockly checks these before the two above.
   [names.NEXT_HEADING]: [alt(KeyCodes.DOWN)],
   [names.PREVIOUS_HEADING]: [alt(KeyCodes.UP)],
-  // Ctrl+Enter runs from the block that has the keyboard (`tries.ts`).
+  // Ctrl+Enter (`tries.ts`) runs from the focused block.
   [names.MENU]: [registry.createSerializedKey(KeyCodes.F10, [KeyCodes.SHIFT]), KeyCodes.CONTEXT_MENU],
   [names.INFORMATION]: [alt(KeyCodes.I)],
   [names.EXTENDED_INFORMATION]: [alt(KeyCodes.I, KeyCodes.SHIFT)],
 };
 
-/** Whether a person presses it while typing: a letter or a digit, alone or with Shift. */
+/** Returns true for a key used for typing: a letter or a digit, alone or with Shift. */
 function isTypingKey(key: string): boolean {
   const code = Number(key.replace(/^Shift\+/, ''));
   return (code >= KeyCodes.ZERO && code <= KeyCodes.NINE) || (code >= KeyCodes.A && code <= KeyCodes.Z);
@@ -54,7 +54,7 @@ function overrideShortcut(name: string, keyCodes: Keys, changes: Partial<Shortcu
   registry.register({...shortcut, ...changes, keyCodes, allowCollision: true}, true);
 }
 
-/** Takes the one block out of its stack, which closes behind it; Blockly takes all below along when Shift is held. */
+/** Detaches only the focused block and closes its stack; with Shift, Blockly would detach the blocks below, too. */
 function unplugFocusedBlock(): boolean {
   const block = Blockly.getFocusManager().getFocusedNode();
   if (!(block instanceof Blockly.BlockSvg)) return false;
@@ -69,7 +69,7 @@ const KEY_NAMES: Readonly<Record<number, string>> = {
   [KeyCodes.DELETE]: lazy('Del'), [KeyCodes.ENTER]: '↵', [KeyCodes.UP]: '↑', [KeyCodes.DOWN]: '↓', [KeyCodes.SLASH]: '/',
 };
 
-/** The first key of a command as menus show it: Ctrl+D, on a Mac ⌘D. */
+/** Returns a command's first shortcut as shown in menus: Ctrl+D, or ⌘D on a Mac. */
 export function formatShortcut(name: string): string {
   const [key] = registry.getKeyCodesByShortcutName(name);
   if (!key) return '';
@@ -83,7 +83,7 @@ export function formatShortcut(name: string): string {
   return [...modifiers, last ? t(last) : String.fromCharCode(code)].join(isMac ? '' : '+');
 }
 
-/** Copy, cut, paste and duplicate as our clipboard does them. */
+/** Replaces Blockly's shortcuts for copy, cut, paste and duplicate with those of our clipboard. */
 export function registerClipboardShortcuts(clipboard: Clipboard): void {
   const canRun = (workspace: Blockly.WorkspaceSvg) =>
     !workspace.isDragging() && !Blockly.getFocusManager().ephemeralFocusTaken();
@@ -104,7 +104,7 @@ export function registerClipboardShortcuts(clipboard: Clipboard): void {
   setCallback(names.DUPLICATE, () => clipboard.duplicate());
 }
 
-/** Call it once, after everybody has registered their shortcuts. */
+/** Applies the shortcuts; call once, after all shortcuts have been registered. */
 export function applyShortcutKeys(): void {
   for (const [name, keys] of Object.entries(SHORTCUT_KEYS)) {
     overrideShortcut(name, keys, name === names.DISCONNECT ? {callback: unplugFocusedBlock} : {});

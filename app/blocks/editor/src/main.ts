@@ -1,4 +1,4 @@
-// The page of the block editor: what the window tells it (`nepReceive`) and what it tells the window.
+// Page of the block editor: handles messages from the window (`nepReceive`) and sends messages to it.
 import * as Blockly from 'blockly/core';
 import './blockly_patches';
 import './fields';
@@ -107,9 +107,9 @@ class Editor {
       letGoOutside: (tab, drag, mouse) => this.carrying.dropOutside(tab, drag, mouse),
     });
     this.tabs.setPinned(pinned);
-    // On paper the page has another size for a moment.
+    // Don't resize for printing, which changes the size of the page temporarily.
     new ResizeObserver(() => window.matchMedia('print').matches || this.tabs.resize()).observe(document.body);
-    // A hidden page draws no frames, and Blockly tells of edits only after a frame.
+    // A hidden page has no animation frames, and Blockly fires events only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.activeTab.program.flush());
     this.createZoomButtons();
     registerTries((request) => bridge.tries(JSON.stringify(request)));
@@ -119,7 +119,7 @@ class Editor {
     registerMenu(this.clipboard);
     registerBackpack((json) => bridge.backpack(json), () => this.activeTab.backpack);
     registerPictureMenu((command) => bridge.command(command));
-    // Keys that come while nothing in the page has them, as after a change of tabs, are the canvas's.
+    // Send shortcuts to the canvas if no element has the focus, such as after a tab switch.
     document.addEventListener('keydown', (event) => {
       if (document.activeElement !== document.body || !(event.ctrlKey || event.metaKey)) return;
       Blockly.ShortcutRegistry.registry.onKeyDown(this.activeTab.workspace, event);
@@ -193,7 +193,7 @@ class Editor {
       this.bridge.opened();
     },
     edit: (action: 'copy' | 'cut' | 'paste' | 'duplicate' | 'selectAll') => {
-      // What we are told may be here before the keys are: until they come Blockly knows of no chosen block.
+      // The command can arrive before the page gets the focus; until then, Blockly has no selected block.
       if (!this.activeTab.hasFocus || !Blockly.getFocusManager().getFocusedNode()) this.activeTab.focus();
       if (action === 'selectAll') selectAll(this.activeTab.workspace);
       else void this.clipboard[action]();
@@ -202,7 +202,7 @@ class Editor {
     point: (target: PointerTarget | null) => this.pointer.show(target),
   };
 
-  /** A block of the toolbox that was tried says so, too. */
+  /** Shows errors on their blocks, also on a block of the toolbox that was tried. */
   private setErrors(errors: Record<string, string>): void {
     this.activeTab.overlays.setErrors(errors);
     for (const [id, sentence] of Object.entries(errors)) {
@@ -226,22 +226,22 @@ class Editor {
     this.notifyWatched();
   }
 
-  /** The window tells what these variables hold. */
+  /** Requests the values of the watched variables from the window. */
   private notifyWatched(): void {
     const watched = JSON.stringify(this.activeTab.watched.ids);
     if (watched !== this.watched) this.bridge.watches(this.watched = watched);
   }
 
-  /** The window watches the sensors in the toolbox as long as it shows them. */
+  /** Requests the values of the sensors shown in the toolbox from the window. */
   private notifyOfferedSensors(): void {
     const offered = JSON.stringify(this.activeTab.offered);
     if (offered !== this.offered) this.bridge.offers(this.offered = offered);
   }
 
-  /** The looks of the light theme while `draw` reads them. */
+  /** Runs `draw` with the light theme. */
   private withLightTheme<T>(draw: () => T): T {
     const {tokens, dark} = this.theme;
-    if (dark) this.setTheme(tokens, false);  // nobody sees it: all is as before when the page is painted
+    if (dark) this.setTheme(tokens, false);  // never visible: the theme is restored before the next paint
     try {
       return draw();
     } finally {
@@ -249,7 +249,7 @@ class Editor {
     }
   }
 
-  /** The window hears how many pages lie ready for the printer; "" when there is nothing to be seen. */
+  /** Lays out the pages to print and reports their number to the window; "" if there are no blocks. */
   private preparePrint({token, ...paper}: Paper & {token: number}): void {
     let count = 0;
     try {
@@ -259,7 +259,7 @@ class Editor {
     }
   }
 
-  /** The window gets "" when there is nothing to be seen. */
+  /** Sends a picture of the program to the window; "" if there are no blocks. */
   private async sendPicture({token, kind, white}: PictureRequest): Promise<void> {
     let data = '';
     try {
@@ -303,7 +303,7 @@ class Editor {
     this.updateBinButton();
   }
 
-  /** The bin's button says how many deletions wait in it. */
+  /** Updates the bin button's label with the number of entries. */
   private updateBinButton(): void {
     const count = this.activeTab.bin.size;
     const label = count ? t('Deleted blocks ({count})', {count}) : t('Deleted blocks');
@@ -327,10 +327,10 @@ interface InitialState {
   theme: {tokens: Tokens; dark: boolean};
 }
 
-/** Blockly's own words in this language, or in English when there are none; which it was. */
+/** Loads Blockly's messages in this language, otherwise in English; returns the language that was loaded. */
 async function loadLocale(requested: string): Promise<string> {
   for (const language of new Set([requested, requested.split(/[-_]/)[0] ?? '', 'en'])) {
-    // A file that does not exist is a failed request in our scheme, not an answer with a status.
+    // In our URL scheme a missing file is a failed request, not a response with a status.
     const response = await fetch(`msg/${encodeURIComponent(language.toLowerCase())}.json`).catch(() => null);
     if (!response?.ok) continue;
     Blockly.setLocale(await response.json() as Record<string, string>);
@@ -349,7 +349,7 @@ async function start(bridge: Bridge): Promise<void> {
   setBlocklyMessages(language);
   configureMenu();
   applyShortcutKeys();
-  // Blockly measures text once, so the fonts must be loaded before.
+  // Load the fonts first, because Blockly caches the width of text.
   const fonts = ['600 15px Inter', '500 14px Inter', ...(language === 'ja' ? ['600 15px "M PLUS 1p"'] : [])];
   await Promise.allSettled(fonts.map((font) => document.fonts.load(font)));
   const editor = new Editor(bridge, beginning.pinned, beginning.theme);

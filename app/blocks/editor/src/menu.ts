@@ -1,6 +1,6 @@
-// The menus of blocks and of the canvas: their entries, their words, and how a row looks.
-// Who adds entries registers them with Blockly and names an icon with `menuIcon`. Weights: 0 to 9 what runs, 10 to 49
-// copying, 50 to 79 how the block is, 80 to 89 parts of it, 90 help, 99 deleting; the canvas has room from 70 on.
+// Context menus of blocks and of the canvas: items, labels and rendering of the rows.
+// To add an item, register it with Blockly and set its icon with `setMenuIcon`. Weights: 0 to 9 run, 10 to 49
+// copy and paste, 50 to 79 state, 80 to 89 parts, 90 help, 99 delete; on the canvas, 70 and above are free.
 import * as Blockly from 'blockly/core';
 import {canHaveBreakpoint, hasBreakpoint, toggleBreakpoint} from './breakpoints';
 import {type Clipboard} from './clipboard';
@@ -23,7 +23,7 @@ const TOGGLE_DISABLED = 'nepSwitch';
 const REMOVED_ITEMS = ['collapseWorkspace', 'expandWorkspace', 'blockInline', 'blockHelp', 'commentCreate', 'commentDelete',
   'commentDuplicate', 'blockDuplicate', 'blockCollapseExpand', 'blockDisable', 'blockDelete', 'blockComment'];
 
-/** Blockly's own entries that stay: their weight here, and their icon. */
+/** Items of Blockly that are kept, with their weights and icons. */
 const KEPT_ITEMS: Readonly<Record<string, [weight: number, icon: string]>> = {
   undoWorkspace: [20, 'undo-2'],
   redoWorkspace: [21, 'redo-2'],
@@ -33,12 +33,12 @@ const KEPT_ITEMS: Readonly<Record<string, [weight: number, icon: string]>> = {
 
 const icons = new Map<string, string>();
 
-/** The icon of an entry, by the entry's id. */
+/** Sets the icon of a menu item by the item's id. */
 export function setMenuIcon(id: string, icon: string): void {
   icons.set(id, icon);
 }
 
-/** Before anything is made. */
+/** Sets up the menus; call before any workspace is created. */
 export function configureMenu(): void {
   registerRemoveMenu();
   const registry = Blockly.ContextMenuRegistry.registry;
@@ -52,7 +52,7 @@ export function configureMenu(): void {
   setMenuIcon('nepRemoveItem', 'list-minus');
   setMenuIcon('nepAddElseIf', 'split');
   setMenuIcon('nepAddElse', 'split');
-  // Nothing asks: deleting can be undone.
+  // Never ask for confirmation: deleting can be undone.
   Blockly.dialog.setConfirm((_message, callback) => callback(true));
 }
 
@@ -63,7 +63,7 @@ interface MenuEntry {
   weight: number;
   icon: string;
   words: string | ((scope: Scope) => string);
-  /** The shortcut that does the same. */
+  /** Name of the equivalent shortcut. */
   shortcut?: string;
   when(scope: Scope): boolean | 'disabled';
   run(scope: Scope, location: {x: number; y: number}): unknown;
@@ -88,7 +88,7 @@ function addSeparator(scopeType: Blockly.ContextMenuRegistry.ScopeType, weight: 
   Blockly.ContextMenuRegistry.registry.register({id: `nepLine${scopeType}${weight}`, weight, scopeType, separator: true});
 }
 
-/** Whether a person may change the block of this menu. */
+/** Returns true if the user can edit the block of this menu. */
 function isEditable({block}: Scope): boolean {
   return block !== undefined && !block.isInFlyout && !block.isShadow();
 }
@@ -166,10 +166,10 @@ export function registerMenu(clipboard: Clipboard): void {
     when: () => true, run: (scope) => scope.comment && !deleteSelectionWith(scope.comment) && withUndoGroup(() => scope.comment!.dispose())});
 }
 
-/** The shortcut that puts blocks into the backpack. */
+/** Name of the shortcut that adds blocks to the backpack. */
 export const ADD_TO_BACKPACK = 'nepPack';
 
-/** What the menus need of the backpack. */
+/** Backpack operations that the menus use. */
 interface BackpackActions {
   may(block: Blockly.BlockSvg | undefined): boolean;
   pack(block: Blockly.BlockSvg): void;
@@ -202,9 +202,9 @@ export function registerPictureMenu(command: (name: string) => void): void {
   canvas({id: 'nepPrintBlocks', weight: 63, icon: 'printer', words: t('Print'), run: () => command('print.ask')});
 }
 
-// ---- how a block is
+// ---- state of a block
 
-/** A block that is off is skipped; with the block that starts a script, all of the script. */
+/** Disables or enables a block, so that the program skips it; an event block includes its whole script. */
 export function setDisabled(block: Blockly.BlockSvg, off: boolean): void {
   const selected = getSelectedBlocksWith(block);
   withUndoGroup(() => {
@@ -231,16 +231,16 @@ function deleteLabel(block: Blockly.BlockSvg): string {
     (Blockly.Msg['DELETE_X_BLOCKS'] ?? '').replace('%1', String(count));
 }
 
-/** The block of a menu, or all that are chosen with it. */
+/** Returns the block of a menu, or the selection that contains it. */
 function targetBlocks(block: Blockly.BlockSvg): Blockly.BlockSvg[] {
   const selected = getSelectedBlocksWith(block);
   return selected.length ? selected : [block];
 }
 
-/** Where several blocks are chosen, only what is done to all of them. */
+/** Items that apply to several blocks; the others are hidden in a multiple selection. */
 const MULTI_BLOCK_ITEMS = new Set(['nepDuplicate', 'nepCopy', 'nepCut', 'nepPaste', 'nepCollapse', 'nepExpand', 'nepOff', 'nepOn', 'nepDelete', 'nepPack']);
 
-/** Who adds an entry that is done to all chosen blocks says so. */
+/** Shows a menu item for a multiple selection as well; its action has to handle all selected blocks. */
 export function enableForMultiSelection(id: string): void {
   MULTI_BLOCK_ITEMS.add(id);
 }
@@ -250,7 +250,7 @@ function deleteBlock(block: Blockly.BlockSvg): void {
   block.checkAndDelete();
 }
 
-// ---- how a row looks
+// ---- rendering of a row
 
 function createRow(icon: string, text: string, keys: string): HTMLElement {
   const element = document.createElement('div');
@@ -270,7 +270,7 @@ function createRow(icon: string, text: string, keys: string): HTMLElement {
 
 type Option = Blockly.ContextMenuRegistry.ContextMenuOption;
 
-/** No line at an end, and one where all between two is hidden. */
+/** Removes separators at the ends, and repeated ones where all items between them are hidden. */
 function withoutExtraSeparators(options: Option[]): Option[] {
   const first = options.findIndex((option) => !option.separator);
   const isBeforeSeparator = (index: number) => index + 1 === options.length || options[index + 1]?.separator === true;

@@ -1,9 +1,9 @@
-// Rings are for who uses the keyboard: a click never shows one, the first Tab, arrow or F6 does.
+// Focus rings for keyboard users only: shown from the first Tab, arrow key or F6, hidden by a click.
 import * as Blockly from 'blockly/core';
 
 const NAVIGATION_KEYS = /^(Tab|Arrow(Up|Down|Left|Right)|Home|End|PageUp|PageDown|F6)$/;
 
-/** The keyboard led here, or the mouse did. */
+/** Records whether the last navigation was by keyboard. */
 export function setKeyboardLed(led: boolean): void {
   document.documentElement.classList.toggle('nepKeys', led);
   Blockly.keyboardNavigationController.setIsActive(led);
@@ -13,11 +13,11 @@ export function isKeyboardLed(): boolean {
   return document.documentElement.classList.contains('nepKeys') || Blockly.keyboardNavigationController.getIsActive();
 }
 
-/** Follows what the person uses from now on. */
+/** Starts tracking whether the user works by keyboard or mouse. */
 export function trackInputModality(): void {
   document.addEventListener('pointerdown', () => setKeyboardLed(false), true);
   document.addEventListener('keydown', (event) => {
-    // In a field arrows move the caret.
+    // In a text field, arrow keys move the cursor.
     const types = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement;
     if (NAVIGATION_KEYS.test(event.key) && (!types || event.key === 'Tab')) document.documentElement.classList.add('nepKeys');
   }, true);

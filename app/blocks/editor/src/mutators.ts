@@ -1,4 +1,4 @@
-// Blocks whose gaps people make themselves: items of a list, branches of an "if", inputs of a function.
+// Blocks with a variable number of inputs: items of a list, branches of an "if", inputs of a function.
 import * as Blockly from 'blockly/core';
 import {FieldButton} from './fields';
 import {findFreePosition, visibleArea, obstacles} from './free_place';
@@ -7,7 +7,7 @@ import {t} from './words';
 const MAX_ITEMS = 50;
 export const MAX_INPUTS = 12;
 
-/** An input of a function: its id stays, its name changes. */
+/** Input of a function; its id is constant, its name can change. */
 export interface FunctionInput {
   id: string;
   name: string;
@@ -16,7 +16,7 @@ export interface FunctionInput {
 export const DEFINITIONS = ['functions_define', 'functions_define_result'];
 export const CALLS = ['functions_call', 'functions_result'];
 
-/** Changes the shape of a block as one step that can be undone. */
+/** Changes the shape of a block in one undo step. */
 function reshape(block: Blockly.Block, change: () => void): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
@@ -36,7 +36,7 @@ function appendButtons(block: Blockly.Block, input: Blockly.Input, remove: strin
   input.appendField(button('plus', add, 1), 'MORE');
 }
 
-// ---- a list of n items
+// ---- list of n items
 
 interface ItemsBlock extends Blockly.Block {
   items: number;
@@ -74,14 +74,14 @@ function initItems(this: ItemsBlock): void {
   if (recording) Blockly.Events.enable();
 }
 
-// ---- the branches of an "if"
+// ---- branches of an "if"
 
 const MAX_ELSE_IFS = 20;
 
 interface BranchesBlock extends Blockly.Block {
   elseIfs: number;
   hasElse: boolean;
-  /** How it is without another branch: nothing is kept in the file then. */
+  /** Whether the block has an "else" by default; the file stores nothing for the default shape. */
   beginsWithElse: boolean;
   showBranches(elseIfs: number, hasElse: boolean): void;
 }
@@ -134,12 +134,12 @@ function initBranches(this: BranchesBlock): void {
   row.appendField(createRemoveButton(this, 0));
 }
 
-/** First an "else", then an "else if" above it. */
+/** Adds an "else" first, then an "else if" above it. */
 export function addBranch(block: BranchesBlock, elseIf = block.hasElse): void {
   reshape(block, () => block.showBranches(block.elseIfs + (elseIf ? 1 : 0), block.hasElse || !elseIf));
 }
 
-/** Takes the "else if" of that number away, 0: the "else". What was in it lies free. */
+/** Removes the "else if" with that number, or the "else" for 0; the blocks in it are detached. */
 function removeBranch(block: BranchesBlock, number: number): void {
   reshape(block, () => {
     const childOf = (name: string) => block.getInput(name)?.connection?.targetBlock() ?? null;
@@ -150,7 +150,7 @@ function removeBranch(block: BranchesBlock, number: number): void {
       if (child?.isShadow()) child.dispose(false);
       else if (child) freed.push(child);
     }
-    // The branches below move up.
+    // Move the branches below up.
     for (let next = number + 1; number && next <= block.elseIfs; next += 1) {
       for (const name of ['CONDITION', 'BODY']) {
         const moved = childOf(`${name}${next}`);
@@ -164,7 +164,7 @@ function removeBranch(block: BranchesBlock, number: number): void {
   });
 }
 
-/** Where it can be seen and covers nothing. */
+/** Moves a detached block to a free visible position beside the block. */
 function moveBeside(freed: Blockly.BlockSvg, block: Blockly.BlockSvg): void {
   const {workspace} = block;
   Blockly.renderManagement.triggerQueuedRenders(workspace);
@@ -176,14 +176,14 @@ function moveBeside(freed: Blockly.BlockSvg, block: Blockly.BlockSvg): void {
   freed.moveBy(position.x - x, position.y - y);
 }
 
-/** An "if" that has branches; null: it is another block. */
+/** Returns the block as an "if" with branches, or null if it is another block. */
 export function branchesOf(block: Blockly.Block | undefined): BranchesBlock | null {
   return block && 'showBranches' in block ? block as BranchesBlock : null;
 }
 
-// ---- a function
+// ---- function definition
 
-/** The name of an input on its function; it is kept with the function's shape. */
+/** Name of a function's input; stored in the extra state of the function block. */
 class FieldInputName extends Blockly.FieldTextInput {
   override SERIALIZABLE = false;
 
@@ -206,7 +206,7 @@ export function readInputs(saved: unknown): FunctionInput[] {
   return [...inputsById.values()].slice(0, MAX_INPUTS);
 }
 
-/** A name that no other has: "input", "input 2". */
+/** Returns an unused name: "input", "input 2". */
 export function freshName(stem: string, usedNames: Iterable<string>): string {
   const all = new Set(usedNames);
   let name = stem;
@@ -244,7 +244,7 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
   return field;
 }
 
-/** One input more, or without the one at this place, as one step that can be undone. */
+/** Adds an input, or removes the one at `index` if `by` is negative, in one undo step. */
 export function changeInputs(block: DefinitionBlock, by: number, index: number): void {
   reshape(block, () => shapeInputs(block, by, index));
 }
@@ -279,7 +279,7 @@ export function functionName(definition: Blockly.Block): string {
   return String(definition.getFieldValue('NAME') ?? '');
 }
 
-// ---- the use of a function
+// ---- function call
 
 export interface CallBlock extends Blockly.Block {
   target: string;
@@ -320,22 +320,22 @@ function initCall(this: CallBlock): void {
   this.getInput('INPUTS')?.appendField(new Blockly.FieldLabel('function'), 'NAME');
 }
 
-/** Lets a call follow its function: name, and which inputs there are. */
+/** Updates a call with the name and inputs of its function. */
 export function updateCall(call: CallBlock, definition: DefinitionBlock): void {
   const name = functionName(definition);
   const same = call.target === definition.id && call.called === name && JSON.stringify(call.own) === JSON.stringify(definition.own);
   if (!same) reshape(call, () => call.showCall(definition.id, name, definition.own));
 }
 
-// ---- an input inside its function
+// ---- input inside a function
 
-/** The function whose blocks hold this one. */
+/** Returns the function definition that contains the block. */
 function enclosingDefinition(block: Blockly.Block): DefinitionBlock | null {
   const root = block.getRootBlock();
   return DEFINITIONS.includes(root.type) ? root as DefinitionBlock : null;
 }
 
-/** Shows the name of an input; holds its id. */
+/** Label with the name of an input; its value is the input's id. */
 export class FieldFunctionInput extends Blockly.FieldLabelSerializable {
   protected override getText_(): string {
     const block = this.getSourceBlock();

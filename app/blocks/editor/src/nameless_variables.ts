@@ -1,5 +1,5 @@
-// Variables that blocks of a file use and whose names the file does not say. Blockly would make names up, and they would be
-// saved; ours have a placeholder until a person names them.
+// Variables that blocks of a file use without a name in the file. Blockly would generate names, which would
+// then be saved; ours have a placeholder until the user names them.
 import * as Blockly from 'blockly/core';
 import {argsOf, definitionOf} from './definitions';
 import type {BlockState} from './unknown_blocks';
@@ -8,12 +8,12 @@ import {t} from './words';
 type Json = Record<string, unknown>;
 
 export class NamelessVariables {
-  /** The placeholders by the variables' ids. */
+  /** Placeholder names by variable id. */
   private readonly placeholders = new Map<string, string>();
 
   constructor(private readonly workspace: Blockly.Workspace) {}
 
-  /** Creates the variables that these blocks need, before the blocks are made. */
+  /** Creates the variables that these blocks need; call before the blocks are created. */
   create(tops: readonly BlockState[]): void {
     this.placeholders.clear();
     const variables = this.workspace.getVariableMap();
@@ -38,7 +38,7 @@ export class NamelessVariables {
     return name;
   }
 
-  /** What is saved, without variables that nobody has named. */
+  /** Returns the state to save, without variables that still have a placeholder name. */
   omitPlaceholders(state: Json): Json {
     const {variables, ...others} = state;
     if (!this.placeholders.size || !Array.isArray(variables)) return state;
@@ -47,7 +47,7 @@ export class NamelessVariables {
   }
 }
 
-/** The ids in a block's variable fields that stand there without a name. */
+/** Returns the variable ids in the fields of a block state that have no name. */
 function unnamedVariableIds(state: BlockState): string[] {
   const definition = definitionOf(state.type);
   const names = definition ? argsOf(definition).filter((arg) => arg.type === 'field_variable').map((arg) => arg.name ?? '') : [];

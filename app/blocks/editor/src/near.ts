@@ -1,4 +1,4 @@
-// Which gap a block in the hand is near: judged by where the blocks lay when it was taken.
+// Search for the nearest connection of a dragged block, based on the positions at the start of the drag.
 import * as Blockly from 'blockly/core';
 
 type Point = Blockly.utils.Coordinate;
@@ -12,10 +12,10 @@ interface Candidate extends Pair {
   distance: number;
 }
 
-/** What Blockly keeps to itself. */
+/** Members that Blockly doesn't export. */
 interface Strategy {
   workspace: Blockly.WorkspaceSvg;
-  /** All that could be joined; made once when a block is taken. */
+  /** All possible connections, cached at the start of a drag. */
   allConnectionPairs: Pair[];
   cacheAllConnectionPairs(): void;
   getClosestCandidate(block: Blockly.BlockSvg, delta: Point): Candidate | null;
@@ -24,17 +24,17 @@ interface Strategy {
 }
 
 /**
- * Where the gaps are, as a person sees them who aims at one.
+ * Positions of the connections at the start of the drag, which are those the user aims at.
  *
- * The preview of a gap on the way pushes apart what lies below it. A fast hand is past it before that can be seen, and
- * what it let go would join the block above the one it was let go at.
+ * The insertion preview pushes the blocks below it apart. A fast drag passes it before the blocks have moved on
+ * screen, and would connect to the block above the intended one.
  */
 const connectionPositions = new WeakMap<Strategy, Map<Blockly.RenderedConnection, Point>>();
 
 function getConnectionPositions(strategy: Strategy): Map<Blockly.RenderedConnection, Point> {
   const cached = connectionPositions.get(strategy);
   if (cached) return cached;
-  // What the block was taken out of closes up first.
+  // Close the gap that the dragged block left first.
   Blockly.renderManagement.triggerQueuedRenders(strategy.workspace);
   const positions = new Map<Blockly.RenderedConnection, Point>();
   for (const {neighbour} of strategy.allConnectionPairs) {
@@ -60,7 +60,7 @@ strategy.cacheAllConnectionPairs = function () {
 const baseGetClosestCandidate = strategy.getClosestCandidate;
 strategy.getClosestCandidate = function (block, delta) {
   const radius = this.getSearchRadius();
-  if (radius === Infinity) return baseGetClosestCandidate.call(this, block, delta);  // the keys go from gap to gap
+  if (radius === Infinity) return baseGetClosestCandidate.call(this, block, delta);  // by keyboard, the block moves from connection to connection
   const positions = getConnectionPositions(this);
   let best: Candidate | null = null;
   for (const pair of this.allConnectionPairs) {

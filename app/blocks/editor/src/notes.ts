@@ -1,5 +1,5 @@
-// Notes: sheets of text beside a block, or anywhere on the canvas. They are Blockly's comments and are saved as such;
-// here they get our look, take the keys when they are made, and keep what is typed.
+// Notes beside a block or anywhere on the canvas. They are saved as Blockly's comments; this module adds our
+// design, focuses new notes and saves text while it is being typed.
 import * as Blockly from 'blockly/core';
 import {visibleBlockOf} from './folding';
 import {findFreePosition, visibleArea, obstacles} from './free_place';
@@ -13,22 +13,22 @@ const HEADER_HEIGHT = 26;
 const BORDER_WIDTH = 6;
 const BLOCK_DISTANCE = 26;
 const GAP = 12;
-/** From a new note to the edge of what can be seen, beside a scrollbar. */
+/** Margin between a new note and the edge of the view, where the scrollbar is. */
 const VIEW_MARGIN = 24;
 const DEFAULT_SIZE = [230, 128] as const;
 const TYPING_DEBOUNCE_MS = 200;
 const FONT_SIZE = 14;
-/** On the screen no letter is smaller, however far away the canvas is; up to a size that still fits into a sheet. */
+/** Smallest font size on the screen at any zoom, and largest font size that still fits into a note. */
 const MIN_FONT_SIZE = 12;
 const MAX_FONT_SIZE = 30;
 
-// ---- what is typed
+// ---- typed text
 
-/** Where something was typed that Blockly does not know yet: it asks only when the field is left. */
+/** Text areas with changes that Blockly hasn't read yet: it reads them only when they lose the focus. */
 const dirtyTextAreas = new Set<HTMLTextAreaElement>();
 let flushTimer = 0;
 
-/** Tells Blockly what was typed so far; before anything is saved, and when the person rests. */
+/** Passes typed text to Blockly; called before saving and after a pause in typing. */
 export function flushTypedText(): void {
   window.clearTimeout(flushTimer);
   for (const area of [...dirtyTextAreas]) {
@@ -45,7 +45,7 @@ document.addEventListener('input', (event) => {
   flushTimer = window.setTimeout(flushTypedText, TYPING_DEBOUNCE_MS);
 }, true);
 
-/** Esc leaves the words of a note on the canvas for the note. Blockly forgets to make it ready for the keys. */
+/** Focuses the note itself on Escape; Blockly doesn't make it focusable in this case. */
 document.addEventListener('keydown', (event) => {
   const note = event.key === 'Escape' && event.target instanceof HTMLTextAreaElement ?
     event.target.closest<SVGElement>('.blocklyComment') : null;
@@ -57,14 +57,14 @@ document.addEventListener('keydown', (event) => {
   Blockly.getFocusManager().focusNode(comment);
 }, true);
 
-// ---- the sheet of a block
+// ---- note bubble of a block
 
 class NoteBubble extends Blockly.bubbles.TextInputBubble {
   private buttons: SVGGElement[] | undefined;
-  /** Before the person took it into the hand. */
+  /** Geometry before the user's drag or resize. */
   private before: Shape | null = null;
 
-  /** A head to take it by, with its buttons; made before the first size is set, which the parent does. */
+  /** Adds a header with buttons, by which the note can be dragged; called after the first size was set. */
   addHeader(buttons: [icon: string, words: string, run: () => void][]): void {
     this.svgRoot.classList.add('nepNote');
     this.buttons = buttons.map(([icon, words, run]) => {
@@ -105,7 +105,7 @@ class NoteBubble extends Blockly.bubbles.TextInputBubble {
     this.fireChange();
   }
 
-  /** The corner is in the hand until the button is let go, wherever that is. */
+  /** Records a resize by the corner handle until the pointer is released, wherever that happens. */
   listenForResize(): void {
     this.svgRoot.querySelector('.blocklyResizeHandle')?.addEventListener('pointerdown', () => {
       this.before = this.sign.shape;
@@ -141,7 +141,7 @@ class NoteBubble extends Blockly.bubbles.TextInputBubble {
   }
 }
 
-/** Where a sheet is, beside the corner of its block, how large, and whether it shows. */
+/** State of a note bubble: visibility, size, and position relative to the corner of its block. */
 interface Shape {
   open: boolean;
   width: number;
@@ -149,7 +149,7 @@ interface Shape {
   at: {x: number; y: number} | null;
 }
 
-/** A sheet was moved, resized, opened or closed by a person: one step of undo. Blockly itself tells nobody. */
+/** Undoable move, resize, opening or closing of a note by the user; Blockly itself fires no event for these. */
 class NoteChange extends Blockly.Events.BlockBase {
   override type = 'nep_note';
 
@@ -166,21 +166,21 @@ class NoteChange extends Blockly.Events.BlockBase {
     const block = this.getEventWorkspace_().getBlockById(this.blockId ?? '') ?? this.block;
     const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
     if (!(sign instanceof NoteIcon)) return;
-    // A sign that was made just now takes its sheet along when it comes to its place.
+    // A new icon moves its bubble along when it is positioned, so render first.
     Blockly.renderManagement.triggerQueuedRenders(block.workspace as Blockly.WorkspaceSvg);
     const before = sign.shape;
     sign.shape = forward ? this.to : this.from;
-    sign.fireNoteChange(before);  // undo itself is told to nobody, what it does is
+    sign.fireNoteChange(before);  // undo alone notifies no listeners
   }
 }
 
-/** Blockly's own names of where the sheet is, and of what draws from it to the block. */
+/** Blockly's internal names for the tail of a bubble. */
 interface BubbleInternals {
   tail: SVGPathElement;
   renderTail(): void;
 }
 
-/** A thin line between block and sheet, in the place of a wedge over the block's words. */
+/** Draws a thin line from the block to the note instead of a wedge, which would cover the block's text. */
 (NoteBubble.prototype as unknown as BubbleInternals).renderTail = function (this: BubbleInternals) {
   const sheet = this as unknown as NoteBubble;
   const block = (sheet.getOwner() as NoteIcon | undefined)?.getSourceBlock();
@@ -196,7 +196,7 @@ interface BubbleInternals {
   this.tail.setAttribute('d', `M${from},${middle}L${to},${HEADER_HEIGHT / 2}`);
 };
 
-/** The id of the block whose note this sheet is. */
+/** Returns the id of the block that a note bubble belongs to. */
 export function blockIdOf(sheet: Element): string {
   return sheet.querySelector<SVGElement>('[data-of]')?.dataset['of'] ?? '';
 }
@@ -207,7 +207,7 @@ function createSvgElement(name: string, kind: string): SVGElement {
   return node;
 }
 
-/** The sign on a block that has a note: shows and hides it. */
+/** Icon on a block with a note; a click shows or hides the note. */
 class NoteIcon extends Blockly.icons.CommentIcon {
   private wasHidden = false;
 
@@ -232,14 +232,14 @@ class NoteIcon extends Blockly.icons.CommentIcon {
     return new Size(ICON_SIZE, ICON_SIZE);
   }
 
-  /** A folded block still has its own note. */
+  /** Keeps the icon of a collapsed block's own note visible. */
   override isShownWhenCollapsed(): boolean {
     return true;
   }
 
   override updateCollapsed(): void {}
 
-  /** Its sheet is seen, or not, as its block is. */
+  /** Shows or hides the bubble together with its block. */
   set isSeen(visible: boolean) {
     const sheet = this.getBubble();
     if (sheet instanceof NoteBubble) sheet.isSeen = visible;
@@ -247,7 +247,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
 
   override async setBubbleVisible(visible: boolean): Promise<void> {
     flushTypedText();
-    // A block that is folded up closes all sheets inside it: they are only not seen until it is unfolded.
+    // Blockly closes all notes inside a collapsed block; ours stay open but hidden until it is expanded.
     if (!visible && this.getBubble() && this.isHidden()) return;
     await super.setBubbleVisible(visible);
   }
@@ -257,7 +257,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
     return block instanceof Blockly.BlockSvg && !block.isDeadOrDying() && visibleBlockOf(block) !== block;
   }
 
-  /** What is folded up has no place of its own: the sheet stays where it was until its block has one again. */
+  /** Keeps the bubble in place while its block is hidden in a collapsed one and has no position of its own. */
   override onLocationChange(corner: Blockly.utils.Coordinate): void {
     const previousLocation = this.getBubbleLocation();
     const unfolded = this.wasHidden && !this.isHidden();
@@ -286,9 +286,9 @@ class NoteIcon extends Blockly.icons.CommentIcon {
     void this.setBubbleVisible(open);
   }
 
-  /** The file is another one now, and undo brings back how the sheet was. */
+  /** Fires a change event, which makes the change undoable and marks the document as modified. */
   fireNoteChange(before: Shape, now = this.shape): void {
-    // A sheet that was never open has found its place: that alone is nothing to undo.
+    // The initial placement of a bubble alone is not an undoable change.
     Blockly.Events.fire(new NoteChange(this.sourceBlock, before.at ? before : {...before, at: now.at}, now));
   }
 
@@ -306,7 +306,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
     ]);
     sheet.moveDuringDrag(this.getBubbleLocation() ?? getInitialLocation(sheet, block));
     this.setBubbleLocation(sheet.getRelativeToSurfaceXY());
-    // The first two listeners of Blockly's own kind are added by the parent.
+    // `showEditableBubble()` adds the text and size listeners.
     sheet.addLocationChangeListener(() => this.onBubbleLocationChange());
     sheet.setAriaLabelProvider(() => t('Note: {text}', {text: this.getText()}));
     this.addKeyListeners(sheet, block);
@@ -322,7 +322,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
       flushTypedText();
       Blockly.getFocusManager().focusNode(block);
     }, true);
-    // A note in which nothing was written would not be saved: it goes when it is left.
+    // Remove an empty note when it loses the focus, because it wouldn't be saved.
     text.addEventListener('focusout', () => window.setTimeout(() => {
       flushTypedText();
       if (!text.contains(document.activeElement) && !block.isDeadOrDying() && this.getText() === '') removeNote(block);
@@ -330,7 +330,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
   }
 }
 
-/** Beside the block: on no other block of its stack, on no other stack, in sight. */
+/** Returns a free visible position beside the block that covers no block of its stack and no other stack. */
 function getInitialLocation(sheet: NoteBubble, block: Blockly.BlockSvg): Blockly.utils.Coordinate {
   const {workspace} = block;
   const root = block.getRootBlock();
@@ -360,23 +360,23 @@ export function removeNote(block: Blockly.BlockSvg): void {
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
   if (!(sign instanceof NoteIcon)) return;
   withEventGroup(() => {
-    sign.fireNoteChange(sign.shape, {...sign.shape, open: false});  // undo brings it back as it was
+    sign.fireNoteChange(sign.shape, {...sign.shape, open: false});  // so that undo restores its state
     block.setCommentText(null);
   });
 }
 
-/** The words of its note; '' when it has none. */
+/** Returns the text of the block's note, or "" if it has none. */
 export function getNoteText(block: Blockly.BlockSvg): string {
   return block.getIcon(Blockly.icons.IconType.COMMENT)?.getText() ?? '';
 }
 
-/** The sheet of a note goes and comes with the block that it is beside. */
+/** Shows or hides the bubble of a block's note together with the block. */
 export function setNoteVisible(block: Blockly.BlockSvg, visible: boolean): void {
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
   if (sign instanceof NoteIcon) sign.isSeen = visible;
 }
 
-/** An open note that has the keys. */
+/** Adds an open note to the block and focuses it. */
 export async function addNote(block: Blockly.BlockSvg): Promise<void> {
   withEventGroup(() => block.setCommentText(''));
   const sign = block.getIcon(Blockly.icons.IconType.COMMENT);
@@ -387,10 +387,10 @@ export async function addNote(block: Blockly.BlockSvg): Promise<void> {
   Blockly.getFocusManager().focusNode(sheet.getEditor());
   const {x, y} = sheet.getRelativeToSurfaceXY();
   const {width, height} = sheet.getSize();
-  block.workspace.scrollBoundsIntoView(new Rect(y, y + height, x, x + width), VIEW_MARGIN);  // where all is full it is far off
+  block.workspace.scrollBoundsIntoView(new Rect(y, y + height, x, x + width), VIEW_MARGIN);  // the only free position may be out of view
 }
 
-/** A note on the canvas itself, at a place of the page. */
+/** Adds a note to the canvas at a position on the page. */
 export function addCanvasNote(workspace: Blockly.WorkspaceSvg, screenPosition: {x: number; y: number}): void {
   const wsPosition = Blockly.utils.svgMath.screenToWsCoordinates(workspace, new Coordinate(screenPosition.x, screenPosition.y));
   withEventGroup(() => {
@@ -401,7 +401,7 @@ export function addCanvasNote(workspace: Blockly.WorkspaceSvg, screenPosition: {
   });
 }
 
-/** Lets the words of notes be readable however far away the canvas is. */
+/** Keeps the text of notes readable at any zoom. */
 export function keepNotesReadable(workspace: Blockly.WorkspaceSvg): void {
   let scale = 0;
   const adapt = () => {

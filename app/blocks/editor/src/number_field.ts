@@ -1,5 +1,5 @@
-// Blockly's number field removes commas, so that 0,2 became 2. Ours takes comma and point as decimal separators, and
-// rejects what is no number, with a sentence; the field keeps the value it had.
+// Number field that accepts comma and point as decimal separators (Blockly's removes commas: 0,2 becomes 2) and
+// rejects invalid text with a message; the field then keeps its value.
 import * as Blockly from 'blockly/core';
 import {Hint} from './hint';
 import {parseNumber, type Rejection} from './typed_number';
@@ -9,7 +9,7 @@ const REJECTION_MESSAGES: Readonly<Record<Rejection, string>> = {
   'separators': lazy('Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5.'),
   'not a number': lazy('Enter a number.'),
 };
-/** Where a number may begin: no sentence is shown yet. */
+/** Start of a number, for which no message is shown yet. */
 const UNFINISHED = /^\s*[+\u2212-]?[.,]?\s*$/;
 
 class NumberField extends Blockly.FieldNumber {

@@ -1,4 +1,4 @@
-// What the blocks show while a program runs: glow, outlines, sentences, absent robots, live values.
+// State of the blocks while a program runs: highlights, outlines, messages, absent robots, live values.
 import * as Blockly from 'blockly/core';
 import {Bubbles, type BubbleContent} from './bubbles';
 import {definitionOf, sensorTypes} from './definitions';
@@ -28,7 +28,7 @@ export class Overlays {
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
-  /** The first at once, the next ones as often as an eye can follow: each is a picture of the whole page. */
+  /** Highlights the running blocks: at once, then throttled, because each update repaints the whole page. */
   highlight(ids: string[]): void {
     this.next = ids;
     if (this.resting) return;
@@ -46,14 +46,14 @@ export class Overlays {
     this.updateOutlines();
   }
 
-  /** The outline and its sentence in one step: nobody sees one without the other. */
+  /** Sets the blocks with errors, with their outlines and messages in one step. */
   setErrors(errors: Record<string, string>): void {
     this.errors = new Map(Object.entries(errors));
     this.updateOutlines();
     this.updateBubbles();
   }
 
-  /** A sentence beside each of these blocks; what they do goes on, so they have no outline. */
+  /** Sets the warnings shown beside blocks; these blocks keep running, so they get no outline. */
   setWarnings(warnings: Record<string, string>): void {
     this.warnings = new Map(Object.entries(warnings));
     this.updateBubbles();
@@ -64,14 +64,14 @@ export class Overlays {
     this.updateAbsentBlocks();
   }
 
-  /** Keys: a block's id, or `<robot>/<property>` and perhaps `/<field>` for every block that reads this sensor. */
+  /** Sets live values by block id, or by `<robot>/<property>[/<field>]` for all blocks that read this sensor. */
   setLive(values: Record<string, string>, old: string[]): void {
     this.live = new Map(Object.entries(values));
     this.old = new Set(old);
     this.renderLiveValues();
   }
 
-  /** Another program is here: nothing of it runs, nothing is wrong with it. */
+  /** Clears all states after another program was loaded. */
   reset(): void {
     window.clearTimeout(this.resting);
     this.resting = 0;
@@ -85,7 +85,7 @@ export class Overlays {
     this.restore();
   }
 
-  /** Puts everything on again after the blocks were made anew. */
+  /** Restores all states after blocks were recreated. */
   restore(): void {
     this.outlined.clear();
     this.updateOutlines();
@@ -103,10 +103,10 @@ export class Overlays {
     this.bubbles.scheduleUpdate();
   }
 
-  /** Only blocks whose state differs are touched: this runs 30 times a second. */
+  /** Updates only blocks whose state has changed, because this runs many times a second. */
   private updateOutlines(): void {
     const stateById = new Map<string, BlockState>();
-    // What counts most comes last: a folded block shows the state of all that is in it.
+    // In order of priority, highest last: a collapsed block shows one state for all blocks inside it.
     for (const id of this.stopped) stateById.set(this.getVisibleBlockId(id), 'stopped');
     for (const id of this.errors.keys()) stateById.set(this.getVisibleBlockId(id), 'error');
     for (const id of this.running) stateById.set(this.getVisibleBlockId(id), 'running');
@@ -114,14 +114,14 @@ export class Overlays {
     for (const [id, state] of stateById) this.setState(id, state);
   }
 
-  /** The block that shows what this one does. */
+  /** Returns the id of the block shown in place of this one. */
   private getVisibleBlockId(id: string): string {
     const block = this.workspace.getBlockById(id);
     return block ? visibleBlockOf(block).id : id;
   }
 
   private setState(id: string, state: BlockState | null): void {
-    // A block of the toolbox that is tried glows as well.
+    // Highlight a block of the toolbox that is being tried as well.
     const block = this.workspace.getBlockById(id) ??
       this.workspace.getFlyout()?.getWorkspace().getBlockById(id) as Blockly.BlockSvg | undefined;
     if (block) pathOf(block)?.setState(state);
@@ -141,7 +141,7 @@ export class Overlays {
     }
   }
 
-  /** Five times a second: only blocks of sensors are looked at, and only new words are drawn. */
+  /** Updates the live values, several times a second: visits only sensor blocks and redraws only changed text. */
   renderLiveValues(): void {
     const flyout = this.workspace.getFlyout()?.getWorkspace();
     for (const workspace of flyout ? [this.workspace, flyout] : [this.workspace]) {
@@ -159,7 +159,7 @@ export class Overlays {
     }
   }
 
-  /** A block that failed says that; what it was warned of before matters less. */
+  /** Updates the bubbles; an error replaces the warning of the same block. */
   private updateBubbles(): void {
     const messages = new Map<string, BubbleContent>();
     for (const [id, sentence] of this.warnings) messages.set(id, ['warning', sentence]);
@@ -168,7 +168,7 @@ export class Overlays {
   }
 }
 
-/** The robot and its sensor that a block reads. */
+/** Returns the robot and the sensor that a block reads. */
 export function sensorOf(block: Blockly.Block): [robot: string, sensor: string] {
   return [String(block.getFieldValue('ROBOT') ?? ''), block.type.split('_get_')[1] ?? ''];
 }

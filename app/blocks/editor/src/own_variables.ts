@@ -1,4 +1,4 @@
-// Blocks that come from another file name their variables: the one here of that name is meant, else a new one is made.
+// Maps the variables of blocks from another file to this behaviour's by name; missing ones are created.
 import * as Blockly from 'blockly/core';
 import type {BlockState, ConnectionState} from './unknown_blocks';
 
@@ -8,14 +8,14 @@ interface VariableRef {
   type?: string;
 }
 
-/** `state` with the ids of this behaviour; `fresh` holds those of names that are not here, for several states. */
+/** Returns `state` with variable ids of this behaviour; `newIds` collects ids of new names across several states. */
 export function withLocalVariableIds(state: BlockState, workspace: Blockly.Workspace, newIds = new Map<string, string>()): BlockState {
   const variables = workspace.getVariableMap();
   const localId = ({id, name, type = ''}: VariableRef): string => {
     const existing = variables.getVariable(name, type);
     if (existing) return existing.getId();
     const key = `${type} ${name.toLowerCase()}`;
-    // An id that is another variable's here, or another name's among these states, is not this one's.
+    // An id is taken if another variable here or another name of these states uses it.
     const isTaken = variables.getVariableById(id) !== null || [...newIds.values()].includes(id);
     const newId = newIds.get(key) ?? (isTaken ? Blockly.utils.idGenerator.genUid() : id);
     newIds.set(key, newId);

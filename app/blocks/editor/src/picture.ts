@@ -1,19 +1,19 @@
-// A picture of all blocks of a behaviour, also of those outside the view: SVG that needs nothing else (looks and fonts
-// are in it), or PNG made of that. The canvas that is seen stays as it is; states of a run and outlines are left out.
+// Picture of all blocks of a behaviour, including those outside the view: self-contained SVG with styles and
+// fonts, or a PNG of it. The visible canvas doesn't change; run states and outlines are left out.
 import * as Blockly from 'blockly/core';
 import {flushTypedText, blockIdOf} from './notes';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
-/** Around the blocks; the signs at their left are 20 wide. */
+/** Margin around the blocks; leaves room for the signs at their left, which are 20 wide. */
 const MARGIN = 32;
 const SCALE = 2;
-/** What is higher is the sheet of a note, not the bar above it. */
+/** Height above which a rectangle is the body of a note and not its header. */
 const NOTE_HEADER_HEIGHT = 30;
-/** What Chromium can draw at once: on a side, and in all. */
+/** Limits of a canvas in Chromium: length of a side, and total pixels. */
 const MAX_SIDE_PX = 16_000;
 const MAX_PIXELS = 120_000_000;
 
-/** The looks that make a difference, with what they are where nobody says anything: that needs no words. */
+/** Relevant style properties with their initial values, which are not written. */
 const STYLE_DEFAULTS: Readonly<Record<string, string>> = {
   'fill': 'rgb(0, 0, 0)', 'fill-opacity': '1', 'fill-rule': 'nonzero', 'stroke': 'none', 'stroke-width': '1px', 'stroke-opacity': '1',
   'stroke-linecap': 'butt', 'stroke-linejoin': 'miter', 'stroke-dasharray': 'none', 'opacity': '1', 'paint-order': 'normal',
@@ -30,14 +30,14 @@ export interface Picture {
   height: number;
 }
 
-/** What is on the canvas: a stack, a note, or the note of a block, which goes with its stack. */
+/** Rendered item of the canvas: a stack, a note, or the note of a block, which belongs to its stack. */
 export interface RenderedItem {
   item: unknown;
   box: Blockly.utils.Rect;
   drawn: SVGElement | null;
 }
 
-/** Each thing on the canvas, or `only` these, with its looks written on it; `patterns` gets what they are filled with, by id. */
+/** Renders all items, or `only` these, with inline styles; adds the fill patterns in use to `patterns` by id. */
 export function renderItems(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>, only?: ReadonlySet<unknown>): RenderedItem[] {
   flushTypedText();
   Blockly.renderManagement.triggerQueuedRenders();
@@ -58,7 +58,10 @@ export function renderItems(workspace: Blockly.WorkspaceSvg, patterns: Map<strin
   return renderedItems;
 }
 
-/** null: there is nothing to be seen. Call it while the page has the light theme; of `only` these, in the theme of now. */
+/**
+ * Returns the picture, or null if the canvas is empty. Uses the current theme: call with the light theme, except
+ * for a drag image (`only`).
+ */
 export async function createPicture(workspace: Blockly.WorkspaceSvg, white: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
   const patterns = new Map<string, SVGElement>();
   const renderedItems = renderItems(workspace, patterns, only);
@@ -87,7 +90,7 @@ export async function createPicture(workspace: Blockly.WorkspaceSvg, white: bool
   return {svg: new XMLSerializer().serializeToString(root), width, height};
 }
 
-/** As a `data:` URL of a PNG, twice as large as on the screen (or `wanted`) or as large as can be. */
+/** Returns the picture as a `data:` URL of a PNG at `requestedScale`, reduced if the canvas limits require it. */
 export async function renderPng({svg, width, height}: Picture, requestedScale = SCALE): Promise<string> {
   const scale = Math.min(requestedScale, MAX_SIDE_PX / width, MAX_SIDE_PX / height, Math.sqrt(MAX_PIXELS / (width * height)));
   const image = new Image(width, height);
@@ -99,7 +102,7 @@ export async function renderPng({svg, width, height}: Picture, requestedScale = 
   return canvas.toDataURL('image/png');
 }
 
-/** The same shapes with their looks written on them; null for what is not seen. */
+/** Returns a copy with inline styles, or null if the element isn't visible. */
 function cloneWithStyles(source: Element, patterns: Map<string, SVGElement>): SVGElement | null {
   if (source.matches(EXCLUDED_SELECTOR)) return null;
   const style = getComputedStyle(source);
@@ -144,7 +147,7 @@ function writeStyles(source: Element, style: CSSStyleDeclaration, clone: SVGElem
   patterns.set(id, patternClone);
 }
 
-/** The words of a note as lines of text: other programs show no fields of a page. */
+/** Returns the text of a note as SVG text, because other programs don't render HTML in SVG. */
 function createNoteText(source: Element): SVGElement | null {
   const area = source.querySelector('textarea');
   if (!area?.value) return null;
@@ -171,12 +174,12 @@ function createNoteText(source: Element): SVGElement | null {
   return text;
 }
 
-/** How much higher a note has to be for all its words. */
+/** Returns the additional height that a note needs for its whole text. */
 export function overflowHeight(note: SVGElement): number {
   return Number(note.querySelector<SVGElement>('[data-more]')?.dataset['more'] ?? 0);
 }
 
-/** Makes a note as high as its words. */
+/** Extends a note to the height of its text. */
 export function expandNote(note: SVGElement): void {
   const more = overflowHeight(note);
   for (const ground of note.querySelectorAll('rect')) {
@@ -185,7 +188,7 @@ export function expandNote(note: SVGElement): void {
   }
 }
 
-/** Leaves out the words that do not fit into a note, and says so with “…”. */
+/** Removes the lines that don't fit into a note and marks the cut with “…”. */
 export function truncateNote(note: SVGElement): void {
   const text = note.querySelector<SVGElement>('[data-room]');
   if (!text) return;
@@ -215,12 +218,12 @@ function wrapText(text: string, width: number, font: string): string[] {
 const WEIGHTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Medium', '600': 'SemiBold', '700': 'Bold'};
 const JAPANESE_WEIGHTS: Readonly<Record<string, string>> = {'400': 'Regular', '500': 'Regular', '600': 'Bold', '700': 'Bold'};
 const JAPANESE = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]/;
-/** A word with the spaces after it, or a single Japanese character: lines may break after each. */
+/** Matches a word with the spaces after it or one Japanese character; lines may break after each. */
 const WORDS = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef] *|[^ \u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+ *| +/g;
 
 const fontFaces = new Map<string, Promise<string>>();
 
-/** The bundled fonts of a text, as "file weight family". */
+/** Returns the bundled fonts of a text as "file weight family". */
 function fontsOf(text: SVGTextElement): string[] {
   const weight = text.getAttribute('font-weight') ?? '';
   if (!(weight in WEIGHTS)) return [];
@@ -229,12 +232,12 @@ function fontsOf(text: SVGTextElement): string[] {
   return fonts;
 }
 
-/** Returns the rule that embeds a font, so that the picture looks the same where the font isn't installed; cached. */
+/** Returns the CSS rule that embeds a font for systems where it isn't installed; cached. */
 async function fontFace(font: string): Promise<string> {
   if (!fontFaces.has(font)) {
     const [file, weight, ...family] = font.split(' ');
     const read = readFace(file!, weight!, family.join(' '));
-    read.catch(() => fontFaces.delete(font));  // the next picture tries again
+    read.catch(() => fontFaces.delete(font));  // retry for the next picture
     fontFaces.set(font, read);
   }
   return fontFaces.get(font)!;

@@ -1,21 +1,21 @@
-// The program on paper: stacks in the order in which they are read, whole where they fit on a page, parted between two
-// blocks where they do not; in columns, as a newspaper. The pages lie in the page of the editor, which shows them only to the printer.
+// Print layout of the program: stacks in reading order and in columns, split between two blocks if they don't
+// fit on a page. The pages are part of the editor's page and visible to the printer only.
 import * as Blockly from 'blockly/core';
 import {truncateNote, renderItems, expandNote, overflowHeight} from './picture';
 import {t} from './words';
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
-/** Of blocks on paper: their words are 9 points high. */
+/** Scale of blocks on paper, which makes their text 9 points high. */
 const SCALE = 0.8;
-/** Around a stack, in units of the canvas: at its left are the signs of its notes. */
+/** Margins around a stack, in workspace units; at the left are the icons of its notes. */
 const LEFT_MARGIN = 24;
 const MARGIN = 6;
-/** Between stacks, and below the title of a page, in pixels. */
+/** Gap between stacks and height of a page's header, in pixels. */
 const GAP = 20;
 const HEADER_HEIGHT = 40;
-/** So much of a column has to be free for the beginning of a stack that is parted anyway. */
+/** Minimum free share of a column to start a stack that has to be split. */
 const MIN_COLUMN_FRACTION = 0.4;
-/** What is lost by rounding. */
+/** Tolerance for rounding errors. */
 const ROUNDING_TOLERANCE = 0.01;
 
 type Box = Blockly.utils.Rect;
@@ -23,21 +23,21 @@ type Box = Blockly.utils.Rect;
 export interface PageSetup {
   title: string;
   date: string;
-  /** Of a sheet and its empty edge, in pixels of a page: 96 in an inch. */
+  /** Size and margin of a sheet in CSS pixels (96 per inch). */
   width: number;
   height: number;
   edge: number;
 }
 
-/** A stack with its notes. */
+/** Stack with its notes. */
 interface Cluster {
   box: Box;
   drawn: SVGElement[];
-  /** Where it can be parted: above each block that hangs below another. */
+  /** Positions at which the stack can be split: above each block that has one above it. */
   cuts: number[];
 }
 
-/** A part of a cluster on a page. */
+/** Part of a cluster on one page. */
 interface Piece {
   cluster: Cluster;
   page: number;
@@ -50,7 +50,7 @@ interface Piece {
 
 let pages: HTMLElement | null = null;
 
-/** Lays the pages ready for the printer; how many. Call it while the page has the light theme. */
+/** Lays out the pages for the printer and returns their number; call with the light theme active. */
 export function layoutPages(workspace: Blockly.WorkspaceSvg, setup: PageSetup): number {
   clearPages();
   const patterns = new Map<string, SVGElement>();
@@ -73,7 +73,7 @@ export function clearPages(): void {
   pages = null;
 }
 
-/** In the order in which they are read: from above, then from the left. */
+/** Returns the clusters in reading order: top to bottom, then left to right. */
 function clustersOf(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGElement>): Cluster[] {
   const clusters = new Map<unknown, Cluster>();
   for (const {item, box, drawn} of renderItems(workspace, patterns)) {
@@ -93,7 +93,7 @@ function clustersOf(workspace: Blockly.WorkspaceSvg, patterns: Map<string, SVGEl
   return [...clusters.values()].sort((a, b) => a.box.top - b.box.top || a.box.left - b.box.left);
 }
 
-/** Whether a note may be so high: none of the blocks that it belongs to is below it. */
+/** Returns true if a note can be extended without covering more blocks of its stack. */
 function isFree(fullBox: Box, before: Box, item: unknown): boolean {
   if (!(item instanceof Blockly.BlockSvg)) return true;
   return item.getDescendants(false).map((block) => block.getBoundingRectangleWithoutChildren())
@@ -110,7 +110,7 @@ function cutsOf(stack: Blockly.BlockSvg): number[] {
     .map((block) => block.getRelativeToSurfaceXY().y).sort((a, b) => a - b);
 }
 
-/** In columns: below each other, then at the right of that, then on the next page. */
+/** Lays out the clusters in columns: downwards, then in the next column, then on the next page. */
 function layoutClusters(clusters: readonly Cluster[], width: number, height: number): Piece[] {
   const pieces: Piece[] = [];
   let [page, x, y, column] = [0, 0, 0, 0];
@@ -146,7 +146,7 @@ function layoutClusters(clusters: readonly Cluster[], width: number, height: num
 
 function createPage({title, date, width, height, edge}: PageSetup, page: number, count: number, pieces: Piece[]): HTMLElement {
   const section = document.createElement('section');
-  // A little less than the sheet: what is rounded up would begin another one.
+  // Slightly smaller than the sheet, because rounding up would start another page.
   Object.assign(section.style, {width: `${width}px`, height: `${height - 1}px`, padding: `${edge}px`});
   const header = document.createElement('header');
   const [name, about] = [document.createElement('b'), document.createElement('span')];
@@ -169,7 +169,7 @@ function createPiece({cluster: {box, drawn}, x, y, scale, from, to}: Piece, edge
   return svg;
 }
 
-/** The canvas has patterns of the same names, and is not shown on paper. */
+/** Prefix of pattern ids; the canvas, which isn't printed, uses the same ids without it. */
 const ID_PREFIX = 'nepPrint-';
 
 function prefixPatternIds(drawn: SVGElement): SVGElement {

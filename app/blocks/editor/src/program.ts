@@ -1,4 +1,4 @@
-// The workspace as JSON: loading, saving, telling the window about real edits.
+// Loads and saves the workspace as JSON and notifies the window of edits.
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
@@ -19,7 +19,7 @@ export interface Listener {
 const DEBOUNCE_MS = 150;
 
 export class Program {
-  /** Parts of the file that Blockly does not know; written back as they were. */
+  /** Top-level keys of the file without a Blockly serializer; saved unchanged. */
   private rest: Json = {};
   private lastNotifiedJson = '';
   private timer = 0;
@@ -33,7 +33,7 @@ export class Program {
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
-  /** A new file: forgets the old one and its undo. */
+  /** Loads a document and clears the undo history. */
   load(state: Json): void {
     this.replace(state);
     this.workspace.clearUndo();
@@ -45,7 +45,7 @@ export class Program {
     this.culling.update();
   }
 
-  /** Another program in the place of this one, as one edit that undo takes back; the view stays. */
+  /** Replaces the program as one undoable edit; the scroll position stays. */
   change(state: Json): void {
     this.flush();
     const {scrollX, scrollY} = this.workspace;
@@ -55,7 +55,7 @@ export class Program {
     try {
       this.loadBlocks(state, {recordUndo: true});
       this.workspace.scroll(scrollX, scrollY);
-      this.lastNotifiedJson = JSON.stringify(this.save());  // the window made it
+      this.lastNotifiedJson = JSON.stringify(this.save());  // the edit comes from the window
       const newBlocks = this.workspace.getTopBlocks(false).filter((block) => !before.has(block.id));
       const [only] = newBlocks;
       if (before.size && only && newBlocks.length === 1) this.moveIntoView(only);
@@ -64,7 +64,7 @@ export class Program {
     }
   }
 
-  /** A script that was added: the window knows neither what can be seen nor how wide the other scripts are. */
+  /** Moves a new script to a free, visible position: the window knows neither the viewport nor the block sizes. */
   private moveIntoView(block: Blockly.BlockSvg): void {
     Blockly.renderManagement.triggerQueuedRenders(this.workspace);
     const box = block.getBoundingRectangle();
@@ -80,13 +80,13 @@ export class Program {
     if (!view.contains(now.x, now.y)) this.workspace.centerOnBlock(block.id, true);
   }
 
-  /** Tells nothing any more. */
+  /** Stops all notifications. */
   dispose(): void {
     window.clearTimeout(this.timer);
     this.loading = true;
   }
 
-  /** The same program made again (definitions changed): undo, view and selection stay. */
+  /** Recreates the blocks after their definitions changed; keeps the undo history, scroll position and selection. */
   rebuild(): void {
     const {scrollX, scrollY} = this.workspace;
     const selected = Blockly.common.getSelected();
@@ -97,7 +97,7 @@ export class Program {
     if (block) Blockly.common.setSelected(block);
   }
 
-  /** Undo or redo, after the edits of this frame have reached Blockly's own list of edits. */
+  /** Undoes or redoes an edit, after the edits of this frame have reached Blockly's undo stack. */
   undo(redo: boolean): void {
     window.requestAnimationFrame(() => window.setTimeout(() => {
       this.workspace.undo(redo);
@@ -112,7 +112,7 @@ export class Program {
     return {...this.rest, ...this.nameless.omitPlaceholders(state)};
   }
 
-  /** The newest JSON; tells about it at once when the window does not have it yet. */
+  /** Returns the current JSON; notifies the window immediately if it has changed. */
   flush(): string {
     flushTypedText();
     window.clearTimeout(this.timer);
@@ -125,13 +125,13 @@ export class Program {
     return json;
   }
 
-  /** Something of the behaviour has changed that is no edit of its blocks, and that undo leaves alone. */
+  /** Schedules a notification of a change that isn't a block edit and isn't on the undo stack. */
   scheduleFlush(): void {
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.flush(), DEBOUNCE_MS);
   }
 
-  /** Puts the program's top left corner near the workspace's. */
+  /** Scrolls the top left corner of the program near that of the viewport. */
   scrollToStart(): void {
     const blocks = this.workspace.getTopBlocks(false);
     if (!blocks.length) {
@@ -160,7 +160,7 @@ export class Program {
     const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
       !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
-    // What costs at each block, once: the scrollbars, and how wide the same words are.
+    // Update the scrollbars once, not per block, and cache the widths of equal texts.
     this.workspace.setResizesEnabled(false);
     Blockly.utils.dom.startTextWidthCache();
     try {
@@ -177,7 +177,7 @@ export class Program {
     }
   }
 
-  /** Clears the workspace and loads what is beside the blocks (variables); what cannot be read is kept as it is. */
+  /** Clears the workspace and loads the state other than blocks (variables); saves an unreadable state unchanged. */
   private loadOthers(others: Json, how: {recordUndo?: boolean}): void {
     try {
       Blockly.serialization.workspaces.load(others, this.workspace, how);
@@ -209,13 +209,13 @@ export class Program {
     this.notifyHistory();
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
-      // While a block is in the hand the program is not finished: wait until it is put down.
+      // The program is incomplete during a drag; wait until the drag ends.
       if (this.workspace.isDragging()) this.onEvent(event);
       else this.flush();
     }, DEBOUNCE_MS);
   }
 
-  /** A block that was dragged out of the toolbox and back into it has changed nothing: there is nothing to undo. */
+  /** Removes the undo step of a block that was dragged from the toolbox and back into it. */
   private dropEmptyUndoGroup(group: string): void {
     const stack = this.workspace.getUndoStack();
     const first = group ? stack.findIndex((event) => event.group === group) : -1;
@@ -229,7 +229,7 @@ export class Program {
     if (isNothing && [...createdIds].every((id) => deletedIds.has(id))) stack.splice(first);
   }
 
-  /** Tells what can be undone; `again`: also when that was told before. */
+  /** Notifies the window of what can be undone and redone; `force`: even if unchanged. */
   notifyHistory(force = false): void {
     const canUndo = this.workspace.getUndoStack().length > 0;
     const canRedo = this.workspace.getRedoStack().length > 0;
@@ -239,7 +239,7 @@ export class Program {
   }
 }
 
-/** Whether the workspace holds a block of one of the types, or a kept block whose own type is among them. */
+/** Returns true if the workspace contains a block of these types, or an unknown block whose original type is one. */
 export function hasBlockOfTypes(workspace: Blockly.Workspace, types: ReadonlySet<string>): boolean {
   return workspace.getAllBlocks(false).some((block) => types.has(block.type) ||
     (block.type === UNKNOWN_BLOCK && unknownBlockMatches(block, types)));

@@ -1,4 +1,4 @@
-// Taking any item out of a list, any input off a function: entries of the menu, for mouse and keys.
+// Context menu entries that remove an item of a list or an input of a function, and add branches.
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import {definitionOf} from './definitions';
@@ -12,7 +12,7 @@ interface Item {
 
 type State = Blockly.serialization.blocks.State;
 
-/** The item of a list that this block is, or is a grey value of. */
+/** Returns the list item that contains this block, directly or as a shadow value inside it. */
 function itemOf(start: Blockly.Block | null): Item | null {
   let block = start;
   for (let parent = block?.getParent(); block && parent; parent = block.getParent()) {
@@ -25,7 +25,7 @@ function itemOf(start: Blockly.Block | null): Item | null {
   return null;
 }
 
-/** The list without this item and what is in it: made anew in the place of the old, as one step that undo takes back. */
+/** Removes the item and its contents by recreating the list, as one undo step. */
 function removeItem({list, number}: Item): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
@@ -42,7 +42,7 @@ function removeItem({list, number}: Item): void {
   if (!group) Blockly.Events.setGroup(false);
   const neighbour = newList.getInput(`ITEM${Math.max(0, number - 1)}`)?.connection?.targetBlock();
   const next = neighbour instanceof Blockly.BlockSvg ? neighbour : newList;
-  // After Blockly has given the keys of the old list to what is near.
+  // Focus after Blockly has moved the focus of the deleted list to a neighbour.
   window.setTimeout(() => !next.isDeadOrDying() && Blockly.getFocusManager().focusNode(next));
 }
 
@@ -56,9 +56,9 @@ function withoutItem(saved: State, number: number): State {
   return {...saved, inputs, extraState: {...saved.extraState, items: items - 1}};
 }
 
-// ---- the menu
+// ---- Context menu
 
-/** The grey value that the keys were on: Blockly opens the menu of the block that holds it. */
+/** Shadow block that had the focus; Blockly opens the context menu of its parent. */
 let menuBlock: Blockly.BlockSvg | null = null;
 let menuItem: Item | null = null;
 

@@ -1,4 +1,4 @@
-// Zelos, plus the outlines that say what a block is doing.
+// Zelos renderer with outlines for the states of a block.
 import * as Blockly from 'blockly/core';
 
 export type BlockState = 'running' | 'stopped' | 'error';
@@ -6,23 +6,25 @@ export type BlockState = 'running' | 'stopped' | 'error';
 type Shape = [path: string, offset: Blockly.utils.Coordinate, rtl: boolean];
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
-/** Widths of the strokes that together make the soft glow; cheaper than a blur, repainted ten times a second. */
-/** A block that is over sooner gets its outline only: a glow that nobody can see cost half a core at 30 a second. */
+/**
+ * Delay before a running block glows: 30 glows per second of short blocks cost half a CPU core.
+ * GLOW_WIDTHS: widths of the stacked strokes; cheaper to repaint than a blur.
+ */
 const GLOW_AFTER_MS = 150;
 const GLOW_WIDTHS = [19, 15, 11, 7];
 
-/** A block's shape that can carry one outline above everything inside the block. */
+/** Path object that can draw an outline above all children of the block. */
 export class StatePath extends Blockly.zelos.PathObject {
   private state: BlockState | null = null;
   private marks: SVGGElement[] = [];
   private glowing = 0;
-  /** The shapes of connections that nobody has looked at: Blockly would draw each, a fifth of a page's elements. */
+  /** Connection highlights that aren't drawn yet; drawn on demand because they are a fifth of all SVG elements. */
   private readonly undrawn = new Map<Blockly.RenderedConnection, Shape>();
 
   override addConnectionHighlight(connection: Blockly.RenderedConnection, ...shape: Shape): SVGElement {
     if (connection.isHighlighted() || this.drawn.has(connection)) return this.draw(connection, shape);
     this.undrawn.set(connection, shape);
-    return undefined as unknown as SVGElement;  // the one who calls looks whether there is any
+    return undefined as unknown as SVGElement;  // callers check for undefined
   }
 
   override removeConnectionHighlight(connection: Blockly.RenderedConnection): void {
@@ -31,7 +33,7 @@ export class StatePath extends Blockly.zelos.PathObject {
     super.removeConnectionHighlight(connection);
   }
 
-  /** Draws the shape of a connection that the keys or a dragged block come to. */
+  /** Draws the highlight of a connection when it gets the focus or a dragged block is near. */
   drawConnection(connection: Blockly.RenderedConnection): void {
     const shape = this.undrawn.get(connection);
     if (shape) connection.setAriaRole(this.draw(connection, shape));
@@ -45,7 +47,7 @@ export class StatePath extends Blockly.zelos.PathObject {
     return super.addConnectionHighlight(connection, ...shape);
   }
 
-  /** The style of the block around this one; '' for none. Blocks below each other lie in the same. */
+  /** Style name of the surrounding block, '' if there is none. Blocks of one stack share it. */
   private around = '';
   private selection: SVGGElement | null = null;
   private selected = false;
@@ -56,7 +58,7 @@ export class StatePath extends Blockly.zelos.PathObject {
     const parent = block.getParent();
     const above = parent && pathOf(parent);
     const around = !parent ? '' : parent.getNextBlock() === block ? above?.around ?? '' : parent.getStyleName();
-    // Only the first of a script has another parent when it goes elsewhere; those below it go with it.
+    // Only the parent of the first block in a stack changes; the blocks below move with it.
     let next: Blockly.BlockSvg | null = block;
     for (let path: StatePath | null = this; next && path; next = next.getNextBlock(), path = next && pathOf(next)) {
       if (next !== block && path.around === around) break;
@@ -64,20 +66,20 @@ export class StatePath extends Blockly.zelos.PathObject {
     }
   }
 
-  /** A block in one of its own colour gets a light edge. */
+  /** Sets the surrounding style; a block inside one of the same style gets a light edge. */
   private setSurroundingStyle(around: string, block: Blockly.BlockSvg): void {
     this.around = around;
     this.setClass_('nepInside', around !== '' && !block.isShadow() && around === block.getStyleName());
   }
 
-  /** Two tones, of which one is seen on any block and the other on any canvas. */
+  /** Draws the selection outline in two tones: one contrasts with every block, the other with every canvas. */
   override updateSelected(enable: boolean): void {
     this.setClass_('blocklySelected', enable);
     this.selected = enable;
     this.updateOutline();
   }
 
-  /** One of several that are chosen; it looks selected, whichever of them has the keys. */
+  /** Marks the block as one of several selected blocks, with or without the focus. */
   setMultiSelected(isMultiSelected: boolean): void {
     this.setClass_('nepChosen', isMultiSelected);
     this.isMultiSelected = isMultiSelected;
@@ -98,7 +100,7 @@ export class StatePath extends Blockly.zelos.PathObject {
     for (const mark of this.marks) mark.querySelectorAll('path').forEach((element) => element.setAttribute('d', path));
   }
 
-  /** Shows one state, or none; calling it again with the same state costs nothing. */
+  /** Shows a state, or none; does nothing if the state is unchanged. */
   setState(state: BlockState | null): void {
     if (state === this.state) return;
     this.state = state;
@@ -106,7 +108,7 @@ export class StatePath extends Blockly.zelos.PathObject {
     for (const mark of this.marks) mark.remove();
     this.marks = [];
     if (!state) return;
-    // The outline lies on everything inside the block, the glow behind the block itself.
+    // The outline is drawn above the children of the block, the glow behind the block.
     const outline = this.addMark(`nepState nepState-${state}`, 'nepOutline', [state === 'running' ? 4 : 3]);
     this.svgRoot.append(outline);
     if (state === 'running') this.glowing = window.setTimeout(() => this.addGlow(), GLOW_AFTER_MS);
@@ -143,7 +145,7 @@ class Constants extends Blockly.zelos.ConstantProvider {
   override FIELD_TEXT_FONTWEIGHT = '600';
   private defaultStyle: Blockly.Theme.BlockStyle | null = null;
 
-  /** Each block begins with the style of none, which Blockly works out anew for each. */
+  /** Caches the default style: every new block requests it, and Blockly computes it each time. */
   override getBlockStyle(name: string | null): Blockly.Theme.BlockStyle {
     return name ? super.getBlockStyle(name) : this.defaultStyle ??= super.getBlockStyle(name);
   }
@@ -162,12 +164,12 @@ class Renderer extends Blockly.zelos.Renderer {
 export const RENDERER = 'nep';
 Blockly.blockRendering.register(RENDERER, Renderer);
 
-/** The outline carrier of a rendered block. */
+/** Returns the path object of a rendered block. */
 export function pathOf(block: Blockly.BlockSvg): StatePath | null {
   return block.pathObject instanceof StatePath ? block.pathObject : null;
 }
 
-/** Enter on a block with one field opens it: a text's quotation marks are no reason to go inside first. */
+/** Enter on a value block with a single field opens that field's editor directly. */
 const basePerformAction = Blockly.BlockSvg.prototype.performAction;
 Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
   const fields = [...this.getFields()].filter((field) => field.isClickable());
@@ -176,7 +178,7 @@ Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, eve
   else basePerformAction.call(this, event);
 };
 
-/** Blockly asks for the drawn shape of a connection by this name, wherever it needs one. */
+/** Private method of Blockly that finds the SVG element of a connection highlight. */
 interface HighlightFinder {
   findHighlightSvg(this: Blockly.RenderedConnection): SVGPathElement | null;
 }

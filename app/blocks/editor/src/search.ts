@@ -1,4 +1,4 @@
-// Finding: blocks in the toolbox by words and synonyms, blocks in the workspace by what stands on them.
+// Search: blocks of the toolbox by words and synonyms, blocks of the workspace by their text.
 import * as Blockly from 'blockly/core';
 import {definitionOf} from './definitions';
 import {helpFor} from './help';
@@ -12,10 +12,10 @@ function normalize(text: string): string {
     .replace(/\s+/g, ' ').trim();
 }
 
-/** Words of at least so many letters are found although one letter is wrong, missing or too many. */
+/** Minimum length in letters of a word that matches with one typing error. */
 const MIN_FUZZY_LENGTH = 4;
 
-/** Whether two words differ by one letter at most, or by two neighbours that changed places. */
+/** Returns true if two words differ by at most one letter or by two transposed neighbours. */
 function isSimilar(word: string, other: string): boolean {
   const [short, long] = word.length <= other.length ? [word, other] : [other, word];
   if (long.length - short.length > 1) return false;
@@ -27,26 +27,26 @@ function isSimilar(word: string, other: string): boolean {
     (short[index] === long[index + 1] && short[index + 1] === long[index] && short.slice(index + 2) === rest(index + 2));
 }
 
-/** Whether a word of the text begins nearly like this one. */
+/** Returns true if a word of the text begins approximately with the query. */
 function hasSimilarWord(text: string, query: string): boolean {
   if (query.length < MIN_FUZZY_LENGTH) return false;
   return text.split(' ').some((word) => word.length >= MIN_FUZZY_LENGTH - 1 && [0, -1, 1].some((more) =>
     isSimilar(word.slice(0, query.length + more), query)));
 }
 
-/** Where a word may be found, with what that is worth: on the block, in a choice of it, in lists of other words. */
+/** Search index of a toolbox entry: texts and their weights. */
 interface IndexedEntry {
   title: string;
   choices: string[];
-  /** Words for which it comes before what is called so. */
+  /** Words for which this entry ranks above entries with the word in their title. */
   leads: Set<string>;
   lists: [text: string, worth: number, ofBeginning: number, first: number][];
   told: string;
 }
 
-/** More than a block can have that is called so. */
+/** Score of a leading word; above the highest title score. */
 const LEAD_SCORE = 15;
-/** Less than this is found in what is told about a block, not in what it is called. */
+/** Minimum score of a match in the title, choices or synonyms; description matches score less. */
 const MIN_TITLE_SCORE = 3;
 
 function indexEntry(entry: Entry): IndexedEntry {
@@ -71,10 +71,10 @@ function indexEntry(entry: Entry): IndexedEntry {
 }
 
 /**
- * How well one word is answered; 0 is not at all.
+ * Returns the score of an entry for one word; 0 means no match.
  *
- * A whole word is worth more than the beginning of one, and the first word more than the others: what a block begins
- * with, and what most people call it instead.
+ * A whole word scores higher than a prefix, and the first word of a list higher than the others: it is the first
+ * word on the block or its most common synonym.
  */
 function scoreOf({title, leads, lists, told}: IndexedEntry, word: string): number {
   if (leads.has(word)) return LEAD_SCORE;
@@ -92,10 +92,10 @@ function fuzzyScoreOf({lists}: IndexedEntry, word: string): number {
 }
 
 /**
- * The entries that answer, best first.
+ * Returns the matching entries, best first.
  *
- * The words may come in any order. One that nothing has may have a wrong letter. When nothing answers to all of them,
- * the blocks that are called by most of them do.
+ * Words match in any order. A word without an exact match may contain one typing error. If no entry matches all
+ * words, the entries that match most of them in their title or synonyms are returned.
  */
 export function findEntries(entries: Entry[], query: string, limit = 40): Entry[] {
   const queryWords = [...new Set(normalize(query).split(/[\s,]+/).filter(Boolean))];
@@ -122,17 +122,17 @@ export function findEntries(entries: Entry[], query: string, limit = 40): Entry[
     .slice(0, limit).map(({entry}) => entry);
 }
 
-/** What stands on a block, without the blocks in it. */
+/** Returns the normalized text of a block's own fields, without its children. */
 function blockText(block: Blockly.Block): string {
   const texts = block.inputList.flatMap((input) => input.fieldRow).map((field) => field.getText());
   return normalize(texts.join(' '));
 }
 
 /**
- * The bar that finds blocks in the workspace.
+ * Search bar for blocks in the workspace.
  *
- * Not Blockly's own plug-in for it: that is bound to one workspace (each tab has its own), tells no count, speaks
- * English only, needs accents typed exactly, does not look again after an edit, and opens on Ctrl+F by itself.
+ * Replaces Blockly's workspace search plug-in, which is bound to one workspace (each tab has its own), shows no
+ * count, is in English only, is sensitive to accents, doesn't update after edits, and takes Ctrl+F itself.
  */
 export class FindBar {
   private readonly bar = document.createElement('div');
@@ -168,7 +168,7 @@ export class FindBar {
     if (!already || this.input.value) this.search();
   }
 
-  /** Another behaviour, or other blocks: look again when the bar is open. */
+  /** Repeats the search after an edit or a change of tab, if the bar is open. */
   refresh(): void {
     if (this.bar.hidden) return;
     window.clearTimeout(this.timer);

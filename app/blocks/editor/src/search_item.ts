@@ -1,4 +1,4 @@
-// The field above the toolbox: type, see the blocks that answer, take one with Enter.
+// Search field above the toolbox; Enter picks the first matching block.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {type Entry, findEntries} from './search';
@@ -6,13 +6,13 @@ import {t} from './words';
 
 export const SEARCH = 'nepSearch';
 
-/** Blocks are made for a word, not for each letter of it: when no other came for so long. */
+/** Debounce time: results are rendered once per word instead of once per letter. */
 const DEBOUNCE_MS = 80;
-/** As high as a block in the toolbox is at least, with what is free below it. */
+/** Minimum height of a block in the toolbox, including the gap below it. */
 const BLOCK_HEIGHT = 50;
 const SHOW_ALL = 'SHOW_ALL_FOUND';
 
-/** What the field needs of the toolbox in which it stands. */
+/** Methods of the toolbox that the search field calls. */
 interface SearchableToolbox {
   allEntries(): Entry[];
   showFound(entries: unknown[] | null): void;
@@ -20,7 +20,7 @@ interface SearchableToolbox {
   enterFound(event: KeyboardEvent | null): void;
 }
 
-/** The words in a search field, which of them are selected, and whether their blocks are still to be shown. */
+/** State of a search field: its text, the selection in it, and whether results are pending. */
 interface SearchState {
   words: string;
   selection: [start: number, end: number];
@@ -43,13 +43,13 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.field.title = t('Find a block');
     this.field.onfocus = () => this.updateExpanded();
     this.field.onblur = () => {
-      // Who goes elsewhere in the page wants that; another window takes the keys as well.
+      // Moving the focus inside the page cancels the search; switching to another window doesn't.
       if (document.hasFocus()) this.cancelSearch();
       this.updateExpanded();
     };
     this.field.oninput = () => this.scheduleSearch();
     this.field.onkeydown = (event) => this.onKey(event);
-    // Otherwise the toolbox takes it for a click beside its categories and closes the blocks.
+    // Otherwise the toolbox treats the press as a click outside its categories and closes the flyout.
     this.div.onpointerdown = (event) => event.stopPropagation();
     this.div.append(iconElement('search', 16), this.field);
     this.parentToolbox_.getWorkspace().registerButtonCallback(SHOW_ALL, () => {
@@ -82,7 +82,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.updateExpanded();
   }
 
-  /** Its words and its focus, for the field that replaces it. */
+  /** Text and focus, to be restored in the field that replaces this one. */
   get query(): SearchState {
     const {value, selectionStart, selectionEnd} = this.field;
     return {
@@ -93,7 +93,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     };
   }
 
-  /** Takes the place of a field that had these words and this focus. */
+  /** Restores the text and focus of the field that this one replaces. */
   restore({words, selection, hasFocus, isPending}: SearchState): void {
     this.field.value = words;
     if (hasFocus) this.field.focus();
@@ -102,12 +102,12 @@ export class SearchItem extends Blockly.ToolboxItem {
     if (isPending) this.scheduleSearch();
   }
 
-  /** Shows again which blocks the words find. */
+  /** Repeats the search if the field has text. */
   refresh(): void {
     if (this.field.value.trim()) this.showResults();
   }
 
-  /** While somebody looks for a block, a toolbox of tiles is whole. */
+  /** Expands a compact toolbox (tiles only) while the search is active. */
   private updateExpanded(): void {
     const isExpanded = document.activeElement === this.field || this.field.value !== '';
     const box = this.div.closest('.blocklyToolbox');
@@ -126,7 +126,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.waiting = window.setTimeout(() => this.showResults(), DEBOUNCE_MS);
   }
 
-  /** Shows what was typed, if it was not yet. */
+  /** Shows pending results immediately. */
   private flushSearch(): void {
     if (this.waiting) this.showResults();
   }
@@ -140,7 +140,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     return findEntries(this.toolbox.allEntries(), this.field.value);
   }
 
-  /** So many can be seen at once, and one is half hidden. */
+  /** Number of results to render first: as many as fit into the viewport, and one more. */
   private get atFirst(): number {
     const {height} = this.parentToolbox_.getWorkspace().getCachedParentSvgSize();
     return Math.max(8, Math.ceil(height / BLOCK_HEIGHT) + 1);
@@ -179,7 +179,7 @@ export class SearchItem extends Blockly.ToolboxItem {
     event.preventDefault();
   }
 
-  /** The toolbox around the field would get the keys next and give them to a category, which leads back to here. */
+  /** Keeps Shift+Tab from focusing the toolbox, which would select a category and return the focus here. */
   private focusPrevious(): void {
     const box = this.div.closest<HTMLElement>('.blocklyToolbox');
     if (!box) return;

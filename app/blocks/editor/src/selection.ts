@@ -1,29 +1,29 @@
-// Several blocks and notes chosen at once: by a frame drawn on the canvas, by clicks with Ctrl or Shift, or all of them.
-// A chosen block means itself with all that is inside it; what hangs below it is chosen only when it has its own
-// outline. The notes are those of the canvas: one beside a block belongs to it.
+// Selection of several blocks and notes: all of them, with a marquee, or with Ctrl or Shift and a click.
+// A selected block includes its children; blocks below it are selected only if they have
+// an outline of their own. Only notes of the canvas can be selected, not comments of blocks.
 import * as Blockly from 'blockly/core';
 import {removeAll} from './carry';
 import {pathOf} from './renderer';
 
 type Block = Blockly.BlockSvg;
 export type Note = Blockly.comments.RenderedWorkspaceComment;
-/** What can be chosen. */
+/** An element that can be selected. */
 export type Item = Block | Note;
 
 export function isNote(item: unknown): item is Note {
   return item instanceof Blockly.comments.RenderedWorkspaceComment;
 }
 
-/** How far the mouse may move and the press still be a click, in pixels. */
+/** Maximum distance between press and release of a click, in pixels. */
 const CLICK_TOLERANCE_PX = 5;
-/** The top of a block that holds others: a frame that touches it means the block, one further down what is inside. */
+/** Height of a container block's header: a marquee that touches it selects the block, below it the children. */
 const HEADER_HEIGHT = 48;
 
 const selections = new WeakMap<Blockly.Workspace, Selection>();
 
 export class Selection {
   private selectedItems = new Set<Item>();
-  /** What the mouse is in the middle of: a press on a block that waits to be a click. */
+  /** Pointer press on an item that may become a click. */
   private pressed: {x: number; y: number; item: Item; toggles: boolean; before: Item | null} | null = null;
 
   constructor(readonly workspace: Blockly.WorkspaceSvg) {
@@ -39,13 +39,13 @@ export class Selection {
     });
   }
 
-  /** More than one, or none; the blocks in the order in which they are read, then the notes. */
+  /** The selected items if there are several, else none: blocks in reading order, then notes. */
   get items(): Item[] {
     if ([...this.selectedItems].some((item) => item.isDeadOrDying())) this.setSelectedItems([...this.selectedItems].filter((item) => !item.isDeadOrDying()));
     return this.selectedItems.size > 1 ? [...this.selectedItems] : [];
   }
 
-  /** Chooses exactly these: one is selected as by a click, of several one has the keys. */
+  /** Selects exactly these items and focuses the first one unless one of them has the focus. */
   select(items: Iterable<Item>): void {
     const all = [...new Set(items)];
     const outermost = [...getOutermostBlocks(new Set(blocksIn(all))), ...all.filter(isNote)];
@@ -57,7 +57,7 @@ export class Selection {
     else if (focused instanceof Blockly.BlockSvg || isNote(focused)) Blockly.getFocusManager().focusNode(this.workspace);
   }
 
-  /** Shows which are chosen, without moving the keys: while a frame is drawn. */
+  /** Highlights the selected items without moving the focus, as while a marquee is drawn. */
   setSelectedItems(items: Iterable<Item>): void {
     const now = new Set(items);
     for (const item of this.selectedItems) if (!now.has(item) && !item.isDeadOrDying()) setSelectedStyle(item, false);
@@ -69,14 +69,14 @@ export class Selection {
     if (this.selectedItems.size) this.setSelectedItems([]);
   }
 
-  /** The chosen note that this is, or the block that it is or is inside of. */
+  /** Returns the item itself or the surrounding block that is part of the selection. */
   findSelectedAncestor(item: Item | null): Item | null {
     if (isNote(item)) return this.selectedItems.has(item) ? item : null;
     for (let block = item; block; block = block.getSurroundParent()) if (this.selectedItems.has(block)) return block;
     return null;
   }
 
-  /** The keys went to it, by a click or by arrow keys: the others are let go when it is none of them. */
+  /** Clears the selection when an item outside it gets the focus. */
   onFocus(item: Item): void {
     if (this.selectedItems.size && !this.pressed?.toggles && !this.findSelectedAncestor(item)) this.clear();
   }
@@ -100,7 +100,7 @@ export class Selection {
     const isClick = Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < CLICK_TOLERANCE_PX;
     if (isClick && !this.workspace.isDragging()) {
       if (pressed.toggles) {
-        this.workspace.getGesture(event)?.cancel();  // a click would open the field below the mouse
+        this.workspace.getGesture(event)?.cancel();  // a click would open the field under the pointer
         this.toggle(pressed.item, pressed.before);
       } else if (event.button === 0) this.clear();
     }
@@ -135,7 +135,7 @@ function getNonShadowBlock(block: Block): Block {
   return real;
 }
 
-/** In the order of reading; what is inside another chosen one goes with it anyway. */
+/** Returns the blocks that aren't inside another of them, in reading order. */
 function getOutermostBlocks(blocks: ReadonlySet<Block>): Block[] {
   if (blocks.size < 2) return [...blocks];
   const outermost: Block[] = [];
@@ -150,18 +150,18 @@ function getOutermostBlocks(blocks: ReadonlySet<Block>): Block[] {
   return outermost;
 }
 
-/** All blocks and notes that are chosen together with this one; none when it is not one of several. */
+/** Returns all selected blocks and notes if this item is one of several, else none. */
 export function getSelectedItemsWith(item: Item | null | undefined): Item[] {
   const selection = item ? selections.get(item.workspace) : undefined;
   return selection?.findSelectedAncestor(item ?? null) ? selection.items : [];
 }
 
-/** The blocks among them. */
+/** Returns the selected blocks if this item is one of several. */
 export function getSelectedBlocksWith(item: Item | null | undefined): Block[] {
   return blocksIn(getSelectedItemsWith(item));
 }
 
-/** The notes among them. */
+/** Returns the selected notes if this item is one of several. */
 export function getSelectedNotesWith(item: Item | null | undefined): Note[] {
   return getSelectedItemsWith(item).filter(isNote);
 }
@@ -170,7 +170,7 @@ export function selectionOf(workspace: Blockly.Workspace): Selection | undefined
   return selections.get(workspace);
 }
 
-/** Chosen blocks that hang below each other, together; the topmost first. */
+/** Groups selected blocks that are connected below each other; the topmost comes first. */
 export function groupIntoStacks(blocks: readonly Block[]): Block[][] {
   const selected = new Set(blocks);
   return blocks.filter((block) => !selected.has(block.getPreviousBlock() as Block) || block.getPreviousBlock()?.getNextBlock() !== block)
@@ -181,7 +181,7 @@ export function groupIntoStacks(blocks: readonly Block[]): Block[][] {
     });
 }
 
-/** How many blocks a person sees in them: grey values in gaps are none. */
+/** Returns the number of blocks including their children, without shadow blocks. */
 export function countBlocks(blocks: readonly Block[]): number {
   let count = 0;
   for (const block of blocks) {
@@ -199,7 +199,7 @@ interface Area {
   bottom: number;
 }
 
-/** Where each block and note can be hit by a frame, in units of the canvas: worked out once, as none moves meanwhile. */
+/** Returns the areas in which a marquee selects each block and note, in workspace units. */
 export function areasOf(workspace: Blockly.WorkspaceSvg): Area[] {
   const areas: Area[] = [];
   const add = (block: Block) => {
@@ -235,7 +235,7 @@ Blockly.comments.RenderedWorkspaceComment.prototype.onNodeFocus = function (this
   selections.get(this.workspace)?.onFocus(this);
 };
 
-/** Deleting one of several deletes them all, as one step; whether it was one of several. */
+/** Deletes the whole selection as one undo step; returns false if the item isn't one of several. */
 export function deleteSelectionWith(item: Item): boolean {
   const items = getSelectedItemsWith(item).filter((selected) => selected.isDeletable());
   if (!items.length) return false;
@@ -253,7 +253,7 @@ Blockly.BlockSvg.prototype.checkAndDelete = function (this: Block) {
   if (!deleteSelectionWith(this)) baseCheckAndDelete.call(this);
 };
 
-/** Blockly's key deletes only the note that has the keys. */
+/** Deletes the selection when a note has the focus; Blockly's shortcut would delete only that note. */
 export function deleteByKey(): boolean {
   const focused = Blockly.getFocusManager().getFocusedNode();
   return isNote(focused) && deleteSelectionWith(focused);

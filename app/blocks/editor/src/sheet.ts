@@ -1,33 +1,33 @@
-// A sheet at the right of the canvas with blocks that wait there: those in the bin, those in the backpack.
+// Sheet at the right edge of the canvas that shows stored blocks: the bin and the backpack.
 import * as Blockly from 'blockly/core';
 import {Flyout} from './flyout';
 import {iconElement} from './icons';
 import {t} from './words';
 
-/** Room for the buttons below the sheet. */
+/** Height of the footer with the buttons of the sheet, in pixels. */
 const FOOTER_HEIGHT = 64;
 
-/** A sheet is open for a moment only: it closes with the next thing that is done elsewhere. */
+/** Temporary flyout that closes on the next action outside it. */
 export abstract class Sheet extends Flyout {
   protected override updateOverlayOffset(): void {}
 
   protected override readonly footerHeight = FOOTER_HEIGHT;
   protected override readonly name: string = 'nepSheet';
 
-  /** What Enter or a click on a stack of blocks in it does. */
+  /** Handles Enter or a click on a stack in the sheet. */
   abstract pick(block: Blockly.BlockSvg): void;
 
-  /** What Delete on it does. */
+  /** Handles Delete on a stack in the sheet. */
   remove(_block: Blockly.BlockSvg): void {}
 
-  /** What its close button is called. */
+  /** Accessible label of the close button. */
   protected abstract get closes(): string;
 
   override autoHide(onlyClosePopups: boolean): void {
     if (!onlyClosePopups) this.hide();
   }
 
-  /** The keys go to its first stack, if they are led by keys. */
+  /** Turns on keyboard navigation and focuses the first stack. */
   focusFirst(): void {
     const first = this.getWorkspace().getTopBlocks(true)[0];
     if (!first) return;
@@ -48,7 +48,7 @@ export abstract class Sheet extends Flyout {
 
 const sheets = new Map<Blockly.WorkspaceSvg, Sheet>();
 
-/** Puts a new sheet beside the canvas of `workspace`. */
+/** Creates a sheet for `workspace` and adds it to the page. */
 export function createSheet<S extends Sheet>(workspace: Blockly.WorkspaceSvg, make: (options: Blockly.Options) => S): S {
   const options = workspace.copyOptionsForFlyout();
   options.toolboxPosition = Blockly.utils.toolbox.Position.RIGHT;
@@ -65,12 +65,12 @@ export function disposeSheet(sheet: Sheet | null): void {
   sheet.dispose();
 }
 
-/** The sheet that this block lies in. */
+/** Returns the sheet that contains this block. */
 export function sheetOf(block: Blockly.Block | null | undefined): Sheet | null {
   return block && sheets.get(block.workspace as Blockly.WorkspaceSvg) || null;
 }
 
-/** Enter on a block in a sheet takes it. */
+/** Enter on a block in a sheet picks its stack. */
 const basePerformAction = Blockly.BlockSvg.prototype.performAction;
 Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, event?: KeyboardEvent) {
   const sheet = sheetOf(this);
@@ -78,14 +78,14 @@ Blockly.BlockSvg.prototype.performAction = function (this: Blockly.BlockSvg, eve
   else basePerformAction.call(this, event);
 };
 
-/** So does a click: whether this block was one in a sheet. */
+/** Picks the clicked stack; returns false if the block isn't in a sheet. */
 export function activateClicked(block: Blockly.BlockSvg | null): boolean {
   const sheet = sheetOf(block);
   if (sheet && block) sheet.pick(block.getRootBlock());
   return sheet !== null;
 }
 
-/** A click on a field there takes the stack as well: what waits is not edited. */
+/** A click on a field in a sheet picks the stack too: stored blocks can't be edited. */
 const baseIsClickableInFlyout = Blockly.Field.prototype.isClickableInFlyout;
 Blockly.Field.prototype.isClickableInFlyout = function (this: Blockly.Field, closes: boolean) {
   return !sheetOf(this.getSourceBlock()) && baseIsClickableInFlyout.call(this, closes);

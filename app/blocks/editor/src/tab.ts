@@ -1,4 +1,4 @@
-// One behaviour in the page: a workspace of its own, with its undo, zoom, scroll position and open category.
+// Tab of one behaviour: a workspace with its own undo stack, zoom, scroll position and open category.
 import * as Blockly from 'blockly/core';
 import {Backpack} from './backpack';
 import {Bin} from './bin';
@@ -30,23 +30,23 @@ export interface TabListener {
   changed(tab: Tab, json: string): void;
   history(tab: Tab, canUndo: boolean, canRedo: boolean): void;
   selected(tab: Tab, id: string): void;
-  /** Other variables are shown beside the blocks. */
+  /** The set of watched variables has changed. */
   watched(tab: Tab): void;
-  /** A workspace was made. */
+  /** A workspace was created. */
   made(tab: Tab): void;
-  /** Other sensors may be shown in the toolbox. */
+  /** The sensors shown in the toolbox may have changed. */
   offered(tab: Tab): void;
-  /** A person wants the blocks of a category to stay open, or not. */
+  /** The user has pinned or unpinned the flyout. */
   pinned(keeps: boolean): void;
-  /** A person has deleted so many blocks at once. */
+  /** The user has deleted `count` blocks in one step. */
   deleted(tab: Tab, count: number): void;
-  /** There is another number of deletions in the bin. */
+  /** The number of deletions in the bin has changed. */
   binned(tab: Tab): void;
-  /** These in the hand are outside of the page, there; null: they are not any more. */
+  /** The dragged items are outside the page at this position; null: they are inside again. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
-  /** It was let go there. */
+  /** The dragged items were dropped outside the page. */
   letGoOutside(tab: Tab, leaving: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
-  /** A drag is over; see `DragListener`. */
+  /** A drag has ended; see `DragListener`. */
   dragEnded(placed: boolean, copies: boolean): void;
 }
 
@@ -64,7 +64,7 @@ export class Tab {
   key = '';
   generation = 0;
   private readonly frame = document.createElement('div');
-  /** Types whose definition changed since the blocks here were made. */
+  /** Block types whose definitions have changed since the last update of this tab. */
   private readonly outdated = new Set<string>();
   private toolboxDefinition: unknown = null;
   private choicesOutdated = false;
@@ -123,7 +123,7 @@ export class Tab {
     if (flyout instanceof Flyout) flyout.onPin = (keeps) => listener.pinned(keeps);
   }
 
-  /** Shows another program here, with an empty history. */
+  /** Loads another program and clears the undo history. */
   load(generation: number, state: Record<string, unknown>): void {
     this.cancelInteraction();
     this.program.load(state);
@@ -134,7 +134,7 @@ export class Tab {
     this.bin.clear();
   }
 
-  /** Another program in the place of this one, as an edit that can be undone. */
+  /** Replaces the program as one undoable edit. */
   change(state: Record<string, unknown>): void {
     this.cancelInteraction();
     this.program.change(state);
@@ -146,26 +146,26 @@ export class Tab {
   show(): void {
     this.frame.hidden = false;
     Blockly.common.setMainWorkspace(this.workspace);
-    // Blockly pastes where was copied; a person means what they see.
+    // Blockly pastes into the workspace of the copy; users expect the visible one.
     Blockly.clipboard.setLastCopiedWorkspace(this.workspace);
     this.resize();
     this.update();
     this.program.notifyHistory(true);
   }
 
-  /** The page has another size. */
+  /** Adapts the workspace to the size of the page. */
   resize(): void {
     Blockly.svgResize(this.workspace);
     this.culling.scheduleUpdate();
   }
 
-  /** Keeps the blocks of a category open, or not; `closes`: what is open does not stay until the next click. */
+  /** Pins or unpins the flyout of the open category; `closes`: unpinning also closes it. */
   setPinned(keeps: boolean, closes = false): void {
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.setPinned(keeps, closes);
   }
 
-  /** Tells the newest edits and takes it off the screen; what is told to it meanwhile waits until `show`. */
+  /** Flushes pending edits and hides the tab; later updates are applied in `show`. */
   hide(): void {
     this.cancelInteraction();
     Blockly.renderManagement.triggerQueuedRenders();
@@ -183,7 +183,7 @@ export class Tab {
     this.frame.remove();
   }
 
-  /** Ends what the mouse or an open field is in the middle of. */
+  /** Cancels the current drag and closes open fields and menus. */
   cancelInteraction(): void {
     this.workspace.hideChaff();
     this.workspace.getGesture(new PointerEvent('pointercancel'))?.cancel();
@@ -209,7 +209,7 @@ export class Tab {
     if (!this.frame.hidden) this.update();
   }
 
-  /** Makes up for what changed while nobody saw it. */
+  /** Applies the changes of theme, definitions and toolbox that arrived while the tab was hidden. */
   private update(): void {
     if (this.themeOutdated) this.workspace.setTheme(makeTheme());
     const rebuilt = this.outdated.size > 0 && hasBlockOfTypes(this.workspace, this.outdated);
@@ -239,18 +239,18 @@ export class Tab {
     }
   }
 
-  /** The keys go to the field that finds blocks in the toolbox. */
+  /** Focuses the search field of the toolbox. */
   search(): void {
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.focusSearch();
   }
 
-  /** The sensors that the open toolbox shows. */
+  /** Sensors shown in the open flyout. */
   get offered(): [robot: string, sensor: string][] {
     return visibleSensors(this.workspace.getFlyout());
   }
 
-  /** Whether a block is in the hand here. */
+  /** True while a block is dragged in this workspace. */
   get isDragging(): boolean {
     return this.workspace.isDragging();
   }

@@ -1,4 +1,4 @@
-// The behaviours that are open in the page, one of them shown.
+// Manages the open tabs, one of which is shown.
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, defineBlocks, defineSources} from './definitions';
 import {type Option} from './choices';
@@ -6,7 +6,7 @@ import {type BlockHelp, setHelp} from './help';
 import {Tab, type TabListener} from './tab';
 
 const BUSY_POLL_MS = 60;
-/** A canvas as wide as this has room for the blocks of a category beside it. */
+/** Minimum width in pixels of a canvas next to which the flyout stays open. */
 const MIN_PINNED_WIDTH = 1000;
 
 export interface Definitions {
@@ -19,18 +19,18 @@ export interface Definitions {
 
 export interface ShownTab {
   key: string;
-  /** With a program: load it here. Without: show what is here already. */
+  /** If set, `workspace` is loaded into the tab; otherwise the tab is shown as it is. */
   generation?: number;
   workspace?: Record<string, unknown>;
 }
 
 export class Tabs {
   private readonly tabs = new Map<string, Tab>();
-  /** The one that is shown; before the first key, and after closing it, an empty one without a key. */
+  /** The visible tab; before the first `show` and after closing the visible tab, an empty tab without a key. */
   activeTab: Tab;
   private waiting: Definitions | null = null;
   private toolbox: unknown = {contents: []};
-  /** Whether the blocks of a category stay open; null: when there is room. */
+  /** Whether the flyout is pinned; null: depends on the width of the page. */
   private pinned: boolean | null = null;
 
   constructor(private readonly container: HTMLElement, private readonly listener: TabListener) {
@@ -54,13 +54,13 @@ export class Tabs {
     tab.dispose();
   }
 
-  /** Keeps the blocks of a category open (true), or not; null: as long as the page is wide. */
+  /** Pins (true) or unpins (false) the flyout; null: pinned while the page is wide enough. */
   setPinned(pinned: boolean | null): void {
     this.pinned = pinned;
     this.activeTab.setPinned(this.staysOpen, pinned === null);
   }
 
-  /** The page has another size. */
+  /** Adapts the visible tab to the size of the page. */
   resize(): void {
     this.activeTab.resize();
     if (this.pinned === null) this.activeTab.setPinned(this.staysOpen, true);
@@ -75,7 +75,7 @@ export class Tabs {
     for (const tab of this.all()) tab.themeChanged();
   }
 
-  /** Waits while a block is in the hand or a field is open: nobody's drag is broken by a robot that connects. */
+  /** Applies definitions when idle, so that a connecting robot doesn't interrupt a drag or close an open field. */
   define(definitions: Definitions): void {
     const first = this.waiting === null;
     this.waiting = definitions;

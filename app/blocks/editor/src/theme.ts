@@ -1,4 +1,4 @@
-// From tokens to a Blockly theme and CSS variables.
+// Converts design tokens to a Blockly theme and CSS variables.
 import * as Blockly from 'blockly/core';
 import {SAME_STYLE, categories, colour, roles} from './tokens';
 
@@ -47,7 +47,7 @@ export function makeTheme(): Blockly.Theme {
   });
 }
 
-/** Puts every colour role on the page as `--nep-<role>`, and those of blocks as `--nep-block-<category>`. */
+/** Sets a CSS variable `--nep-<role>` for each colour role and `--nep-block-<category>` for each block category. */
 export function setCssVariables(dark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);

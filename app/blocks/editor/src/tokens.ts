@@ -1,4 +1,4 @@
-// The design tokens (resources/theme/tokens.json) as the page gets them from the window.
+// Design tokens (resources/theme/tokens.json) as passed to the page by the window.
 
 export interface BlockColours {
   primary: string;
@@ -9,13 +9,13 @@ export interface BlockColours {
 type Roles = Record<string, unknown>;
 type LightDark<T> = {light: T; dark: T};
 
-/** Either the whole file, or one mode of it (then `colour` and each block hold that mode's values). */
+/** The whole file, or a single mode of it, in which `colour` and each block hold the values of that mode. */
 export interface Tokens {
   colour: Roles | LightDark<Roles>;
   block: Record<string, {icon: string} & (BlockColours | LightDark<BlockColours>)>;
 }
 
-/** Blockly's own style names, and a few plurals, mean ours. */
+/** Maps Blockly's style names and some plurals to the styles of this editor. */
 export const SAME_STYLE: Readonly<Record<string, string>> = {
   logic_blocks: 'values', math_blocks: 'values', text_blocks: 'values', colour_blocks: 'values',
   loop_blocks: 'control', list_blocks: 'variables', variable_blocks: 'variables',
@@ -35,7 +35,7 @@ function modeOf<T extends object>(value: T | LightDark<T>): T {
   return (value as LightDark<T>)[isDark ? 'dark' : 'light'];
 }
 
-/** The colour of a role in the present mode; a role nobody defined is a visible mistake. */
+/** Returns the colour of a role in the current mode; an unknown role gets a conspicuous colour. */
 export function colour(role: string): string {
   const value = current ? modeOf<Roles>(current.colour)[role] : null;
   return typeof value === 'string' ? value : '#FF00FF';

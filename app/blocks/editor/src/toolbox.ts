@@ -1,4 +1,4 @@
-// The toolbox of the design: tiles with icons, headings, robots.
+// Toolbox with icon tiles, headings and robots.
 import * as Blockly from 'blockly/core';
 import {Flyout} from './flyout';
 import {focusedBlock} from './help';
@@ -38,7 +38,7 @@ function connectionNote(def: Def): string {
   return def['virtual'] === true ? t('virtual') : '';
 }
 
-/** What is wrong with a robot now: a status of the design (its dot has that colour), and the words for it. */
+/** Alarm of a robot: a status of the design, which sets the colour of the dot, and its text. */
 export interface Alarm {
   status: string;
   words: string;
@@ -47,13 +47,13 @@ export interface Alarm {
 let alarms = new Map<string, Alarm>();
 const headings = new Set<Heading>();
 
-/** The headings of these robots say so, at once and whatever is in the hand: a dot must not stay green. */
+/** Shows the alarms in the robots' headings immediately, even during a drag: a stale green dot would mislead. */
 export function showAlarms(now: Record<string, Alarm>): void {
   alarms = new Map(Object.entries(now));
   for (const heading of headings) heading.updateStatus();
 }
 
-/** "Blocks", or a robot's name with a filled dot (connected) or an empty ring (not). */
+/** Heading: "Blocks", or a robot's name with a filled dot (connected) or an empty ring (not connected). */
 class Heading extends Blockly.ToolboxItem {
   private div: HTMLDivElement | null = null;
   private readonly dot = document.createElement('i');
@@ -77,7 +77,7 @@ class Heading extends Blockly.ToolboxItem {
     this.updateStatus();
   }
 
-  /** Dot and note: what is wrong now, else whether the robot is connected. */
+  /** Updates the dot and note: the alarm if there is one, else the connection. */
   updateStatus(): void {
     const def = (this.toolboxItemDef_ ?? {}) as unknown as Def;
     const alarm = typeof def['connected'] === 'boolean' ? alarms.get(toText(def['name'])) : undefined;
@@ -104,7 +104,7 @@ interface ToolboxContents {
   contents: Def[];
 }
 
-/** Gives every item an id that stays the same from one definition to the next; says so when there is no robot. */
+/** Gives every category a stable id; adds the search field and, without robots, a placeholder heading. */
 function withIds(def: ToolboxContents): ToolboxContents {
   let section = '';
   const empty = def.contents.length && !def.contents.some((item) => item['kind'] === 'robotHeading');
@@ -126,13 +126,13 @@ export class Toolbox extends Blockly.Toolbox {
   private contentsJson = '';
   private lastOpen = '';
   private isShowingResults = false;
-  /** What each category was made of; Blockly writes into the contents it is given. */
+  /** JSON of each category's original contents; Blockly modifies the contents that it receives. */
   private contentsById = new Map<string, string>();
   private contentItems: Def[] = [];
-  /** What to do when other blocks are shown than those of a category. */
+  /** Called when search results replace the contents of the flyout. */
   onResultsShown = (): void => undefined;
 
-  /** Every block of every category, each once. */
+  /** Returns every block of every category, without duplicates. */
   allEntries(): Def[] {
     const seenKeys = new Set<string>();
     const offered = this.contentItems.flatMap((item) => {
@@ -147,13 +147,13 @@ export class Toolbox extends Blockly.Toolbox {
     });
   }
 
-  /** Whether a category stays open. */
+  /** True if the flyout stays open. */
   private get isPinned(): boolean {
     const flyout = this.getFlyout();
     return flyout instanceof Flyout && flyout.isPinned;
   }
 
-  /** Keeps a category open from now on, or lets it close; `closes`: at once. */
+  /** Pins or unpins the flyout; `closes`: unpinning also closes it. */
   setPinned(keeps: boolean, closes: boolean): void {
     const flyout = this.getFlyout();
     if (!(flyout instanceof Flyout)) return;
@@ -164,7 +164,7 @@ export class Toolbox extends Blockly.Toolbox {
     if (before !== keeps) this.workspace_.resize();
   }
 
-  /** Opens the category that was open last, or the first, when none is open and one has to be. */
+  /** Opens the last or first category if the flyout is pinned and closed. */
   private openLastCategory(): void {
     if (!this.isPinned || this.getFlyout()?.isVisible()) return;
     const items = this.getToolboxItems().filter((item) => item.isSelectable());
@@ -173,7 +173,7 @@ export class Toolbox extends Blockly.Toolbox {
     if (item) this.setSelectedItem(item);
   }
 
-  /** A category that stays open is left only for another. */
+  /** Keeps the selection while the flyout is pinned; only another category replaces it. */
   override clearSelection(): void {
     if (!this.isPinned) super.clearSelection();
   }
@@ -195,7 +195,7 @@ export class Toolbox extends Blockly.Toolbox {
     if (flyout instanceof Flyout) flyout.setTitle(title);
   }
 
-  /** Shows these blocks in place of a category; null shows the category again, or none. */
+  /** Shows search results in the flyout; null ends the search and reopens a pinned category. */
   showFound(entries: unknown[] | null): void {
     if (this.selectedItem_) this.deselectItem_(this.selectedItem_);
     const flyout = this.getFlyout();
@@ -207,7 +207,7 @@ export class Toolbox extends Blockly.Toolbox {
     this.onResultsShown();
   }
 
-  /** Shows also those that were found and not shown; with the keys one is on the first of them. */
+  /** Shows all results; with keyboard navigation, focuses the first one that was hidden before. */
   showAllFound(entries: unknown[], before: number): void {
     const flyout = this.getFlyout();
     const scroll = flyout?.getWorkspace().scrollY ?? 0;
@@ -217,7 +217,7 @@ export class Toolbox extends Blockly.Toolbox {
     if (next && Blockly.keyboardNavigationController.getIsActive()) Blockly.getFocusManager().focusNode(next);
   }
 
-  /** The keys go to the first block that was found; with a key press it is taken at once. */
+  /** Focuses the first result; with a key event, also picks it and ends the search. */
   enterFound(event: KeyboardEvent | null): void {
     const workspace = this.getFlyout()?.getWorkspace();
     const first = this.isShowingResults && this.getFlyout()?.isVisible() ? workspace?.getTopBlocks(true)[0] : undefined;
@@ -233,17 +233,17 @@ export class Toolbox extends Blockly.Toolbox {
     for (const item of this.getToolboxItems()) if (item instanceof SearchItem) item.clear();
   }
 
-  /** The keys go to the field that finds blocks. */
+  /** Focuses the search field. */
   focusSearch(): void {
     for (const item of this.getToolboxItems()) if (item instanceof SearchItem) item.focus();
   }
 
-  /** What a category holds beside what people made themselves. */
+  /** Returns the static contents of a dynamic category. */
   contentsOf(dynamic: string): unknown[] {
     return this.contentItems.find((item) => item['dynamic'] === dynamic)?.['contents'] as unknown[] ?? [];
   }
 
-  /** Opens a category of what people made, also again with what is new in it. */
+  /** Opens a dynamic category, or refreshes it if it is open. */
   openDynamic(dynamic: string): void {
     const id = this.contentItems.find((item) => item['dynamic'] === dynamic)?.['toolboxitemid'];
     const item = this.getToolboxItems().find((candidate) => candidate.getId() === id);
@@ -251,7 +251,7 @@ export class Toolbox extends Blockly.Toolbox {
     else if (item) this.setSelectedItem(item);
   }
 
-  /** Shows a category of what people made again, if it is open. */
+  /** Refreshes a dynamic category if it is open. */
   refreshDynamic(dynamic: string): void {
     const open = this.selectedItem_;
     if (open && this.contentItems.some((item) => item['dynamic'] === dynamic && item['toolboxitemid'] === open.getId())) {
@@ -261,7 +261,7 @@ export class Toolbox extends Blockly.Toolbox {
     }
   }
 
-  /** Shows new contents; an open category, typed words and the focus stay, and equal contents change nothing. */
+  /** Replaces the contents; keeps the open category, search text and focus. Does nothing if nothing changed. */
   update(def: unknown, blocksChanged: boolean): void {
     const items = withIds(def as ToolboxContents);
     const key = JSON.stringify(items);

@@ -1,4 +1,4 @@
-// Trying blocks at once, as in Scratch: a click on a block of the toolbox, "Run from here" for one in the behaviour.
+// Runs single blocks, as in Scratch: a click on a block of the toolbox, or “Run from here” in the workspace.
 import * as Blockly from 'blockly/core';
 import {focusedBlock} from './help';
 import {drawIcon} from './icons';
@@ -12,7 +12,7 @@ const MENU_ITEM_ID = 'nepRunFromHere';
 const HANDLE_DISTANCE = 34;
 const HANDLE_SIZE = 26;
 
-/** What is tried: a block of the behaviour by its id, one of the toolbox with all that it is. */
+/** Block to run: a workspace block by its id, a toolbox block with its serialized state. */
 export interface TryRequest {
   id: string;
   kind: 'value' | 'hat' | 'stack';
@@ -22,14 +22,14 @@ export interface TryRequest {
 type TryListener = (request: TryRequest) => void;
 let notifyTry: TryListener = () => undefined;
 
-/** The block that is meant: a grey value stands for the block that holds it. */
+/** Returns the block itself, or the nearest parent that isn't a shadow block. */
 function getNonShadowBlock(block: Blockly.Block | null): Blockly.BlockSvg | null {
   let current = block;
   while (current?.isShadow()) current = current.getParent();
   return current instanceof Blockly.BlockSvg ? current : null;
 }
 
-/** Functions are run by what calls them. */
+/** Returns true if the block can be run; function definitions can't, only their calls. */
 function canTry(block: Blockly.BlockSvg | null): block is Blockly.BlockSvg {
   return block !== null && !block.isInsertionMarker() && !block.type.startsWith('functions_define');
 }
@@ -48,7 +48,7 @@ function actionLabel(block: Blockly.BlockSvg | null): string {
   return block?.outputConnection ? t('Show its value') : t('Run from here');
 }
 
-/** Once for the page: menu, key, and the click on a block of the toolbox; `tell` hears what is to be tried. */
+/** Registers the menu entry, shortcut and toolbox click, once per page; `listener` is called with each request. */
 export function registerTries(listener: TryListener): void {
   notifyTry = listener;
   setMenuIcon(MENU_ITEM_ID, 'play');
@@ -67,7 +67,7 @@ export function registerTries(listener: TryListener): void {
   Blockly.ShortcutRegistry.registry.register({
     name: MENU_ITEM_ID,
     keyCodes: [ctrl(Blockly.utils.KeyCodes.ENTER)],
-    allowCollision: true,  // with Blockly's menu, until `keys.ts` has given that its other keys
+    allowCollision: true,  // with Blockly's context menu, until `keys.ts` assigns that other keys
     preconditionFn: () => canTry(getNonShadowBlock(focusedBlock())),
     callback: () => {
       const block = getNonShadowBlock(focusedBlock());
@@ -77,7 +77,7 @@ export function registerTries(listener: TryListener): void {
   });
   const gestures = Blockly.Gesture.prototype as unknown as ClickGesture;
   const click = gestures.doBlockClick;
-  // Blockly puts a copy into the program; a person who clicks wants to see what the block does.
+  // Blockly adds a copy of a clicked toolbox block to the workspace; run the block instead.
   gestures.doBlockClick = function (this: ClickGesture) {
     if (activateClicked(this.targetBlock)) return;
     const block = this.flyout ? getNonShadowBlock(this.targetBlock) : null;
@@ -86,14 +86,14 @@ export function registerTries(listener: TryListener): void {
   };
 }
 
-/** What Blockly's gesture knows of a click, by its own names. */
+/** Private members of Blockly's gesture that handle a click. */
 interface ClickGesture {
   flyout: Blockly.IFlyout | null;
   targetBlock: Blockly.BlockSvg | null;
   doBlockClick(this: ClickGesture): void;
 }
 
-/** A small round button at the left of the selected block: it runs the block and all below it. */
+/** Round button to the left of the selected block that runs the block and all blocks below it. */
 export class TryHandle {
   private handle: SVGGElement | null = null;
   private placing = 0;
@@ -125,7 +125,7 @@ export class TryHandle {
     if (title && title.textContent !== actionLabel(block)) title.textContent = actionLabel(block);
     this.handle.setAttribute('aria-label', actionLabel(block));
     const position = block.getRelativeToSurfaceXY();
-    // Left of a value is what holds it: there it stands above.
+    // A value has its parent block on the left, so the button is placed above it.
     const [x, y] = block.outputConnection ? [position.x, position.y - HANDLE_DISTANCE] : [position.x - HANDLE_DISTANCE, position.y + 8];
     this.handle.setAttribute('transform', `translate(${x}, ${y})`);
   }
@@ -140,7 +140,7 @@ export class TryHandle {
     drawIcon(icon, 'play', 14);
     icon.setAttribute('transform', 'translate(6.5, 6)');
     group.append(document.createElementNS(SVG_NS, 'title'), circle, icon);
-    // The block stays selected: the press is not the workspace's.
+    // Keep the workspace from handling the press and clearing the selection.
     group.addEventListener('pointerdown', (event) => {
       event.stopPropagation();
       event.preventDefault();
@@ -155,7 +155,7 @@ export class TryHandle {
   }
 }
 
-/** The answer of a try beside its block, in the behaviour or in the toolbox, until the next press of anything. */
+/** Shows the result of a run next to its block until the next click, key press or scroll. */
 export class TryResult {
   private readonly box = document.createElement('div');
 
@@ -169,7 +169,7 @@ export class TryResult {
     }
   }
 
-  /** Also for blocks of the toolbox, which are no part of the program: an error stands beside the toolbox and covers none. */
+  /** Shows the text next to the block; an error of a toolbox block goes beside the flyout to cover no blocks. */
   show(block: Blockly.BlockSvg, text: string, isError: boolean): void {
     this.box.textContent = text;
     this.box.classList.toggle('nepTryFailed', isError);

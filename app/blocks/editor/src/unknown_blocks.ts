@@ -1,5 +1,5 @@
-// Blocks which nobody here knows (a robot that was never seen, a newer Studio) are kept: shown grey, moved
-// like others, and written back exactly as they were read.
+// Placeholders for blocks of unknown types (an unknown robot, a newer Studio): shown grey, movable,
+// and saved with their original state.
 import * as Blockly from 'blockly/core';
 import {type BlockDefinition, definitionOf, fieldNames, inputKinds} from './definitions';
 import {readInputs} from './mutators';
@@ -32,7 +32,7 @@ interface UnknownState {
   shape: Shape;
   inputs: [string, InputKind][];
   label: string;
-  /** The children too are inside `original`: they could not be made. */
+  /** `original` includes the children, which could not be created either. */
   whole?: boolean;
 }
 
@@ -40,7 +40,7 @@ function mapInputs(inputs: Record<string, ConnectionState>, change: (connection:
   return Object.fromEntries(Object.entries(inputs).map(([name, each]) => [name, change(each, name)]));
 }
 
-/** `state` with every block that cannot be made here replaced by a kept one. */
+/** Returns `state` with every block that can't be created replaced by a placeholder. */
 export function wrapUnknown(state: BlockState, shape: Shape | null = null): BlockState {
   const definition = definitionOf(state.type);
   const isKnown = definition !== null && matchesDefinition(state, definition, shape);
@@ -55,7 +55,7 @@ export function wrapUnknown(state: BlockState, shape: Shape | null = null): Bloc
   const {id, x, y, inputs, next, ...original} = state;
   const form = shape ?? guessTop(state);
   const unknownState: UnknownState = {
-    // Nothing can hang below a value; what the file says there stays inside.
+    // A value block has no next connection, so the next block of the file stays in `original`.
     original: form === 'value' && next ? {...original, next} : original,
     shape: form,
     inputs: Object.entries(inputs ?? {}).map(([name, each]) => [name, kindOf(name, each)]),
@@ -65,14 +65,14 @@ export function wrapUnknown(state: BlockState, shape: Shape | null = null): Bloc
     ...(result.inputs && {inputs: result.inputs}), ...(form !== 'value' && result.next && {next: result.next})};
 }
 
-/** One kept block that holds a whole stack: the last resort when even `wrapUnknown` cannot be made. */
+/** Returns one placeholder for a whole stack: the fallback if the result of `wrapUnknown` can't be loaded. */
 export function wrapWholeStack(state: BlockState): BlockState {
   const {id, x, y, ...original} = state;
   const unknownState: UnknownState = {original, shape: 'statement', inputs: [], label: labelOf(state), whole: true};
   return {...position(id, x, y), type: UNKNOWN_BLOCK, extraState: unknownState};
 }
 
-/** The opposite of `wrapUnknown` and `wrapWholeStack`. */
+/** Reverts `wrapUnknown` and `wrapWholeStack`. */
 export function unwrapUnknown(state: BlockState): BlockState {
   const {inputs, next, ...result} = state as BlockState;
   if (inputs) {
@@ -98,12 +98,12 @@ function wrapConnected(connection: ConnectionState, kind: InputKind): Connection
     ...(connection.shadow && {shadow: wrapUnknown(connection.shadow, kind)})};
 }
 
-/** Without the `null` that Blockly writes for the grey preview of a block that is still being dragged. */
+/** Unwraps the connected blocks; omits the `null` that Blockly saves for an insertion marker during a drag. */
 function unwrapConnected(connection: ConnectionState): ConnectionState {
   return {...(connection.shadow && {shadow: unwrapUnknown(connection.shadow)}), ...(connection.block && {block: unwrapUnknown(connection.block)})};
 }
 
-/** Whether the definition has a place for everything that the state holds. */
+/** Returns true if the definition has all connections, inputs and fields that the state uses. */
 function matchesDefinition(state: BlockState, definition: BlockDefinition, shape: Shape | null): boolean {
   const connection = shape === 'value' ? 'output' : shape === 'statement' ? 'previousStatement' : null;
   if (connection && !(connection in definition)) return false;
@@ -115,7 +115,7 @@ function matchesDefinition(state: BlockState, definition: BlockDefinition, shape
     Object.keys(state.fields ?? {}).every((name) => fields.has(name));
 }
 
-/** Whether a block that people shape themselves has this input, as the file says. */
+/** Returns true if a block with a mutator has this input according to its saved extra state. */
 function hasInput(state: BlockState, definition: BlockDefinition, name: string): boolean {
   if (inputKinds(definition).has(name)) return true;
   const extra = (state.extraState ?? {}) as {items?: unknown; inputs?: unknown};
@@ -153,7 +153,7 @@ interface UnknownBlock extends Blockly.Block {
   kept?: UnknownState;
 }
 
-/** Whether this block stands for one that is not known here. */
+/** Returns true if this block is a placeholder for an unknown one. */
 export function isUnknown(block: Blockly.Block): boolean {
   return block.type === UNKNOWN_BLOCK;
 }

@@ -1,10 +1,10 @@
-// New, renamed and deleted variables: the window asks for names, and tells the page what to do.
+// Creates, renames and deletes variables; the window shows the dialogs and sends the edits to the page.
 import * as Blockly from 'blockly/core';
 import {t} from './words';
 
 export type Variable = Blockly.IVariableModel<Blockly.IVariableState>;
 
-/** What the window wants done with a variable. */
+/** Edit of a variable requested by the window. */
 export interface VariableEdit {
   do: 'new' | 'rename' | 'delete' | 'watch';
   id?: string;
@@ -14,12 +14,12 @@ export interface VariableEdit {
 
 const NEW_VARIABLE_ID = 'NEP_NEW_VARIABLE';
 
-/** Asks the window for a command by its name. */
+/** Runs a command of the window by its name. */
 let runCommand: (command: string) => void = () => undefined;
-/** The drop-down in which a person chose “New variable”: it gets the one that is made. */
+/** Drop-down in which “New variable” was chosen; it is set to the created variable. */
 let pendingField: Blockly.FieldVariable | null = null;
 
-/** Buttons and drop-downs about variables lead to the window's commands. */
+/** Sets the function that runs the window's commands for variables. */
 export function setCommandHandler(run: (command: string) => void): void {
   runCommand = run;
 }
@@ -33,7 +33,7 @@ export function registerVariableButtons(workspace: Blockly.WorkspaceSvg): void {
   workspace.registerButtonCallback('CREATE_LIST', press('variable.new_list'));
 }
 
-/** Does it, as one step that undo takes back; the variable, if there is one. */
+/** Applies an edit as one undo step; returns the variable, or null if there is none. */
 export function editVariable(workspace: Blockly.WorkspaceSvg, edit: VariableEdit): Variable | null {
   const variables = workspace.getVariableMap();
   const variable = edit.id === undefined ? null : variables.getVariableById(edit.id);
@@ -54,7 +54,7 @@ export function editVariable(workspace: Blockly.WorkspaceSvg, edit: VariableEdit
   }
 }
 
-/** What used a variable goes with it; what is below such a block moves up to its place. */
+/** Deletes a variable and the blocks that use it; the blocks below them move up. */
 function deleteWithUses(workspace: Blockly.WorkspaceSvg, variable: Variable): void {
   const id = variable.getId();
   for (const block of workspace.getAllBlocks(false)) {
@@ -64,7 +64,7 @@ function deleteWithUses(workspace: Blockly.WorkspaceSvg, variable: Variable): vo
   workspace.getVariableMap().deleteVariable(variable);
 }
 
-// ---- the drop-down of a variable
+// ---- Drop-down of a variable
 
 interface FieldVariableInternals {
   onItemSelected_(this: Blockly.FieldVariable, menu: Blockly.Menu, item: Blockly.MenuItem): void;
@@ -93,14 +93,14 @@ Blockly.FieldVariable.dropdownCreate = function (this: Blockly.FieldVariable): B
   const isEditOption = (option: Blockly.MenuOption) => Array.isArray(option) &&
     (option[1] === Blockly.RENAME_VARIABLE_ID || option[1] === Blockly.DELETE_VARIABLE_ID);
   const all = baseDropdownCreate.call(this);
-  // In the toolbox a drop-down only chooses.
+  // In the toolbox the drop-down offers only a choice, no edits.
   if (inFlyout) return all.filter((option) => !isEditOption(option));
   const editOptions = all.filter(isEditOption);
   const names = all.filter((option) => !isEditOption(option));
   return [...names, [t('New variable'), NEW_VARIABLE_ID], ...editOptions];
 };
 
-// ---- the menu of a block with a variable
+// ---- Context menu of a block with a variable
 
 function variableOf(block?: Blockly.BlockSvg): Variable | null {
   const [only, other] = block?.getVarModels() ?? [];

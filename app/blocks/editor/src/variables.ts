@@ -1,4 +1,4 @@
-// The variables of a behaviour: the toolbox offers each of them, and follows when people make, rename or delete one.
+// Toolbox categories of variables and lists; they are refreshed when variables change.
 import * as Blockly from 'blockly/core';
 import {Toolbox} from './toolbox';
 import type {Variable} from './variable_edits';
@@ -28,7 +28,7 @@ export class Variables {
     workspace.addChangeListener((event) => VARIABLE_EVENTS.has(event.type) && this.scheduleRefresh());
   }
 
-  /** Once for all the variables of a program that is being loaded. */
+  /** Schedules one refresh for all variable events of a load. */
   private scheduleRefresh(): void {
     if (this.waiting) return;
     this.waiting = true;
@@ -38,7 +38,7 @@ export class Variables {
     });
   }
 
-  /** Another program is here. */
+  /** Refreshes the variable and list categories. */
   refresh(): void {
     const toolbox = this.workspace.getToolbox();
     if (!(toolbox instanceof Toolbox) || !this.workspace.rendered) return;
@@ -46,14 +46,14 @@ export class Variables {
     toolbox.refreshDynamic(LISTS);
   }
 
-  /** The blocks of the category of lists are about this variable from now on. */
+  /** Uses this variable in the blocks of the list category and opens the category. */
   useAsList(variable: Variable): void {
     this.newestList = variable.getId();
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.openDynamic(LISTS);
   }
 
-  /** The variable that a person made as a list last, else the last one that a block makes a list of. */
+  /** Returns the list created last, else the variable of the last block that assigns a list. */
   private getList(): Variable | null {
     const variables = this.workspace.getVariableMap();
     const newest = variables.getVariableById(this.newestList);
@@ -63,7 +63,7 @@ export class Variables {
     return set[set.length - 1]?.getVarModels()[0] as Variable | undefined ?? null;
   }
 
-  /** First what makes the list, then all that is done with it. */
+  /** Returns the list category: first the block that creates the list, then the blocks that use it. */
   private getListContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
     const contents = (toolbox instanceof Toolbox ? toolbox.contentsOf(LISTS) : []) as Entry[];
@@ -83,7 +83,7 @@ export class Variables {
       Blockly.utils.toolbox.FlyoutItemInfoArray;
   }
 
-  /** The blocks of the category about the newest variable, and the value of each. */
+  /** Returns the variable category: blocks for the newest variable, and a getter for each variable. */
   private getVariableContents(): Blockly.utils.toolbox.FlyoutItemInfoArray {
     const toolbox = this.workspace.getToolbox();
     const contents = (toolbox instanceof Toolbox ? toolbox.contentsOf(VARIABLES) : []) as Entry[];

@@ -1,9 +1,9 @@
-// The sensors that the open toolbox shows: their values are wanted while it is open.
+// Sensors shown in the open flyout; their values are requested while it is open.
 import * as Blockly from 'blockly/core';
 import {sensorTypes} from './definitions';
 import {sensorOf} from './overlays';
 
-/** Calls `look` after whatever opens, fills or closes it. */
+/** Calls `onChange` after the flyout is opened, filled or closed. */
 export function observeFlyout(flyout: Blockly.IFlyout, onChange: () => void): void {
   const {show, setVisible} = flyout;
   flyout.show = (contents) => {
@@ -16,7 +16,7 @@ export function observeFlyout(flyout: Blockly.IFlyout, onChange: () => void): vo
   };
 }
 
-/** Robot and sensor of each block in it; none while it is closed. */
+/** Returns the robot and sensor of each block in the flyout; none if it is closed. */
 export function visibleSensors(flyout: Blockly.IFlyout | null): [robot: string, sensor: string][] {
   if (!flyout?.isVisible()) return [];
   const blocks = [...sensorTypes()].flatMap((type) => flyout.getWorkspace().getBlocksByType(type, true));

@@ -1,4 +1,4 @@
-// What variables hold, on small cards at the edge of the page: kept with the behaviour, moved by hand.
+// Cards at the edge of the page that show the values of variables; movable, and saved with the behaviour.
 import * as Blockly from 'blockly/core';
 import {iconElement} from './icons';
 import {t} from './words';
@@ -7,7 +7,7 @@ const SERIALIZER_NAME = 'nepWatched';
 const SERIALIZER_PRIORITY = 10;
 const PAGE_MARGIN = 6;
 
-/** As `VariableValue.to_json` tells it. */
+/** Value of a variable, as returned by `VariableValue.to_json`. */
 export interface VariableValue {
   kind: string;
   text: string;
@@ -17,13 +17,13 @@ export interface VariableValue {
 
 interface Watched {
   id: string;
-  /** Where a person put it, from the right and from the top. */
+  /** Position chosen by the user: distances from the right and top edges, in pixels. */
   right?: number;
   top?: number;
 }
 
 interface Listener {
-  /** Something is watched that was not, or no longer, or elsewhere. */
+  /** The watched variables or the positions of their cards have changed. */
   changed(): void;
 }
 
@@ -78,7 +78,7 @@ export class WatchedValues {
     this.render();
   }
 
-  /** A card for each watched variable; those whose variable is gone are not drawn, undo may bring it back. */
+  /** Renders a card for each watched variable; deleted variables are skipped but kept, as undo may restore them. */
   private render(): void {
     this.column.replaceChildren();
     this.cards.clear();
@@ -136,7 +136,7 @@ export class WatchedValues {
     card.style.top = moved ? `max(${PAGE_MARGIN}px, min(${top}px, calc(100% - 40px)))` : '';
   }
 
-  /** A card follows the hand; it stays inside the page. */
+  /** Moves the card with the pointer, within the page. */
   private startDrag(card: HTMLElement, watched: Watched, event: PointerEvent): void {
     if (event.button !== 0 || (event.target as Element).closest('button, ol')) return;
     event.preventDefault();

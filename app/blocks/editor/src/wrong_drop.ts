@@ -1,11 +1,11 @@
-// A block that was let go where it does not fit: why, in a sentence at that place, and out of the way.
+// Explains why a dropped block doesn't fit, with a hint at that place, and moves the block aside.
 import * as Blockly from 'blockly/core';
 import {findFreePosition, visibleArea, obstacles} from './free_place';
 import {helpFor} from './help';
 import {Hint} from './hint';
 import {lazy, t} from './words';
 
-/** How near a gap was meant, in pixels of the screen. */
+/** Maximum distance between a drop and the slot that it targets, in screen pixels. */
 const MAX_DISTANCE_PX = 30;
 const OFFSET = 28;
 const EMPTY_INPUT_SIZE = 40;
@@ -20,10 +20,10 @@ const TYPE_LABELS: Readonly<Record<string, string>> = {
 const OTHER_TYPE_LABEL = lazy('another value');
 
 interface DropRejection {
-  /** The block at whose gap, or below which, it was let go. */
+  /** Block that rejected the drop. */
   by: Blockly.BlockSvg;
   sentence: string;
-  /** Where that is on the canvas. */
+  /** Position of the rejecting connection, in workspace coordinates. */
   place: Blockly.utils.Coordinate;
 }
 
@@ -38,12 +38,12 @@ export class RejectedDrops {
     this.hint.dispose();
   }
 
-  /** Says why it did not join, if it was let go at something; moves it aside when it covers that. */
+  /** Shows why the block did not connect, if it was dropped near a connection, and moves it aside if needed. */
   explainDrop(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void {
     this.showRejection(block, this.findRejection(block, Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, mouse)));
   }
 
-  /** The same for a value that was put down with the keys: ``meant`` had them before, a gap, a field or a block. */
+  /** Same for a value placed with the keyboard; `target` is the slot, field or block that had the focus before. */
   explainKeyboardDrop(block: Blockly.BlockSvg, target: Blockly.IFocusableNode): void {
     if (block.outputConnection) this.showRejection(block, rejectionAt(block, target));
   }
@@ -71,7 +71,7 @@ export class RejectedDrops {
     this.moveToFreePosition(block, mine, bubble);
   }
 
-  /** Where it lies now may be another script: then it goes to the next free place. */
+  /** Moves the block to the next free position if it overlaps another script. */
   private moveToFreePosition(block: Blockly.BlockSvg, mine: Blockly.utils.Rect, bubble: Blockly.utils.Rect): void {
     const others = obstacles(this.workspace, new Set([block]));
     if (!others.some((other) => other.intersects(mine))) return;
@@ -107,7 +107,7 @@ export class RejectedDrops {
   }
 }
 
-/** Why a value does not go where the keys were. */
+/** Returns why a value doesn't fit at the focused target. */
 function rejectionAt(block: Blockly.BlockSvg, target: Blockly.IFocusableNode): DropRejection | null {
   if (target instanceof Blockly.RenderedConnection) return rejectionAtInput(block, target.getSourceBlock(), target);
   const targetBlock = target instanceof Blockly.Field ? target.getSourceBlock() : target;
@@ -136,7 +136,7 @@ function distanceBetween(point: {x: number; y: number}, other: {x: number; y: nu
   return Math.hypot(point.x - other.x, point.y - other.y);
 }
 
-/** Where the next block begins, or would. */
+/** Returns the position at which a next block would start. */
 function nextBlockPosition(block: Blockly.BlockSvg): Blockly.utils.Coordinate | null {
   if (block.outputConnection) return null;
   const {x, y} = block.getRelativeToSurfaceXY();
@@ -145,7 +145,7 @@ function nextBlockPosition(block: Blockly.BlockSvg): Blockly.utils.Coordinate | 
   return new Blockly.utils.Coordinate(x, y + block.getHeightWidth().height);
 }
 
-/** Whether the mouse is in a gap for a value. */
+/** Returns true if the pointer is over a free value slot. */
 function isInInput(gap: Blockly.RenderedConnection, mouse: Blockly.utils.Coordinate): boolean {
   if (gap.type !== Blockly.ConnectionType.INPUT_VALUE) return false;
   const targetBlock = gap.targetBlock();

@@ -1,37 +1,37 @@
-/** How the clocks of two computers differ, and how surely that is known. */
+/** Offset between the clocks of two computers, with its uncertainty. */
 import { steadyNs } from "../system/clock.js";
 
 const MAX_OFFSET_NS = 2n ** 62n;
 export const MAX_UNCERTAINTY_NS = 10_000_000_000n;
-const DRIFT_PARTS = 20_000n; // clocks that nobody sets drift apart by one part of so many at most
+const DRIFT_PARTS = 20_000n; // unsynchronized clocks drift apart by at most 1/20000 (50 ppm)
 
-/** What to add to times of another clock for those of this computer's, in nanoseconds. */
+/** Offset that converts times of another clock to this computer's clock, in nanoseconds. */
 export interface ClockDifference {
   readonly addNs: bigint;
   readonly uncertaintyNs: bigint;
-  /** When that was so, by the steady clock; undefined: both are the same clock. */
+  /** Time of the measurement by the steady clock; undefined if both are the same clock. */
   readonly knownAtNs: bigint | undefined;
 }
 
 export const SAME_CLOCK: ClockDifference = { addNs: 0n, uncertaintyNs: 0n, knownAtNs: undefined };
 
-/** Return how far two clocks may have drifted apart. */
+/** Return the maximum drift between two clocks after a time. */
 export function driftNs(elapsedNs: bigint): bigint {
   return elapsedNs > 0n ? elapsedNs / DRIFT_PARTS : 0n;
 }
 
-/** The clock of a publisher: `difference` changes while its messages are kept, and is undefined while unknown. */
+/** Clock of a publisher. `difference` is updated while its messages are stored; undefined while unknown. */
 export interface PublisherClock {
   difference: ClockDifference | undefined;
 }
 
-/** Return the difference that a master tells; undefined for what no clock can be. */
+/** Return the difference reported by a master; undefined if it is malformed or out of range. */
 export function toldDifference([addNs, uncertaintyNs, ...more]: readonly bigint[]): ClockDifference | undefined {
   if (addNs === undefined || uncertaintyNs === undefined || more.length > 0) return undefined;
   return isClock(addNs / 2n, uncertaintyNs / 2n) ? { addNs, uncertaintyNs, knownAtNs: steadyNs() } : undefined;
 }
 
-/** Whether a clock can be so wrong, known so surely. */
+/** Return true if a clock offset and its uncertainty are within the valid range. */
 export function isClock(offsetNs: bigint, uncertaintyNs: bigint): boolean {
   return abs(offsetNs) <= MAX_OFFSET_NS && uncertaintyNs >= 0n && uncertaintyNs <= MAX_UNCERTAINTY_NS;
 }

@@ -8,13 +8,13 @@ import { encodeJson } from "./json_text.js";
 import { countNonFinite, isTooDeep, MAX_LEVELS } from "./nesting.js";
 import { pack, unpack, withWideIntegers } from "./packing.js";
 
-/** A payload as bytes. */
+/** An encoded payload. */
 export interface Encoded {
   readonly data: Buffer;
-  /** The same as a string, if it was made from one. */
+  /** The data as a string, if it was encoded from one. */
   readonly text?: string;
   readonly extension?: Extension;
-  /** NaN and infinite numbers that became `null`. */
+  /** Number of NaN and infinite values encoded as `null`. */
   readonly nonFinite?: number;
 }
 
@@ -111,18 +111,18 @@ const image: Codec = { name: "image", number: 5, encode: encodeImage, decode: de
 
 const CODECS: readonly Codec[] = [json, string, bytes, msgpack, image];
 
-/** Return the codec of a message type: that of its name, `image` for `images`, else JSON. */
+/** Return the codec of a message type: the one with that name, `image` for `images`, JSON otherwise. */
 export function codecFor(msgType: string): Codec {
   const name = msgType === "images" ? "image" : msgType;
   return CODECS.find((each) => each.name === name) ?? json;
 }
 
-/** Return the codec with this number on the wire, if there is one. */
+/** Return the codec with this wire number; undefined if there is none. */
 export function codecNumbered(number: number): Codec | undefined {
   return CODECS[number - 1];
 }
 
-/** Return a copy: the caller may go on writing into its own bytes while the message is queued. */
+/** Return a copy of the bytes, so that the caller may reuse its buffer while the message is queued. */
 export function copyOf(payload: unknown): Buffer {
   if (isShared(payload)) return payload;
   if (ArrayBuffer.isView(payload))

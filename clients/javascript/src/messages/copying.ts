@@ -1,4 +1,4 @@
-/** Return a copy in memory that isn't zeroed before, as `Buffer.from` does: for 1 MB that takes longer than copying. */
+/** Return a copy in uninitialized memory: zeroing 1 MB, as `Buffer.from` does, takes longer than copying it. */
 export function copied(bytes: Uint8Array): Buffer {
   const copy = Buffer.allocUnsafe(bytes.length);
   copy.set(bytes);
@@ -6,7 +6,7 @@ export function copied(bytes: Uint8Array): Buffer {
 }
 
 const MIN_SHARED_BYTES = 65_536;
-/** Large payloads as they were received: programs must not write into them, so they are published again without a copy. */
+/** Large received payloads. Programs must not modify them, so they are republished without a copy. */
 const received = new WeakSet<Buffer>();
 
 /** Return the payload of a received message, marked for {@link isShared}. */
@@ -15,7 +15,7 @@ export function shared(data: Buffer): Buffer {
   return data;
 }
 
-/** Whether these are the bytes of a received message, which nobody may write into. */
+/** Return true if the bytes are the payload of a received message, which must not be modified. */
 export function isShared(bytes: unknown): bytes is Buffer {
   return received.has(bytes as Buffer);
 }

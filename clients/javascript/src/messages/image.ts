@@ -1,15 +1,15 @@
-/** Pictures: JPEG or PNG files and raw pixels with their shape. The bytes are neither encoded nor decoded here. */
+/** Image codec: JPEG or PNG files, or raw pixels with their shape. The bytes are not converted. */
 import { DecodeError, EncodeError } from "../errors.js";
 import { copied, isShared, shared } from "./copying.js";
 import type { Extension } from "../wire/extension.js";
 
-/** A picture as it is published and received on topics of type `image`. */
+/** Image published or received on a topic of type `image`. */
 export interface Image {
-  /** A JPEG or PNG file, or raw pixels row by row without gaps, numbers little-endian. */
+  /** Bytes of a JPEG or PNG file, or raw pixels row by row without padding, little-endian. */
   readonly data: Uint8Array;
   /** `jpeg`, `png`, or the layout of raw pixels: `mono8`, `rgb8`, `bgra16`, `32FC1`, … */
   readonly encoding: string;
-  /** Height, width (pixels) and channels. May be left out for files. */
+  /** Height and width in pixels, and number of channels. Optional for files. */
   readonly shape?: readonly [number, number, number];
 }
 
@@ -36,13 +36,13 @@ const NUMBER_BYTES: Readonly<Record<string, number>> = {
 };
 const PNG_SIGNATURE = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 
-/** Return bytes for each number and channels for each pixel of a raw layout; undefined if there is none of this name. */
+/** Return bytes per number and channels per pixel of a raw layout; undefined if the name is unknown. */
 export function rawLayout(encoding: string): readonly [bytes: number, channels: number] | undefined {
   const match = /^(8U|8S|16U|16S|32S|32F|64F)C([1-4])$/.exec(encoding);
   return match ? [NUMBER_BYTES[match[1]!]!, Number(match[2])] : NAMED[encoding];
 }
 
-/** Return `jpeg` or `png` if the bytes are such a file. */
+/** Return `jpeg` or `png` if the bytes are such a file, else undefined. */
 export function fileKind(data: Uint8Array): "jpeg" | "png" | undefined {
   if (data[0] === 0xff && data[1] === 0xd8 && data[2] === 0xff) return "jpeg";
   return PNG_SIGNATURE.every((each, index) => data[index] === each) ? "png" : undefined;
@@ -71,7 +71,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
   return { data, extension: { shape: [height, width, channels], encoding: image.encoding } };
 }
 
-/** Read an {@link Image}: of files, the bytes decide what they are. @throws {DecodeError} */
+/** Decode an {@link Image}. The format of a file is detected from its bytes. @throws {DecodeError} */
 export function decodeImage(data: Buffer, extension: Extension): Image {
   shared(data);
   const shape = readShape(extension["shape"]);

@@ -1,5 +1,5 @@
-// JSON of payloads with long lists of numbers, as sensors send them. V8 takes two to six times as long for such lists:
-// it looks for the shortest text of each number, although most have few decimals.
+// JSON encoder for payloads with long lists of numbers, such as sensor data. V8 is two to six times slower
+// on them because it searches for the shortest text of each number, although most have few decimals.
 import { copied } from "./copying.js";
 
 const MIN_LIST_LENGTH = 128;
@@ -10,9 +10,9 @@ const MAX_NUMBER_BYTES = 18; // sign, nine digits, point, six decimals, comma
 const MILLION = 1e6;
 const [COMMA, MINUS, POINT, ZERO] = [0x2c, 0x2d, 0x2e, 0x30];
 
-/** Digits of 0 to 999, three each. */
+/** Digits of the numbers 0 to 999, three each. */
 const DIGITS = new Uint8Array(3000);
-/** Number of digits without leading zeros, and as decimals without trailing ones. */
+/** Number of digits of 0 to 999 without leading zeros, and of decimals without trailing zeros. */
 const LENGTHS = new Uint8Array(1000);
 const DECIMALS = new Uint8Array(1000);
 for (let number = 0; number < 1000; number++) {
@@ -23,7 +23,7 @@ for (let number = 0; number < 1000; number++) {
 }
 let scratch = Buffer.alloc(0);
 
-/** Return what `JSON.stringify` writes of a payload; undefined if it has no JSON. Throws what that throws. */
+/** Encode a payload like `JSON.stringify`, with the same exceptions; return undefined if it has no JSON. */
 export function encodeJson(payload: unknown): { data: Buffer; text?: string } | undefined {
   const quick = encodeLists(payload);
   if (quick) return { data: quick };
@@ -31,7 +31,7 @@ export function encodeJson(payload: unknown): { data: Buffer; text?: string } | 
   return text === undefined ? undefined : { data: Buffer.from(text, "utf8"), text };
 }
 
-/** The JSON of a long list of numbers, or of a plain object with such lists; undefined for everything else. */
+/** Return the JSON of a long list of numbers or of a plain object with such lists; undefined for other values. */
 function encodeLists(payload: unknown): Buffer | undefined {
   if (isNumberList(payload)) return finished(writeList(payload, 0));
   if (!isPlain(payload)) return undefined;
@@ -61,13 +61,13 @@ function isPlain(value: unknown): value is Readonly<Record<string, unknown>> {
   return prototype === Object.prototype || prototype === null;
 }
 
-/** The JSON of a member; undefined where it depends on its name, or where the member would be left out. */
+/** Return the JSON of a member; undefined if it depends on the member's name or the member would be omitted. */
 function plainText(value: unknown): string | undefined {
   if (typeof value === "bigint" || (typeof value === "object" && value !== null && "toJSON" in value)) return undefined;
   return JSON.stringify(value) as string | undefined;
 }
 
-/** Make room for some more bytes in `scratch`. False if that would be too many. */
+/** Reserve more bytes in `scratch`. Return false if the limit would be exceeded. */
 function reserve(bytes: number): boolean {
   if (bytes > MAX_SCRATCH_BYTES) return false;
   if (bytes <= scratch.length) return true;
@@ -77,13 +77,13 @@ function reserve(bytes: number): boolean {
   return true;
 }
 
-/** Write a text at a place of `scratch`. Returns the place behind it, or -1. */
+/** Write a text to `scratch` at an offset. Return the end offset, or -1 if there is no room. */
 function writeText(text: string, at: number): number {
   if (at < 0 || !reserve(at + 3 * text.length)) return -1;
   return at + scratch.write(text, at, "utf8");
 }
 
-/** Write a list of numbers at a place of `scratch`. Returns the place behind it; -1 for what `JSON.stringify` has to write. */
+/** Write a list of numbers to `scratch` at an offset. Return the end offset, or -1 if `JSON.stringify` is needed. */
 function writeList(values: readonly number[], at: number): number {
   if (!reserve(at + 2 + values.length * MAX_NUMBER_BYTES)) return -1;
   const out: Uint8Array = scratch;
@@ -125,7 +125,10 @@ function writeWhole(out: Uint8Array, at: number, number: number): number {
   return at;
 }
 
-/** Up to six decimals, if the number is no other than these say: then no shorter text is it, either. */
+/**
+ * Write up to six decimals if they represent the number exactly; then they are also its shortest text.
+ * Return the end offset, or -1.
+ */
 function writeDecimals(out: Uint8Array, at: number, whole: number, value: number): number {
   const millionths = Math.floor((value - whole) * MILLION + 0.5) | 0;
   if ((whole * MILLION + millionths) / MILLION !== value) return -1;

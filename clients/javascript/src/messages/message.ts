@@ -13,45 +13,45 @@ export class Message<T = unknown> {
   /** @internal */
   constructor(
     readonly topic: string,
-    /** The payload as it was received. Don't write into it. */
+    /** The received payload. Don't modify it. */
     readonly data: Buffer,
     private readonly codecOf: Codec,
-    /** Type as the publisher calls it, such as `json` or `sensor_msgs/Image`. */
+    /** Type declared by the publisher, such as `json` or `sensor_msgs/Image`. */
     readonly type: string,
-    /** Counts the publisher's messages from 1. */
+    /** Sequence number, counted from 1 by the publisher. */
     readonly seq: bigint,
-    /** When it was published, by the publisher's clock: nanoseconds since 1970. */
+    /** Time of publication by the publisher's clock, in nanoseconds since 1970. */
     readonly stampNs: bigint,
-    /** The publisher's id. */
+    /** Id of the publisher. */
     readonly publisher: bigint,
-    /** Named values that came beside the payload. */
+    /** Named values sent with the payload. */
     readonly extension: Extension,
-    /** Whether the publisher keeps it for late subscribers. */
+    /** Whether the publisher keeps the message for late subscribers. */
     readonly latched: boolean,
     private readonly clock = NOT_COMPARED,
   ) {}
 
-  /** `json`, `string`, `bytes`, `msgpack` or `image`. */
+  /** Name of the codec: `json`, `string`, `bytes`, `msgpack` or `image`. */
   get codec(): string {
     return this.codecOf.name;
   }
 
-  /** When it was published, by the publisher's clock. */
+  /** Time of publication by the publisher's clock. */
   get date(): Date {
     return new Date(Number(this.stampNs / 1_000_000n));
   }
 
   /**
-   * Seconds from its publication until this was first asked for; ask as soon as a message arrives.
+   * Seconds from publication until the first read of this property; read it as soon as a message arrives.
    *
-   * Between two computers it is corrected by the difference of their clocks, so it may be a little below 0.
+   * Between computers it is corrected by the difference of their clocks, so it may be slightly negative.
    */
   get latencyS(): number {
     this.seenNs ??= nowNs();
     return Number(this.seenNs - this.stampNs - (this.clock.difference?.addNs ?? 0n)) / 1e9;
   }
 
-  /** By how many seconds `latencyS` may be wrong because clocks differ: 0 on one computer, undefined if nobody has compared them. */
+  /** Uncertainty of `latencyS` in seconds due to clock differences: 0 on one computer, undefined if unknown. */
   get latencyUncertaintyS(): number | undefined {
     const { difference } = this.clock;
     if (!difference) return undefined;
@@ -59,7 +59,7 @@ export class Message<T = unknown> {
     return Number(uncertaintyNs + (knownAtNs === undefined ? 0n : driftNs(steadyNs() - knownAtNs))) / 1e9;
   }
 
-  /** The decoded payload. @throws {DecodeError} if it is none of its codec. */
+  /** The decoded payload. @throws {DecodeError} if the data is not valid for its codec. */
   get payload(): T {
     this.decoded ??= { value: this.codecOf.decode(this.data, this.extension) as T };
     return this.decoded.value;

@@ -1,7 +1,7 @@
-/** Lists and maps of a payload may be nested so deeply; deeper ones are refused on both sides. */
+/** Maximum nesting depth of lists and maps in a payload; deeper ones are rejected by sender and receiver. */
 export const MAX_LEVELS = 64;
 
-/** Whether lists and maps are nested more than {@link MAX_LEVELS} deep. */
+/** Return true if lists and maps are nested more than {@link MAX_LEVELS} deep. */
 export function isTooDeep(value: unknown, levels = MAX_LEVELS): boolean {
   if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return false;
   if (levels === 0) return true;
@@ -16,7 +16,7 @@ export function isTooDeep(value: unknown, levels = MAX_LEVELS): boolean {
   return false;
 }
 
-/** Number of NaN and infinite numbers in lists and maps: JSON has neither, they become `null`. */
+/** Count NaN and infinite numbers in lists and maps. JSON has neither; they are encoded as `null`. */
 export function countNonFinite(value: unknown, levels = MAX_LEVELS): number {
   if (typeof value === "number") return Number.isFinite(value) ? 0 : 1;
   if (value === null || typeof value !== "object" || levels === 0) return 0;

@@ -1,19 +1,19 @@
 import { MAX_LEVELS } from "./nesting.js";
 
-/** Bytes of a value without its first byte, by that byte: 0xc0 to 0xdf. Strings, bytes, lists and maps are below. */
+/** Size of a value after its first byte, for first bytes 0xc0 to 0xdf; 0 for those that `next` handles itself. */
 const FIXED_BYTES = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 8, 1, 2, 4, 8, 1, 2, 4, 8, 2, 3, 5, 9, 17, 0, 0, 0, 0, 0, 0, 0];
 
 /**
- * Check the structure of msgpack without decoding it. A decoder reserves room for as many items as a list claims to
- * have: a few bytes of a hostile sender would take gigabytes.
+ * Check the structure of msgpack without decoding it. A decoder allocates as many items as a list declares, so a
+ * few malicious bytes could take gigabytes.
  *
- * @throws {RangeError} if it ends early, goes on behind its value, or is nested more than 64 levels deep.
+ * @throws {RangeError} if the data is truncated, has trailing bytes, or is nested more than 64 levels deep.
  */
 export function checkPacked(packed: Uint8Array): void {
   const view = new DataView(packed.buffer, packed.byteOffset, packed.byteLength);
-  const open: number[] = []; // values that lists and maps still wait for, outermost first
+  const open: number[] = []; // remaining values of the enclosing lists and maps, outermost first
   let at = 0;
-  let missing = 1; // of the innermost one
+  let missing = 1; // remaining values of the innermost one
   while (missing > 0 || open.length > 0) {
     if (missing === 0) {
       missing = open.pop()!;
@@ -32,7 +32,7 @@ export function checkPacked(packed: Uint8Array): void {
   if (at !== view.byteLength) throw new RangeError("Something follows the value.");
 }
 
-/** End of the value or header at `at`, and how many values it holds; -1 for what is no list or map. */
+/** Return the end of the value or header at `at` and its number of items; -1 if it isn't a list or map. */
 function next(view: DataView, at: number): { end: number; items: number } {
   const first = view.getUint8(at++);
   if (first < 0x80 || first >= 0xe0) return { end: at, items: -1 };

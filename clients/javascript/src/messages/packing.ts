@@ -7,21 +7,21 @@ const DECODE_OPTIONS = {
   mapKeyConverter: (key: unknown): string | number =>
     typeof key === "string" || typeof key === "number" ? key : String(key),
 };
-const MAX_DEPTH = 65; // one more than the wire allows: `isTooDeep` gives the reason
+const MAX_DEPTH = 65; // one more than the wire allows, so that `isTooDeep` can report the reason
 
-/** Encode as msgpack. Integers beyond 32 bits are integers only as `bigint`; see {@link asInteger}. */
+/** Encode as msgpack. Integers beyond 32 bits must be `bigint` to stay integers; see {@link asInteger}. */
 export function pack(value: unknown): Buffer {
   const packed = encode(value, { useBigInt64: true, maxDepth: MAX_DEPTH, ignoreUndefined: true });
   return Buffer.from(packed.buffer, packed.byteOffset, packed.byteLength);
 }
 
-/** Decode msgpack. 64-bit integers become `bigint`. @throws {RangeError | Error} if it is none or nested too deeply. */
+/** Decode msgpack. 64-bit integers become `bigint`. @throws {RangeError | Error} if malformed or nested too deep. */
 export function unpack(packed: Uint8Array): unknown {
   checkPacked(packed);
   return decode(packed, DECODE_OPTIONS);
 }
 
-/** Decode msgpack whose maps have text keys only. @throws if it is none. */
+/** Decode msgpack whose maps have only string keys. @throws {RangeError | Error} if it is malformed. */
 export function unpackWithTextKeys(packed: Uint8Array): unknown {
   checkPacked(packed);
   return decode(packed, { ...DECODE_OPTIONS, mapKeyConverter: textKey });
@@ -32,7 +32,7 @@ function textKey(key: unknown): string {
   return key;
 }
 
-/** Whether a decoded value is a map. */
+/** Return true if a decoded value is a map. */
 export function isMap(value: unknown): value is Record<string, unknown> {
   return (
     value !== null &&
@@ -43,7 +43,7 @@ export function isMap(value: unknown): value is Record<string, unknown> {
   );
 }
 
-/** Return a value whose integers beyond 32 bits are `bigint`: msgpack would have them as floats. */
+/** Return a copy whose integers beyond 32 bits are `bigint`; msgpack would encode them as floats otherwise. */
 export function withWideIntegers(value: unknown): unknown {
   if (typeof value === "number") return asInteger(value);
   if (Array.isArray(value)) return value.map(withWideIntegers);
@@ -53,7 +53,7 @@ export function withWideIntegers(value: unknown): unknown {
   return Object.fromEntries(Object.entries(value).map(([key, each]) => [key, withWideIntegers(each)]));
 }
 
-/** Return an integer beyond 32 bits as `bigint`, any other number as it is. */
+/** Return an integer beyond 32 bits as `bigint`, any other number unchanged. */
 export function asInteger(value: number): number | bigint {
   return Number.isSafeInteger(value) && (value > 0xffffffff || value < -0x80000000) ? BigInt(value) : value;
 }

@@ -1,10 +1,10 @@
-/** What nodes and the master say to each other, as values, and their form on the wire. */
+/** Requests of nodes to the master and its replies: types, encoding and decoding. */
 import { WireError } from "../errors.js";
 import { isMap, pack, unpack, withWideIntegers } from "../messages/packing.js";
 
 const MAX_PROBLEM_LETTERS = 500;
 
-/** Return a sentence about a problem as statistics carry it. */
+/** Return a problem description truncated to the length allowed in statistics. */
 export function problemText(sentence: string): string {
   return sentence.slice(0, MAX_PROBLEM_LETTERS);
 }
@@ -16,9 +16,9 @@ export interface NodeRecord {
   readonly pid: number;
   readonly language: string;
   readonly since_ns: bigint;
-  /** Random text that proves the id; only the node and its master know it. */
+  /** Random secret that proves the id; known only to the node and its master. */
   readonly key: string;
-  /** The same for programs that read the same clock. */
+  /** Identifies the computer; equal for programs that read the same clock. */
   readonly computer?: string;
 }
 
@@ -58,7 +58,7 @@ export interface SubscriberCount {
   readonly problem?: string;
 }
 
-/** A request to the master. Fields that have their default may be left out. */
+/** A request to the master. Fields with their default value may be omitted. */
 export type Request =
   | { readonly do: "publisher+"; readonly node: NodeRecord; readonly publisher: PublisherRecord }
   | { readonly do: "subscriber+"; readonly node: NodeRecord; readonly subscriber: SubscriberRecord }
@@ -91,7 +91,7 @@ export type Request =
     }
   | { readonly do: "ping" };
 
-/** A publisher with its node: what a subscriber needs to connect. */
+/** A publisher and its node: the data a subscriber needs to connect. */
 export interface RemotePublisher {
   readonly id: bigint;
   readonly topic: string;
@@ -101,11 +101,11 @@ export interface RemotePublisher {
   readonly history: number;
   readonly nodeId: string;
   readonly nodeName: string;
-  /** Its node's computer; empty if unknown. */
+  /** Computer of the node; empty if unknown. */
   readonly computer: string;
 }
 
-/** A subscriber that a new publisher waits for. */
+/** Subscriber for whose connection a new publisher waits. */
 export interface ExpectedSubscriber {
   readonly id: bigint;
   readonly nodeName: string;
@@ -140,16 +140,16 @@ export type Answer = FromMaster &
         readonly lastSeqs: ReadonlyMap<bigint, bigint>;
         readonly hosts: string[];
         readonly nextS: number;
-        /** When the master received and answered the renewal, by its clock. */
+        /** Times at which the master received the renewal and replied to it, by its clock. */
         readonly times: readonly bigint[];
-        /** By node: what to add to its clock for this node's, and the uncertainty. */
+        /** By node: the offset from its clock to this node's clock, and the uncertainty. */
         readonly clocks: ReadonlyMap<string, readonly bigint[]>;
       }
     | { readonly is: "refused"; readonly reason: string; readonly code: string }
     | {
         readonly is: "publisher+";
         readonly publisher: RemotePublisher;
-        /** Whether it was created just now: its first message has seq 1. */
+        /** Whether the publisher is new, so that its first message has seq 1. */
         readonly isNew: boolean;
       }
     | {

@@ -1,18 +1,18 @@
-/** What is under way to subscribers, in bytes: libzmq bounds its queues by a number of messages only. */
+/** Flow control of subscribers in bytes: libzmq limits its queues only by number of messages. */
 const MIB = 2 ** 20;
 
-/** So much may be under way to one subscriber. */
+/** Maximum number of bytes in flight to one subscriber. */
 export const WINDOW_BYTES = 192 * MIB;
-/** The least that a subscriber may ask for. */
+/** Minimum window that a subscriber may request. */
 export const MIN_WINDOW_BYTES = 24 * MIB;
-/** A subscriber is asked what it has read after every so many bytes. */
+/** Number of bytes after which a subscriber is asked to acknowledge. */
 export const STEP_BYTES = 12 * MIB;
-/** What libzmq holds for subscribers that can't be asked is noted in such steps. */
+/** Granularity at which the bytes are counted that libzmq holds for subscribers that don't acknowledge. */
 export const BACKLOG_STEP_BYTES = MIB;
 const ENTRY_BYTES = MIB;
 const ASK_AGAIN_MS = 500;
 
-/** What was sent to one subscriber and is not known to be read. */
+/** Messages sent to one subscriber and not yet acknowledged. */
 export class SendWindow {
   /** Bytes. */
   underWay = 0;
@@ -22,12 +22,12 @@ export class SendWindow {
   private askedAt = -Infinity;
   private hasMissed = false;
 
-  /** Whether a message of this size may follow; one larger than the window waits for a step. */
+  /** Return true if a message of this size may be sent; one larger than the window waits until a step is free. */
   hasRoom(bytes: number): boolean {
     return this.underWay <= STEP_BYTES || this.underWay + bytes <= this.bound;
   }
 
-  /** So many bytes more are under way, up to the message `seq`. */
+  /** Count bytes that were sent, up to the message `seq`. */
   sent(seq: number, bytes: number): void {
     const newest = this.sentEntries.at(-1);
     if (newest && newest.bytes + bytes <= ENTRY_BYTES) {
@@ -40,19 +40,19 @@ export class SendWindow {
     this.unasked += bytes;
   }
 
-  /** There was no room for a message. */
+  /** Note that a message was dropped for lack of room. */
   missed(): void {
     this.hasMissed = true;
   }
 
-  /** Whether it has room again and does not know yet what it missed; true counts as telling. */
+  /** Return true once when there is room again after a drop; the caller then notifies the subscriber. */
   takeMissed(): boolean {
     if (!this.hasMissed || this.underWay > STEP_BYTES) return false;
     this.hasMissed = false;
     return true;
   }
 
-  /** The subscriber has read everything up to `seq`, and wants so much under way at most. */
+  /** Handle an acknowledgement of all messages up to `seq`, with the window that the subscriber requests. */
   read(seq: bigint, boundBytes: bigint): void {
     this.bound = Math.max(MIN_WINDOW_BYTES, Math.min(Number(boundBytes), WINDOW_BYTES));
     while (this.sentEntries.length > 0 && BigInt(this.sentEntries[0]!.seq) <= seq) {
@@ -60,7 +60,7 @@ export class SendWindow {
     }
   }
 
-  /** Whether to ask now what it has read; true counts as asking. */
+  /** Return true if an acknowledgement should be requested now; the request is then counted as sent. */
   takeAsk(now: number, hasRoom: boolean): boolean {
     if (this.unasked < STEP_BYTES && (hasRoom || now < this.askedAt + ASK_AGAIN_MS)) return false;
     this.unasked = 0;
@@ -70,8 +70,9 @@ export class SendWindow {
 }
 
 /**
- * What libzmq holds for those that don't tell what they have read. It lets go of a message's buffer when all
- * have it; that shows only when the buffer is collected as garbage, so this is an upper estimate.
+ * Bytes that libzmq holds for subscribers that don't acknowledge. libzmq releases a message's buffer after
+ * sending it to all of them; this is noticed only when the buffer is garbage-collected, so the value is an upper
+ * estimate.
  */
 export class Backlog {
   private heldBytes = 0;
@@ -83,7 +84,7 @@ export class Backlog {
     return this.heldBytes <= BACKLOG_STEP_BYTES || this.heldBytes + bytes <= WINDOW_BYTES;
   }
 
-  /** So many bytes were sent since the last call; `buffer` is the newest of them. */
+  /** Count bytes sent since the last call; `buffer` is the newest message of them. */
   sent(buffer: Buffer, bytes: number): void {
     this.heldBytes += bytes;
     this.registry.register(buffer, bytes);

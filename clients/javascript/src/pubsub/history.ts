@@ -1,7 +1,7 @@
 export const MAX_HISTORY = 1000;
 const MAX_HISTORY_BYTES = 64 * 2 ** 20;
 
-/** A publisher's newest messages for late subscribers, bounded in number and in bytes; the newest in any case. */
+/** Newest messages of a publisher for late subscribers, limited by number and bytes; always includes the newest. */
 export class History {
   readonly kept: { readonly parts: Buffer[]; readonly bytes: number }[] = [];
   bytes = 0;

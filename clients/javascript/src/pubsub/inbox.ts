@@ -1,12 +1,12 @@
 import type { Message } from "../messages/message.js";
 
-/** A queue of messages, bounded in number and bytes, that drops its oldest one when it is full. */
+/** Queue of messages, limited by number and bytes, that drops the oldest one when it is full. */
 export class Inbox {
   private messages: (Message | undefined)[] = [];
   private head = 0;
   private bytes = 0;
 
-  /** @param keepsAll false: keep the newest message only; replacing it is no drop. */
+  /** @param keepsAll false: keep only the newest message; a replaced message is not counted as dropped. */
   constructor(
     private readonly keepsAll: boolean,
     private readonly maxMessages: number,
@@ -17,7 +17,7 @@ export class Inbox {
     return this.messages.length - this.head;
   }
 
-  /** Add a message. Returns how many others were dropped for it. */
+  /** Add a message. Return the number of messages dropped for it. */
   put(message: Message): number {
     this.messages.push(message);
     this.bytes += message.data.length;

@@ -1,48 +1,48 @@
-/** The publishers that a subscriber hears, and how many of their messages were lost. No sockets. */
+/** Publishers of a subscriber and the number of their lost messages. No sockets. */
 import { WireError } from "../errors.js";
 import { type ClockDifference, type PublisherClock, SAME_CLOCK } from "../messages/clocks.js";
 import { isLoopback } from "../system/addresses.js";
 import { computerId } from "../system/computer.js";
 import type { ReachablePublisher } from "../session/master_session.js";
 
-const FAREWELL_MS = 3000; // so long after a publisher has unregistered its last messages may still come
+const FAREWELL_MS = 3000; // time to wait for the last messages of a publisher that has unregistered
 const EARLY_MS = 5000;
 const MAX_GAP = 2n ** 32n;
 const MAX_UNLISTED = 1000;
 const MIN_RECONNECT_MS = 2000;
 const MAX_RECONNECT_MS = 30_000;
 
-/** One publisher. */
+/** State of one publisher. */
 export class Source {
   remote: ReachablePublisher | undefined;
-  /** Its computer's clock. */
+  /** Clock of the publisher's computer. */
   readonly clock: PublisherClock = { difference: undefined };
-  /** Where it is connected. */
+  /** Endpoint to which it is connected. */
   endpoint: string | undefined;
-  /** Whether something was received since it was connected to `endpoint`. */
+  /** Whether something has been received since the connection to `endpoint`. */
   isConnected = false;
   private reconnectMs = MIN_RECONNECT_MS;
   private reconnectAt = Infinity;
-  /** Why it can't be connected to. */
+  /** Reason why the connection fails. */
   problem = "";
-  /** Seq of its newest message, received or lost; undefined while unknown, 0 if all are still to come. */
+  /** Seq of the newest message, received or lost; undefined while unknown, 0 if no message has been sent yet. */
   last: bigint | undefined;
   /** Whether a message, an echo or a bye has been received. */
   isHeard = false;
   hasEchoed = false;
   isLapsed = false;
   endsAt: number | undefined;
-  /** Until then at most, what comes before the echo is left out. */
+  /** Deadline until which messages before the echo are ignored. */
   earlyUntil: number | undefined;
-  /** Highest seq that the master has reported. */
+  /** Highest seq reported by the master. */
   promised = 0n;
-  /** Messages in this range were counted as lost because they were promised, and may still come. */
+  /** Range of messages counted as lost because the master reported them; they may still arrive. */
   lateFrom = 0n;
   lateTo = 0n;
-  /** Seq of a message that was refused because too many would be missing before it. */
+  /** Seq of a message rejected because the gap before it was too large. */
   leaptTo = 0n;
 
-  /** It is about to be connected to `endpoint`. */
+  /** Prepare a connection to `endpoint`. */
   connecting(endpoint: string): void {
     this.reconnectMs = this.endpoint === endpoint ? Math.min(MAX_RECONNECT_MS, 2 * this.reconnectMs) : MIN_RECONNECT_MS;
     this.reconnectAt = performance.now() + this.reconnectMs;
@@ -50,7 +50,7 @@ export class Source {
     this.hasEchoed = false;
   }
 
-  /** Whether nothing was received for so long that the connection is to be made again. */
+  /** Whether nothing has been received for so long that the subscriber should reconnect. */
   get isSilent(): boolean {
     return this.endpoint !== undefined && !this.isConnected && performance.now() >= this.reconnectAt;
   }
@@ -64,7 +64,7 @@ export class Sources {
   private clocks: ReadonlyMap<string, ClockDifference> = new Map();
   private readonly unlisted = new Set<bigint>();
 
-  /** The source of this id, made when it is new; the oldest that no master lists may go for it. */
+  /** Return the source with this id; create it if needed, evicting the oldest unlisted one if there are too many. */
   get(id: bigint): Source {
     let source = this.byId.get(id);
     if (!source) {
@@ -76,7 +76,7 @@ export class Sources {
     return source;
   }
 
-  /** Count losses from the first message of a new publisher. Has no effect once it was heard. */
+  /** Count losses from the first message of a new publisher. No effect after its first message. */
   expectAllOf(id: bigint): void {
     this.get(id).last ??= 0n;
   }
@@ -89,7 +89,7 @@ export class Sources {
     return source;
   }
 
-  /** By node: how the clocks of other computers differ from this one's. No others are known. */
+  /** Set the clock differences to other nodes, replacing all previous ones. */
   correct(clocks: ReadonlyMap<string, ClockDifference>): void {
     this.clocks = clocks;
     for (const { remote, clock } of this.byId.values()) if (remote) clock.difference = this.differenceTo(remote);
@@ -106,7 +106,7 @@ export class Sources {
     return source;
   }
 
-  /** Number of publishers that have greeted. */
+  /** Number of publishers whose echo has been received. */
   get echoing(): number {
     let count = 0;
     for (const each of this.byId.values()) if (each.hasEchoed) count++;
@@ -114,9 +114,9 @@ export class Sources {
   }
 
   /**
-   * Count a message. Returns false when it was heard already.
+   * Count a message. Return false if it is a duplicate.
    *
-   * @throws {WireError} when too many would be missing before it.
+   * @throws {WireError} if the gap before it is too large.
    */
   arrived(id: bigint, seq: bigint, isAlone: boolean): boolean {
     const source = this.get(id);
@@ -127,7 +127,7 @@ export class Sources {
       if (last !== undefined) this.lost += Number(seq - last - 1n);
       source.last = seq;
     } else if (source.lateTo !== 0n && source.lateTo === last && source.lateFrom <= seq) {
-      source.lateFrom = seq + 1n; // it was only late
+      source.lateFrom = seq + 1n; // it was late, not lost
       this.lost--;
     } else if (isAlone) {
       return false;
@@ -141,14 +141,14 @@ export class Sources {
       source.leaptTo = seq;
       throw new WireError("seq-leap", `The message's number leaps from ${last} to ${seq}.`);
     }
-    source.leaptTo = 0n; // it goes on from there: counting begins anew
+    source.leaptTo = 0n; // the sequence continues after the gap: restart counting
     source.promised = 0n;
     source.last = seq;
     this.received++;
     return true;
   }
 
-  /** Whether a message, not for this subscriber alone, comes again with the history before the echo. */
+  /** Return true if a message received before the echo will be repeated with the history. */
   isEarly(id: bigint): boolean {
     const source = this.byId.get(id);
     if (!source?.remote || source.hasEchoed || source.isHeard || source.remote.history <= 1) return false;
@@ -156,7 +156,7 @@ export class Sources {
     return performance.now() < source.earlyUntil;
   }
 
-  /** An echo or a bye: messages up to `seq` were sent before it. False when that can't be. */
+  /** Handle an echo or a bye, sent after the messages up to `seq`. Return false if `seq` is implausible. */
   reached(id: bigint, seq: bigint): boolean {
     const source = this.get(id);
     source.isHeard = source.isConnected = true;
@@ -166,7 +166,7 @@ export class Sources {
     return true;
   }
 
-  /** The master says that `seq` was sent; what it said one renewal ago and has not come is lost. */
+  /** Handle the seq reported by the master; messages reported one renewal ago and not received are lost. */
   promised(id: bigint, seq: bigint): void {
     const source = this.byId.get(id);
     if (source?.last === undefined || seq - source.last > MAX_GAP) return;
@@ -179,13 +179,13 @@ export class Sources {
     source.promised = seq;
   }
 
-  /** So many messages that had been received were dropped for lack of room. */
+  /** Count received messages that were dropped for lack of room as lost. */
   dropped(count: number): void {
     this.received -= count;
     this.lost += count;
   }
 
-  /** A publisher has unregistered, or was replaced; its last message was `final`. */
+  /** Handle that a publisher has unregistered or was replaced; its last message was `final`. */
   closing(id: bigint, final: bigint): void {
     const source = this.byId.get(id);
     if (!source || source.endsAt !== undefined) return;
@@ -193,7 +193,7 @@ export class Sources {
     if (final > source.promised) source.promised = final;
   }
 
-  /** A publisher is not listed any more; the master knew of messages up to `final`. */
+  /** Handle that a publisher is no longer listed; the master knew messages up to `final`. */
   lapsed(id: bigint, final: bigint): void {
     const source = this.byId.get(id);
     if (!source) return;
@@ -201,13 +201,13 @@ export class Sources {
     if (final > source.promised) source.promised = final;
   }
 
-  /** A publisher is about to be left: what has not come of what was promised is lost for good. */
+  /** Count the reported messages of a publisher that were not received as lost, before disconnecting from it. */
   settle(id: bigint): void {
     const source = this.byId.get(id);
     if (source?.last !== undefined) this.reached(id, source.promised);
   }
 
-  /** Publishers to leave: their bye has not come, or too many have fallen silent. */
+  /** Return publishers to disconnect from: their bye did not arrive, or there are too many silent ones. */
   ended(): bigint[] {
     const now = performance.now();
     const silent: bigint[] = [];
@@ -219,7 +219,7 @@ export class Sources {
     return [...silent.slice(0, Math.max(0, silent.length - MAX_UNLISTED)), ...over];
   }
 
-  /** Silent publishers whose program has been started again, as `remote`. */
+  /** Return silent publishers whose program was restarted as `remote`. */
   replacedBy(remote: ReachablePublisher): bigint[] {
     const isReplaced = ([id, source]: [bigint, Source]): boolean =>
       source.isLapsed && id !== remote.id && source.remote?.nodeName === remote.nodeName;
@@ -227,7 +227,7 @@ export class Sources {
   }
 }
 
-/** Whether a publisher is on this computer; of one that doesn't tell, its endpoint says so. */
+/** Return true if a publisher is on this computer; judged by its endpoint if its computer is unknown. */
 function isHere({ computer, endpoint }: ReachablePublisher): boolean {
   const own = computerId();
   if (own && computer) return own === computer;

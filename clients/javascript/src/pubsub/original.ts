@@ -1,6 +1,7 @@
 /**
- * The wire of the original NEP, for direct connections: one part, without header. Up to version 0.5.4.5 (generation A)
- * the topic stands in front (`topic {"a":1}`), from 0.5.4.8 on (B) it does not. Messages have no sequence numbers, so losses can't be counted.
+ * Wire of the original NEP for direct connections: one part without a header. Up to version 0.5.4.5
+ * (generation A) the frame starts with the topic (`topic {"a":1}`), from 0.5.4.8 on (B) it doesn't. Messages have
+ * no sequence numbers, so losses can't be counted.
  */
 import { WireError } from "../errors.js";
 import { type Codec, codecFor, type Encoded } from "../messages/codecs.js";
@@ -21,14 +22,14 @@ const SEND_MARK = 10_000;
 const RECEIVE_MARK = 1000;
 const MAX_PREFIX_BYTES = 300;
 
-/** Return the frame of a message. */
+/** Return the message as a frame. */
 export function toFrame(topic: string, generation: Generation, type: string, codec: string, data: Buffer): Buffer {
   const body = codec === "image" ? Buffer.from(data.toString("base64"), "latin1") : data;
   const isPrefixed = ALWAYS_PREFIXED.has(type) || (generation === "A" && !NEVER_PREFIXED.has(type));
   return isPrefixed ? Buffer.concat([Buffer.from(`${topic} `, "utf8"), body]) : body;
 }
 
-/** Return the payload in a frame of either generation; undefined if it is of another topic. @throws {WireError} */
+/** Return the payload of a frame of either generation; undefined if it is of another topic. @throws {WireError} */
 export function fromFrame(topic: string, type: string, codec: string, frame: Buffer): Buffer | undefined {
   if (NEVER_PREFIXED.has(type) && codec !== "image") return frame;
   const prefix = Buffer.from(`${topic} `, "utf8");
@@ -42,7 +43,7 @@ export function fromFrame(topic: string, type: string, codec: string, frame: Buf
   return Buffer.from(text, "base64");
 }
 
-/** A publisher's XPUB that looks to original programs like their PUB. */
+/** XPUB socket of a publisher that is compatible with the PUB socket of original programs. */
 export class OriginalTransport implements PublisherTransport {
   count = 0;
   bytes = 0;
@@ -119,7 +120,7 @@ export class OriginalTransport implements PublisherTransport {
   }
 }
 
-/** A subscriber's SUB that takes the frames of both generations. */
+/** SUB socket of a subscriber that accepts frames of both generations. */
 export class OriginalReader {
   private readonly socket = new SubSocket(RECEIVE_MARK);
   private readonly codec: Codec;

@@ -9,7 +9,7 @@ import { type Generation, OriginalTransport } from "./original.js";
 import type { PublisherTransport } from "./transports.js";
 import { XpubTransport } from "./xpub_transport.js";
 
-/** Wait for a promise; false when it was rejected or took longer. */
+/** Wait for a promise; resolve to false if it rejects or the timeout expires. */
 function within(timeoutMs: number, awaited: Promise<unknown>): Promise<boolean> {
   return new Promise((resolve) => {
     const timer = setTimeout(() => resolve(false), timeoutMs);
@@ -29,15 +29,15 @@ const VALIDATE_INTERVAL_MS = 1000;
 const WARN_INTERVAL_MS = 10_000;
 const MAX_EARLY_MESSAGES = 50_000;
 
-/** How a topic is published. */
+/** Options of a publisher. */
 export interface PublisherOptions {
-  /** `json` (default), `string`, `bytes`, `msgpack`, `image`, or a name of your own that is carried as JSON. */
+  /** `json` (default), `string`, `bytes`, `msgpack`, `image`, or a name of your own, which is encoded as JSON. */
   readonly type?: string;
   /** Keep the newest message and send it to late subscribers. */
   readonly latched?: boolean;
-  /** Keep so many messages for late subscribers (0 to 1000). */
+  /** Number of messages to keep for late subscribers (0 to 1000). */
   readonly history?: number;
-  /** Whether small messages that wait for the socket may travel together. Default: true. */
+  /** Whether small messages that wait for the socket may be sent as one batch. Default: true. */
   readonly batch?: boolean;
   /** Throw `EncodeError` for a payload that can't be encoded, instead of counting it in `rejected`. */
   readonly strict?: boolean;
@@ -49,23 +49,23 @@ export interface PublisherSpec extends PublisherOptions {
   readonly topic: string;
 }
 
-/** What a publisher needs from its node. */
+/** Interface of the node used by a publisher. */
 export interface PublisherHost {
   readonly hold: () => Hold;
   readonly warn: (message: string) => void;
-  /** Bind and register; the subscribers to wait for. */
+  /** Bind and register; return the subscribers to wait for. */
   register(
     publisher: Publisher,
     transport: PublisherTransport,
   ): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
-  /** The wire of the original NEP, if it is used instead of the native one. */
+  /** Generation of the original NEP's wire, if it replaces the native one. */
   readonly generation?: Generation;
   reportMissing(subscribers: readonly bigint[]): void;
   unregister(publisher: Publisher): void;
 }
 
 /**
- * Publishes messages on one topic; made by `Node.publisher` and `Node.new_pub`.
+ * Publishes messages on one topic; returned by `Node.publisher` and `Node.new_pub`.
  *
  * A payload that can't be encoded is dropped, counted in `rejected` and reported by the node's `warning` event.
  *
@@ -74,15 +74,15 @@ export interface PublisherHost {
  * publisher.publish({ x: 1.5, y: 0 });
  */
 export class Publisher<T = unknown> {
-  /** Resolves when all registered subscribers are connected, after 0.5 s at most; rejects if it can't be registered. */
+  /** Resolves when all registered subscribers are connected, after at most 0.5 s; rejects if registration fails. */
   readonly ready: Promise<this>;
-  /** Payloads that could not be encoded. */
+  /** Number of payloads that could not be encoded. */
   rejected = 0;
-  /** Messages in which NaN or infinity was sent as `null`, because JSON has neither. */
+  /** Number of messages in which NaN or infinity was sent as `null`, because JSON has neither. */
   nanCount = 0;
-  /** Messages dropped before the handshake was over, for lack of room. */
+  /** Number of messages dropped for lack of room before the handshake was complete. */
   dropped = 0;
-  /** Malformed subscriptions. */
+  /** Number of malformed subscriptions. */
   refused = 0;
   private readonly codec: Codec;
   private readonly transport: PublisherTransport;
@@ -122,7 +122,7 @@ export class Publisher<T = unknown> {
     return this.spec.topic;
   }
 
-  /** Type under which the topic is listed. */
+  /** Message type under which the topic is registered. */
   get type(): string {
     return this.spec.type ?? "json";
   }
@@ -132,7 +132,7 @@ export class Publisher<T = unknown> {
     return this.codec.name;
   }
 
-  /** Messages published so far, with or without subscribers. */
+  /** Number of messages published so far, with or without subscribers. */
   get sent(): number {
     return this.transport.count + (this.early?.length ?? 0);
   }
@@ -142,7 +142,7 @@ export class Publisher<T = unknown> {
     return this.transport.subscribers;
   }
 
-  /** Names of nodes that subscribe and have not connected: they are starting up or don't respond. */
+  /** Names of subscribed nodes that are not connected: they are starting up or not responding. */
   get unconnectedSubscribers(): string[] {
     const names = [...this.waitedFor].filter(([id]) => !this.transport.hasGreeted(id)).map(([, name]) => name);
     return [...new Set(names)].sort();
@@ -152,7 +152,7 @@ export class Publisher<T = unknown> {
     return this.closing !== undefined;
   }
 
-  // ---- the handshake
+  // ---- handshake
 
   private async begin(): Promise<this> {
     try {
@@ -199,10 +199,10 @@ export class Publisher<T = unknown> {
   // ---- publishing
 
   /**
-   * Publish a message. Returns at once; before the handshake is over, messages wait for it.
+   * Publish a message. Returns immediately; messages are queued until the handshake is complete.
    *
    * @throws {ClosedError} after `close`.
-   * @throws {EncodeError} with the option `strict`, for a payload that can't be encoded.
+   * @throws {EncodeError} with the option `strict`, if the payload can't be encoded.
    */
   publish(payload: T): void {
     if (this.closing) throw new ClosedError(`The publisher of "${this.topic}" is closed.`);
@@ -217,7 +217,7 @@ export class Publisher<T = unknown> {
     if (this.early) this.keepEarly(encoded);
     else if (isWanted) this.transport.send(encoded);
     else {
-      this.validatedAt = performance.now(); // unsubscribed topics: errors show all the same
+      this.validatedAt = performance.now(); // reports encoding errors without subscribers too
       this.transport.skip();
     }
   }
@@ -258,7 +258,7 @@ export class Publisher<T = unknown> {
     this.host.warn(message);
   }
 
-  // ---- the lease and the end
+  // ---- lease and close
 
   /** @internal */
   counts(): PublisherCount {
@@ -284,9 +284,9 @@ export class Publisher<T = unknown> {
   }
 
   /**
-   * Unregister, deliver what is on its way, and close.
+   * Unregister, deliver pending messages, and close.
    *
-   * @param timeoutS Seconds to wait for subscribers to take everything. Default: 2.
+   * @param timeoutS Seconds to wait until subscribers have received everything. Default: 2.
    */
   close(timeoutS = CLOSE_S): Promise<void> {
     this.closing ??= this.finish(timeoutS);
@@ -311,13 +311,13 @@ export class Publisher<T = unknown> {
     const haveLeft = (): boolean => this.transport.subscribers === 0;
     while (!haveLeft() && performance.now() < deadline) {
       await this.waitUntil(haveLeft, Math.min(BYE_AGAIN_MS, deadline - performance.now()));
-      this.transport.sayBye(); // a full queue drops it like anything else
+      this.transport.sayBye(); // repeated, because a full queue drops it
     }
     if (!haveLeft())
       this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
   }
 
-  /** @internal Wait for the first subscriber; without a master the number to expect is unknown. */
+  /** @internal Wait for the first subscriber; without a master the expected number is unknown. */
   waitForAnybody(timeoutMs: number): Promise<void> {
     return this.waitUntil(() => this.transport.isHeard, timeoutMs);
   }
@@ -327,7 +327,7 @@ export class Publisher<T = unknown> {
     return this.close();
   }
 
-  /** Begin to close at the end of a `using` block. */
+  /** Start to close at the end of a `using` block. */
   [Symbol.dispose](): void {
     void this.close();
   }
