@@ -23,6 +23,7 @@ _SLOT_TYPE_NAMES = {
     "List": lazy("a list"),
     None: lazy("a value"),
 }
+_PEOPLE_KEYWORDS = frozenset({"face", "faces", "person", "people"})
 _LITERAL_FIELDS = {"values_number": "NUMBER", "values_text": "TEXT"}
 _RESOURCE_NAMES = {
     "head": lazy("the head"),
@@ -363,9 +364,7 @@ class ProblemCollector:
 
     def _wait_forever_message(self, placed_block: PlacedBlock, block: Block) -> str:
         name = self.label(placed_block, block)
-        condition = placed_block.inputs["CONDITION"][0]
-        text = block_text(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
-        if any(keyword in text for keyword in ("face", "person", "people")):
+        if _depends_on_people(placed_block.inputs["CONDITION"][0]):
             return _("{block} waits forever if no one appears.").format(block=name)
         return _("{block} waits forever if that never happens.").format(block=name)
 
@@ -413,6 +412,13 @@ class ProblemCollector:
 def _is_literal(placed_block: PlacedBlock, name: str) -> bool:
     inner = placed_block.inputs.get(name, ())
     return bool(inner) and inner[0].type == "values_boolean"
+
+
+def _depends_on_people(condition: PlacedBlock) -> bool:
+    # Uses the types of the blocks, because their texts are translated.
+    return not _PEOPLE_KEYWORDS.isdisjoint(condition.type.split("_")) or any(
+        _depends_on_people(inner) for chain in condition.inputs.values() for inner in chain
+    )
 
 
 def _variable_id(argument: Argument, placed_block: PlacedBlock) -> str:

@@ -71,9 +71,11 @@ KINDS = (
     NetworkKind(
         "ros",
         "ROS 1",
-        lazy("Address of the master"),
+        lazy("Address of the ROS master"),
         "127.0.0.1:11311",
-        lazy("A master on another computer. This computer then accepts connections from that network, too."),
+        lazy(
+            "A ROS master on another computer. This computer then accepts connections from that network, too."
+        ),
         reports_stats=False,
         codec_of=lambda info: info.codec,
         readable_type_of=_ros_readable_type,

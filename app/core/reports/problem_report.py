@@ -113,7 +113,8 @@ def describe_contents(parts: ReportParts) -> list[str]:
 
 def work_text(names: Sequence[str]) -> str:
     """Return the line about the included behaviours."""
-    return _("Open behaviours: {names}").format(names=format_list([f"“{name}”" for name in names]))
+    quoted = [_("“{name}”").format(name=name) for name in names]
+    return _("Open behaviours: {names}").format(names=format_list(quoted))
 
 
 def create_report(parts: ReportParts, happened: str, documents: Sequence[ReportedWork] = ()) -> bytes:

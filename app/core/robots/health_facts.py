@@ -13,7 +13,7 @@ from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Sensor
 from app.robots.description.json_access import finite_float
-from nep.i18n import _, lazy, ngettext, number
+from nep.i18n import _, lazy, ngettext, number, plazy
 
 SILENCE_TIMEOUT_S = 3.0
 MAX_MISSED_MESSAGES = 5
@@ -23,7 +23,7 @@ WARM_MOTOR_C = 60
 """Temperature in °C above which the motors of small robots begin to lose torque."""
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
-STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
+STOP, CAMERA, SENSORS = plazy("row of a table", "Stop"), lazy("Camera"), lazy("Sensors")
 REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
 LEFT_ALONE, SIGN_OF_LIFE = lazy("Safety stop"), lazy("Last response")
 REPORTED_TITLES = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
@@ -178,9 +178,9 @@ def _camera(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[H
     if link.silence_reason is not None and topic is not None and topic.silent_s is not None:
         yield HealthItem(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
     elif topic is not None and topic.rate_hz:
-        yield HealthItem(
-            CAMERA, "ok", _("sends {rate} images per second").format(rate=f"{topic.rate_hz:.0f}")
-        )
+        rate = round(topic.rate_hz)
+        template = ngettext("sends {rate} image per second", "sends {rate} images per second", rate)
+        yield HealthItem(CAMERA, "ok", template.format(rate=rate))
     elif topic is not None and topic.gone_s is None and topic.subscribed_since is None:
         yield HealthItem(CAMERA, "off", _("ready (not in use)"))
     else:

@@ -232,6 +232,22 @@ def test_tool_bar_hides_tools_instead_of_shortening_texts(qtbot, whole: MainWind
                 assert button.width() >= button.sizeHint().width() - 1, (view.state, button.text())
 
 
+def test_tools_hidden_for_lack_of_room_reappear_after_the_run(qtbot, whole: MainWindow) -> None:
+    whole.resize(2400, 800)
+    whole.commands.run("layout.developer")
+    bar, keep = whole.tool_bar, whole.tools.keep
+    settle(qtbot)
+    assert keep.isVisible()
+    bar.words.setMinimumWidth(bar.width() - keep.width())  # the text of a run state without room for `keep`
+    bar.words.show()
+    settle(qtbot)
+    assert not keep.isVisible()
+    bar.words.setMinimumWidth(0)
+    whole.tools.refresh()
+    settle(qtbot)
+    assert keep.isVisible()
+
+
 def test_all_menus_are_translated(qtbot, whole: MainWindow) -> None:
     found: list[str] = []
     for layout in ("start", "behaviour", "developer"):

@@ -190,7 +190,7 @@ def columns(
     return (
         Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
                stretch=True, tip=lambda facts: str(facts.path)),
-        Column("when", lazy("Recorded"), 132, date_cell,
+        Column("when", lazy("Recorded"), 148, date_cell,
                key=lambda facts: facts.start_ns or facts.changed_s * 1e9, hide_order=1),
         Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, is_numeric=True),
         Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),

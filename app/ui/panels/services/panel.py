@@ -98,7 +98,7 @@ class ServicesPanel(PanelWidget):
         self.answer = ReplyView(self.theme, self.context.show_toast)
         columns: tuple[Column[CallRecord], ...] = (
             Column(
-                "at", lazy("Calls"), 88, lambda each: Cell(clock_text(each), role="textSecondary", mono=True)
+                "at", lazy("Time"), 88, lambda each: Cell(clock_text(each), role="textSecondary", mono=True)
             ),
             Column(
                 "request",

@@ -159,7 +159,7 @@ class ReplyView(QWidget):
         ended, controls = QHBoxLayout(), QHBoxLayout()
         for row in (ended, controls):
             row.setSpacing(8)
-        ended.addWidget(label(_("Answer"), "title"))
+        ended.addWidget(label(_("Reply"), "title"))
         ended.addWidget(self.chip)
         ended.addWidget(self.facts, 1)
         controls.addStretch(1)

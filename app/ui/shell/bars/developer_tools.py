@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QSize
 from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QWidget
 
 from app.core.recording.recordings import SessionRecordings
 from app.core.recording.replay.scale import duration_text
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
-from app.ui.shell.bars.run_bar import ToolBar
+from app.ui.shell.bars.run_bar import GAP, ToolBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.freeze import all_frozen, freeze_buttons
 from app.ui.shell.commands.shell import Shell
@@ -22,6 +23,7 @@ from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
 REFRESH_HALF_TICKS = 8  # refresh interval in half ticks
+RESTING_STATES = frozenset({"ready", "proven", "unanswered"})  # run states in which tools may reappear
 RECORD_BUTTON_WIDTH_PX = (
     146  # fixed width of the record button, so that nothing moves when a recording starts
 )
@@ -133,8 +135,9 @@ class DeveloperTools(QObject):
     def __init__(self, shell: Shell, bar: ToolBar, commands: Commands, session: Session) -> None:
         super().__init__(bar)
         self._shell, self._bar, self._actions = shell, bar, commands.actions
-        self._recordings = session.recordings
+        self._recordings, self._runs = session.recordings, session.runs
         self._ticks = 0
+        self._crowded_out: list[QWidget] = []  # tools hidden for lack of room, the most important one last
         theme, menus = shell.theme, commands.menus
         self.record = RecordButton(theme)
         self.keep = Button(theme, "", "history", size="small")
@@ -177,6 +180,8 @@ class DeveloperTools(QObject):
         name = custom_name or _("Developer")
         self.layout.set_label(name)
         self.layout.setAccessibleName(_("Layout {name}").format(name=name))
+        if self._runs.view().state in RESTING_STATES:
+            self._show_tools_with_room()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
@@ -189,6 +194,7 @@ class DeveloperTools(QObject):
         # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
         # them are also in menus.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
+        self._crowded_out.clear()
         paint.show_when(self.keep, width >= scaled(MIN_WIDTH_WITH_KEEP_PX) and not recording)
         paint.show_when(self.source, recording or width >= scaled(MIN_WIDTH_WITH_SOURCE_PX))
         paint.show_when(self.source.back, recording)
@@ -203,12 +209,22 @@ class DeveloperTools(QObject):
 
     def _hide_crowded(self) -> None:
         # Hides further tools if the run state, or the texts of the language, need more room. They stay hidden
-        # until the bar is resized, so that the other tools don't move with every change of the run state.
+        # during the run, so that the other tools don't move with every change of the run state.
         source = () if self.source.is_recording else (self.source,)
         for tool in (self.keep, *source, *self._wide_only, self.freeze, self.record):
             if self._bar.needed_width() <= self._bar.width():
                 break
-            tool.hide()
+            if not tool.isHidden():
+                tool.hide()
+                self._crowded_out.append(tool)
+
+    def _show_tools_with_room(self) -> None:
+        while self._crowded_out:
+            tool = self._crowded_out[-1]
+            if self._bar.needed_width() + tool.sizeHint().width() + GAP > self._bar.width():
+                break
+            tool.show()
+            del self._crowded_out[-1]
 
     def on_half_tick(self) -> None:
         """Refresh the tools at regular intervals while the bar is visible; called on every half tick."""

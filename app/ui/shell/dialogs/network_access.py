@@ -104,7 +104,8 @@ class NetworkAccessSheet(Overlay):
             paint.show_when(widget, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_local)
-        self.no.set_label(_("Cancel"))
+        is_notice = self.yes.isHidden() and self.end.isHidden()
+        self.no.set_label(_("Close") if is_notice else _("Cancel"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:

@@ -42,7 +42,7 @@ from app.ui.widgets.menus import ContextMenuFilter
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.errors import BadTopicError
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
     from app.core.session import Session
@@ -164,7 +164,7 @@ class RecordSheet(Overlay):
             wrap=True,
         )  # fmt: skip
 
-        self.ends_min = NumberEdit(theme, MIN_MINUTES, MAX_MINUTES, _("min"), 1, empty=True)
+        self.ends_min = NumberEdit(theme, MIN_MINUTES, MAX_MINUTES, pgettext("minutes", "min"), 1, empty=True)
         self.ends_min.setAccessibleName(_("Stop after (minutes)"))
         self.ends_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
         self.ends_gb.setAccessibleName(_("Stop at (GB)"))
@@ -363,7 +363,7 @@ class RecordSheet(Overlay):
             Column("bandwidth", lazy("Bandwidth"), 88,
                    lambda topic: Cell(bandwidth_text(topic.bandwidth_Bps), role=text_role(topic)),
                    key=lambda topic: topic.bandwidth_Bps, is_numeric=True, hide_order=2),
-            Column("size", lazy("Elapsed"), 84, size_cell, is_numeric=True, hide_order=1),
+            Column("size", lazy("Size"), 84, size_cell, is_numeric=True, hide_order=1),
             Column("lost", lazy("Lost in transit"), 112, lost_cell, is_numeric=True),
         )  # fmt: skip
 
