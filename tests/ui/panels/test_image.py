@@ -486,9 +486,9 @@ def test_whole_image_is_copied_and_encoded_in_another_thread(qtbot, qapp, monkey
     threads: list[int] = []
     whole = SnapshotJob._run
 
-    def watched(self: SnapshotJob, work: object) -> None:
+    def watched(self: SnapshotJob, *args: object) -> None:
         threads.append(threading.get_ident())
-        whole(self, work)  # type: ignore[arg-type]
+        whole(self, *args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(SnapshotJob, "_run", watched)
     window = Window(Session.full())
@@ -547,6 +547,9 @@ def test_snapshot_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qap
     qapp.processEvents()
     assert len(told) == 2
     assert len(list((tmp_path / "kept").iterdir())) == 2
+    assert not job.is_busy
+    job.save(message)  # such as after another topic was shown during the save
+    qtbot.waitUntil(lambda: len(told) == 3)
 
 
 def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:

@@ -66,20 +66,22 @@ class SnapshotJob(QObject):
         self._start(lambda: QImage.fromData(encode_png(message)))
 
     def wait(self) -> None:
-        """Wait up to 2 s for the thread and discard its result; called on close."""
+        """Wait up to 2 s for the thread and discard its result; the next job can start then."""
         self._timer.stop()
-        if self._thread is not None:
-            self._thread.join(2.0)
+        thread, self._thread = self._thread, None
+        self._results = queue.SimpleQueue()  # the thread may outlive the wait and report to the old queue
+        if thread is not None:
+            thread.join(2.0)
 
     def _start(self, job: Callable[[], JobResult]) -> None:
         if not self.is_busy:
             self._thread = threading.Thread(
-                target=self._run, args=(job,), name="studio-snapshot", daemon=True
+                target=self._run, args=(job, self._results), name="studio-snapshot", daemon=True
             )
             self._thread.start()
             self._timer.start()
 
-    def _run(self, job: Callable[[], JobResult]) -> None:
+    def _run(self, job: Callable[[], JobResult], results: queue.SimpleQueue[JobResult]) -> None:
         # Runs in the background thread. Exceptions are returned as a sentence.
         try:
             result: JobResult = job()
@@ -90,7 +92,7 @@ class SnapshotJob(QObject):
             result = f"{file_name}: {(error.strerror or str(error)).lower()}"
         except Exception as error:  # noqa: BLE001  otherwise the job would stay busy forever
             result = f"{type(error).__name__}: {error}"
-        self._results.put(result)
+        results.put(result)
 
     def _report(self) -> None:
         try:
