@@ -84,6 +84,20 @@ def test_f12_in_a_field_of_the_developer_layout_stops(turning: Studio) -> None:
     stands_still(turning)
 
 
+def test_f12_during_the_drag_of_a_field_stops(turning: Studio) -> None:
+    turning.click("Developer")
+    turning.click("Filter topics")
+    turning.screen.type("pose")
+    turning.screen.click(*middle(turning.row("Topics", "/Pepper/pose")["rect"]))
+    x, y = middle(turning.row("Newest message", "theta")["rect"])
+    turning.screen.move(x, y)
+    turning.screen.press()
+    turning.screen.glide(x + 200, y + 100)
+    turning.screen.key("F12")
+    stands_still(turning)
+    turning.screen.release()
+
+
 @pytest.mark.timeout(300)  # three runs
 def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: Studio) -> None:
     """Stop works at once, and the drag or the menu is not cancelled by it."""

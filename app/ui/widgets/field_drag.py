@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QMimeData, QObject, QPoint, Qt, QTimer
-from PySide6.QtGui import QDrag, QKeyEvent, QKeySequence, QPixmap
+from PySide6.QtCore import QEvent, QMimeData, QObject, QPoint, QPointF, Qt
+from PySide6.QtGui import (
+    QCursor,
+    QDragEnterEvent,
+    QDragLeaveEvent,
+    QDragMoveEvent,
+    QDropEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QMouseEvent,
+)
 from PySide6.QtWidgets import QApplication, QWidget
+from shiboken6 import isValid
 
 from app.ui.widgets.labels import label
 
 MIME_TYPE = "application/x-nep-field"
-MODIFIER_KEYS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
-"""Modifier keys, which are ignored during a drag because Qt uses them for the drop action."""
+_LABEL_OFFSET = QPoint(14, 10)
+"""Distance of the label from the mouse pointer in px; the label must not be under the pointer."""
 
 
 def field_mime_data(topic: str, path: str) -> QMimeData:
-    """Return the drag data of a message field, which can also be dropped as text.
+    """Return the drag data of a message field.
 
     Args:
         topic: Key of the topic, including its network.
@@ -42,69 +51,119 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
     return None
 
 
-class DragKeyFilter(QObject):
-    """Event filter that makes keyboard shortcuts work during a drag, when Qt grabs all keys.
+class FieldDrag(QObject):
+    """Drag of a message field with the mouse, until the button is released or Esc is pressed.
 
-    A key other than Esc or a modifier cancels the drag and runs its shortcut. This is needed for Stop.
-    """
-
-    def __init__(self, press: Callable[[str], object]) -> None:
-        # `press` runs the shortcut with this name, such as "F12".
-        super().__init__()
-        self._press = press
-
-    def begin(self) -> None:
-        """Install the filter.
-
-        Call this after the start of the drag: the last installed filter is called first, so it precedes
-        Qt's own.
-        """
-        application = QApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
-
-    def end(self) -> None:
-        """Remove the filter."""
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
-
-    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent):
-            return False
-        if event.key() in {Qt.Key.Key_Escape, *MODIFIER_KEYS}:
-            return False
-        name = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
-        QDrag.cancel()
-        QTimer.singleShot(0, lambda: self._press(name))  # after the end of the drag
-        return True
-
-
-def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str], object]) -> None:
-    """Drag a message field; returns after the drop.
+    Doesn't use `QDrag`, because Qt grabs all keys during a `QDrag`: F12 would not stop the robots. Widgets
+    that accept drops receive the same events as with `QDrag`. Fields can't be dropped on other programs.
 
     Args:
-        source: Widget in which the drag starts.
+        source: Widget in which the mouse button is pressed; it receives the mouse until the button is
+            released.
         topic: Key of the topic.
         path: Field path.
-        press: Runs a shortcut that is pressed during the drag, such as "F12".
     """
-    keys = DragKeyFilter(press)
-    QTimer.singleShot(0, keys.begin)  # runs in the event loop of the drag, after Qt has installed its filter
-    drag = QDrag(source)
-    data = field_mime_data(topic, path)
-    drag.setMimeData(data)
-    drag.setPixmap(_drag_pixmap(data.text()))
-    drag.setHotSpot(QPoint(-12, -4))
-    try:
-        drag.exec(Qt.DropAction.CopyAction)
-    finally:
-        keys.end()
+
+    def __init__(self, source: QWidget, topic: str, path: str) -> None:
+        super().__init__(source)
+        self._data = field_mime_data(topic, path)
+        self._target: QWidget | None = None
+        self._is_accepted = False
+        self._label = _floating_label(self._data.text())
+        self._watched = [source, *filter(None, [QApplication.focusWidget()])]
+        for widget in self._watched:
+            widget.installEventFilter(self)
+        QGuiApplication.setOverrideCursor(Qt.CursorShape.ForbiddenCursor)
+        self._move(QCursor.pos())
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if watched is self._watched[0]:
+            if kind == QEvent.Type.MouseMove and isinstance(event, QMouseEvent):
+                self._move(event.globalPosition().toPoint())
+                return True
+            if kind == QEvent.Type.MouseButtonRelease and isinstance(event, QMouseEvent):
+                self._move(event.globalPosition().toPoint())
+                self._drop(event.globalPosition().toPoint())
+                return True
+            if kind == QEvent.Type.Hide:
+                self.cancel()
+        if kind in {QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress} and isinstance(event, QKeyEvent):
+            if event.key() != Qt.Key.Key_Escape:
+                return False
+            event.accept()
+            if kind == QEvent.Type.KeyPress:
+                self.cancel()
+            return True
+        return False
+
+    def cancel(self) -> None:
+        """End the drag without a drop."""
+        self._leave()
+        self._end()
+
+    def _move(self, position: QPoint) -> None:
+        self._label.move(position + _LABEL_OFFSET)
+        target = _drop_target(position)
+        if target is not self._target:
+            self._leave()
+            self._target = target
+            if target is not None:
+                self._is_accepted = self._send(QDragEnterEvent, target, position)
+        elif target is not None:
+            self._is_accepted = self._send(QDragMoveEvent, target, position)
+        cursor = Qt.CursorShape.DragCopyCursor if self._is_accepted else Qt.CursorShape.ForbiddenCursor
+        QGuiApplication.changeOverrideCursor(cursor)
+
+    def _drop(self, position: QPoint) -> None:
+        target, is_accepted = self._target, self._is_accepted
+        self._end()
+        if target is not None and is_accepted:
+            event = QDropEvent(target.mapFromGlobal(QPointF(position)), *self._event_arguments())
+            QApplication.sendEvent(target, event)
+
+    def _leave(self) -> None:
+        target, self._target, self._is_accepted = self._target, None, False
+        if target is not None and isValid(target):
+            QApplication.sendEvent(target, QDragLeaveEvent())
+
+    def _end(self) -> None:
+        for widget in self._watched:
+            if isValid(widget):
+                widget.removeEventFilter(self)
+        self._target, self._is_accepted = None, False
+        QGuiApplication.restoreOverrideCursor()
+        self._label.close()
+        self.deleteLater()
+
+    def _send(self, kind: type[QDragEnterEvent | QDragMoveEvent], target: QWidget, position: QPoint) -> bool:
+        event = kind(target.mapFromGlobal(position), *self._event_arguments())
+        event.setAccepted(self._is_accepted)  # as in Qt, accepting the enter event suffices
+        QApplication.sendEvent(target, event)
+        return event.isAccepted()
+
+    def _event_arguments(self) -> tuple[Qt.DropAction, QMimeData, Qt.MouseButton, Qt.KeyboardModifier]:
+        plain = Qt.KeyboardModifier.NoModifier
+        return Qt.DropAction.CopyAction, self._data, Qt.MouseButton.LeftButton, plain
 
 
-def _drag_pixmap(text: str) -> QPixmap:
+def _drop_target(position: QPoint) -> QWidget | None:
+    widget = QApplication.widgetAt(position)
+    while widget is not None and not widget.acceptDrops():
+        widget = widget.parentWidget()
+    return widget
+
+
+def _floating_label(text: str) -> QWidget:
     widget = label(text, "code")
     widget.setProperty("raised", "true")
     widget.setContentsMargins(8, 4, 8, 4)
+    widget.setWindowFlags(
+        Qt.WindowType.ToolTip | Qt.WindowType.FramelessWindowHint | Qt.WindowType.WindowTransparentForInput
+    )
+    widget.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
+    widget.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+    widget.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     widget.adjustSize()
-    return widget.grab()
+    widget.show()
+    return widget

@@ -597,7 +597,7 @@ def test_value_is_plotted_by_menu_shortcut_footer_and_drag_and_drop(panel, windo
     dragged: list[tuple[str, str]] = []
     monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
     monkeypatch.setattr(
-        "app.ui.panels.inspector.panel.drag_field", lambda _tree, *field, press: dragged.append(field)
+        "app.ui.panels.inspector.panel.FieldDrag", lambda _viewport, *field: dragged.append(field)
     )
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {**blackboard(), "a b.c": [1, 2]})

@@ -24,7 +24,7 @@ from app.ui.panels.inspector.pace import UpdateLimiter
 from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
 from app.ui.panels.inspector.values import decode_now, payload_or_default
 from app.ui.widgets import Chip, IconButton
-from app.ui.widgets.field_drag import drag_field
+from app.ui.widgets.field_drag import FieldDrag
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, pgettext
 from nep.messages.fields import path_text
@@ -394,7 +394,7 @@ class InspectorPanel(PanelWidget):
     def _start_drag(self, node: TreeNode) -> None:
         path = field_of(node)
         if path:
-            drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
+            FieldDrag(self.tree.viewport(), self._topic, path)
 
     def _full_value(self) -> object:
         # A query or the table may show only parts of the message.
