@@ -66,7 +66,7 @@ def stamp(folder: Path, extra: str) -> str:
 
 
 def is_fresh(folder: Path, extra: str) -> bool:
-    """Return whether the environment is up to date; ``dev`` includes ``studio``."""
+    """Return True if the environment is up to date; one with the extra ``dev`` also serves ``studio``."""
     try:
         written = (folder / ".venv" / "nep-stamp").read_text(encoding="utf-8")
     except OSError:
@@ -242,7 +242,10 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
 
 
 def main(arguments: Sequence[str] | None = None, computer: Computer | None = None) -> int:
-    """Run the command line; return 0, 1 on failure, 2 if something is missing, 130 after Ctrl+C."""
+    """Run the command line and return the exit code: that of the command, or 2 or 130.
+
+    2 means that something is missing on this computer, 130 that the command was stopped by Ctrl+C.
+    """
     args = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

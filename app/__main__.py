@@ -114,7 +114,7 @@ def run_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run Studio and return the exit code: 0 on success, 2 if a required package is missing.
+    """Run Studio and return its exit code; 2 if a required package is missing.
 
     Args:
         arguments: Command-line arguments (default: those of the process).

@@ -192,7 +192,7 @@ class RobotValueError(AppError, ValueError):
     """
 
     def __init__(self, template: str, place: str = "", **holes: object) -> None:
-        # `words` is a `lazy` text; its placeholder `place` and the others are filled here.
+        # `template` is a `lazy` text; its placeholder `place` and the others are filled here.
         self.place = place
         self._template, self._holes = template, holes
         super().__init__(_(template).format(place=place or _("the value"), **holes))

@@ -340,8 +340,8 @@ class _RunEvents:
 def stop_lines(report: StopReport) -> list[str]:
     """Format the result of a stop as lines; empty if there was nothing to stop.
 
-    There is one line if all robots have stopped, otherwise one for each robot. Each program that
-    replied on behalf of a robot adds a line.
+    There is one line if all robots have stopped and no other program replied on their behalf,
+    otherwise one for each robot and each such program.
     """
     strange = [
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(

@@ -21,7 +21,7 @@ SYSTEMS = ("windows", "macos", "linux")
 
 
 class PackageError(Exception):
-    """A package can't be built; the message contains the reason and the solution."""
+    """Raised if a package can't be built; the message contains the reason and the solution."""
 
 
 def this_system() -> str:

@@ -62,7 +62,10 @@ def did_you_mean(word: str, known_names: Sequence[str]) -> str:
 
 
 def nearest(word: str, known_names: Sequence[str]) -> str | None:
-    """Return the known word most similar to `word`, or None if none is similar."""
+    """Return the known word most similar to `word`.
+
+    Returns None if none is similar, or if `word` has more than 200 characters.
+    """
     if len(word) > _MAX_WORD_LENGTH:  # the cost of the comparison grows with the square of the length
         return None
     return next(iter(get_close_matches(word, known_names, n=1)), None)

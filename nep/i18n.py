@@ -143,10 +143,12 @@ def _current_catalogue() -> _Catalogue:
 
 
 def install(requested: str, folder: Path = LOCALE_FOLDER) -> _Catalogue:
-    """Set the language of this process; English if the catalogue is missing or unreadable.
+    """Set the language of this process and return its catalogue.
+
+    The language is English if no catalogue matches, or if the catalogue can't be loaded.
 
     Args:
-        requested: Language code, such as "es" or "es_MX.UTF-8".
+        requested: Language code or locale name, such as "es" or "es_MX.UTF-8".
         folder: Folder of the catalogues.
     """
     global _current  # noqa: PLW0603 - one language per process
@@ -185,7 +187,7 @@ def _supported_system_language() -> str:
 
 
 def editor_translations(folder: Path = LOCALE_FOLDER) -> Mapping[str, str]:
-    """Return the translations for the page of the block editor by English text; empty for English."""
+    """Return the translations for the page of the block editor by English text; empty if there are none."""
     file = folder / language() / "LC_MESSAGES" / EDITOR_CATALOGUE
     if language() == ENGLISH or not file.is_file():
         return {}

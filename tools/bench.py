@@ -1,6 +1,6 @@
 """Run the benchmarks one after the other.
 
-    python tools/bench.py                   all except the slow and special ones in ASKED
+    python tools/bench.py                   all except the slow and special ones in SPECIAL_NAMES
     python tools/bench.py nep_rate -- ARGS  one benchmark; arguments after -- are passed on to it
 
 Exits with 1 if a result is invalid because the computer was busy. See `bench/README.md`.

@@ -56,7 +56,12 @@ class Outcome(NamedTuple):
 
 
 def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, ...]:
-    """Return all checks, cheapest first; `fast` omits pytest."""
+    """Return all checks, cheapest first.
+
+    Args:
+        fast: True to omit test collection and pytest.
+        pytest_arguments: Further arguments of pytest; if there are any, test collection is omitted.
+    """
     python = sys.executable
     lint_imports = str(Path(sysconfig.get_path("scripts")) / "lint-imports")
     all_checks = (

@@ -44,10 +44,7 @@ def graph() -> grimp.ImportGraph:
 
 
 def child_imports(import_graph: grimp.ImportGraph, package: str) -> Imports:
-    """Return the imports between a package's children; imports of a child's subpackages are included.
-
-    The children have no import cycles.
-    """
+    """Return the imports between a package's children; imports of a child's subpackages are included."""
     children = import_graph.find_children(package)
     return {
         child: frozenset(
@@ -60,7 +57,7 @@ def child_imports(import_graph: grimp.ImportGraph, package: str) -> Imports:
 
 
 def transitive_reduction(imports: Imports) -> Imports:
-    """Return the imports without those that are implied by others."""
+    """Return the imports without those that are implied by others; `imports` must not contain cycles."""
 
     def reachable(begin: str, seen: set[str]) -> set[str]:
         for imported in imports[begin] - seen:

@@ -95,10 +95,10 @@ INTERNAL = frozenset({
     "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
     "Subscriber.payloads", "Subscriber.decoded_unshared", "Subscriber.typed", "Subscriber.want_messages",
     "Subscriber.want_payloads",
-    "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
+    "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.claim_tick",
 })  # fmt: skip
 """Public members that are omitted because only nep uses them."""
-INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})
+INTERNAL_EVERYWHERE = frozenset({"args", "forked", "on_node_close"})
 """Names of members that are omitted in all classes."""
 _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
 """Types of default values, keyed by the beginning of the value's source text."""

@@ -28,8 +28,12 @@ class RefusedError(Exception):
 def checked_version(tag: str, version: str = __version__) -> str:
     """Return the version that a tag such as "v1.2.3" names.
 
+    Args:
+        tag: The tag, with or without its "v".
+        version: Version of the project.
+
     Raises:
-        RefusedError: The tag doesn't match the project's version.
+        InvalidReleaseError: The tag doesn't match the version.
     """
     if tag.removeprefix("v") != version:
         raise RefusedError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
@@ -39,8 +43,12 @@ def checked_version(tag: str, version: str = __version__) -> str:
 def section(changelog: str, version: str) -> str:
     """Return the text below the heading of a version.
 
+    Args:
+        changelog: Text of CHANGELOG.md.
+        version: Version without "v".
+
     Raises:
-        RefusedError: The section is missing or empty.
+        InvalidReleaseError: The section is missing or empty.
     """
     parts = re.split(r"^## (.+)$\n?", changelog, flags=re.MULTILINE)
     for heading, text in zip(parts[1::2], parts[2::2], strict=True):

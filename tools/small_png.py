@@ -20,7 +20,10 @@ SAMPLE, ROUNDS = 40_000, 12
 
 
 def shrink(path: Path, max_colours: int = COLOURS) -> int:
-    """Rewrite an image file with at most `max_colours` colours; return the new size in bytes."""
+    """Rewrite an image file with at most `max_colours` colours; return the new size in bytes.
+
+    Raises `OSError` if the file isn't a readable image or can't be written.
+    """
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture")

@@ -120,7 +120,10 @@ def bring_system_packages(computer: Computer) -> None:
 
 
 def bring_test_packages(computer: Computer) -> None:
-    """Install `TEST_PACKAGES` if run as root; otherwise print which tests are skipped and how to install."""
+    """Install missing `TEST_PACKAGES` if run as root.
+
+    Otherwise, and if apt fails, print which tests are skipped, and the command or the reason.
+    """
     if not computer.has_apt:
         return
     names = [name for packages in TEST_PACKAGES.values() for name in packages]

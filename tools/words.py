@@ -268,6 +268,10 @@ def facts(language: str, catalog: Catalog) -> dict[str, object]:
 
     The formats are taken from Unicode's CLDR and stored in languages.json, so that programs don't need
     Babel.
+
+    Args:
+        language: Code of the language, such as "es".
+        catalog: Catalogue of the language.
     """
     locale = Locale.parse(FORMATS.get(language, language))
     entries = [each for each in catalog if each.id]

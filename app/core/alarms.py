@@ -79,7 +79,7 @@ class SessionAlarms:
     """Alarms of a session. Not thread-safe, except `evaluate`; use it from the main thread.
 
     Attributes:
-        keep: Callback that saves the flight recorder. While None, the action fails.
+        save_flight_recorder: Callback that saves the flight recorder. While None, the action fails.
         run_behaviour: Callback that runs a behaviour by name and returns an error message or "". While
             None, the action fails.
         on_event: Callback for each alarm that was raised or cleared, or that is still active.
@@ -145,9 +145,10 @@ class SessionAlarms:
         return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
 
     def create(self, condition: AlarmCondition) -> AlarmRule:
-        """Add and return an alarm that shows a banner while a condition is true.
+        """Return a new alarm that shows a banner while a condition is true, and add it to the list.
 
-        Evaluation starts as soon as all fields of the condition are filled in.
+        Evaluation starts as soon as all fields of the condition are filled in. If the list is full, the
+        alarm is not added and an alert is raised; see `set_rule`.
         """
         rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
         self.set_rule(rule)
@@ -183,7 +184,7 @@ class SessionAlarms:
         return rule
 
     def restore(self) -> None:
-        """Restore the last removed alarm at its position."""
+        """Restore the last removed alarm at its position; if the list is full, an alert is raised instead."""
         if self._removed is not None and self._has_room():
             (rule, index), self._removed = self._removed, None
             rules = [*self.rules]

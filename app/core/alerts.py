@@ -134,13 +134,13 @@ class Alerts:
         return self._alerts.get(id)
 
     def dismiss(self, id: str) -> None:
-        """Hide the banner of an alert until the alert is raised again; the alert remains in `active`."""
+        """Hide the banner of an alert until the alert is resolved; the alert remains in `active`."""
         if id in self._alerts and id not in self._dismissed:
             self._dismissed.add(id)
             self.revision += 1
 
     def is_dismissed(self, id: str) -> bool:
-        """Return True if the user has closed the banner of the alert."""
+        """Return True if the banner of the alert is hidden; see `dismiss`."""
         return id in self._dismissed
 
     def _mark_changed(self) -> None:

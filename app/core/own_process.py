@@ -47,7 +47,10 @@ class OwnProgram:
         self._initial = self._signature()
 
     def executable_state(self) -> ExecutableState:
-        """Return the state of the executable file: "" (unchanged), "replaced" (by an update), or "gone"."""
+        """Return the state of the executable file: "" (unchanged), "replaced" (by an update), or "gone".
+
+        The state is always "" if Studio is not a frozen build.
+        """
         now = self._signature()
         if now == self._initial:
             return ""

@@ -251,7 +251,7 @@ class Session:
         return tuple(name for name in self.launcher.starting_robots if name not in connected)
 
     def start(self) -> None:
-        """Start the threads. If no master replies, start a master."""
+        """Start the threads. If no master replies, start a master, unless ``start_processes`` is False."""
         self.source.start()
         self.networks.start()
         self.alarms.start()

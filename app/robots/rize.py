@@ -107,7 +107,10 @@ def _as_text(value: object) -> str:
 
 
 def from_reply(message: object) -> dict[str, object] | None:
-    """Convert a message of ``action_state`` to a ``robot/answer`` payload; None if it isn't a final reply."""
+    """Convert a message of ``action_state`` to a ``robot/answer`` payload.
+
+    Returns None if the message isn't a final reply, or contains no id.
+    """
     fields = as_object(message)
     state = _STATES.get(bounded_str(fields.get("state")))
     command_id = text(fields.get("id"))

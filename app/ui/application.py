@@ -142,7 +142,10 @@ def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[],
 
 
 def import_web_view(alerts: Alerts) -> None:
-    """Import the block editor; if system libraries are missing, raise an alert that names them."""
+    """Import the block editor; if system libraries are missing, raise an alert that names them.
+
+    Any other `ImportError` is raised.
+    """
     try:
         importlib.import_module(WEB_VIEW_MODULE)
     except ImportError as error:
@@ -248,7 +251,7 @@ def handle_start_request(window: MainWindow, request: StartRequest) -> None:
 def last_layout(window: MainWindow) -> str:
     """Return the name of the layout to show at startup, or "" for the start page.
 
-    This is the last layout, unless it was Behaviour and all behaviours are empty.
+    This is the last layout if it was Developer, or Behaviour with a behaviour that isn't empty.
     """
     last = window.state.layout
     has_content = {
@@ -262,10 +265,11 @@ def offer_first_steps(window: MainWindow, *, has_request: bool) -> None:
     """Offer the first steps if Studio was never started before.
 
     The first start is recorded immediately, so that it is not repeated after a crash. Nothing is
-    offered if there is unsaved work to recover.
+    offered if there is unsaved work to recover or if an open behaviour isn't empty.
 
     Args:
-        has_request: True if the command line names files or the demonstration, which suppresses the offer.
+        has_request: True if the command line names files or the demonstration; nothing is offered
+            then.
     """
     if not window.session.settings.are_new:
         return

@@ -87,7 +87,7 @@ class SelfDrive(QObject):
     """Runner that performs the steps in order and then closes the window.
 
     Attributes:
-        well: True once all steps have succeeded.
+        has_succeeded: True once all steps have succeeded.
         pictures: Paths of the saved screenshots.
     """
 

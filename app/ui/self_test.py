@@ -273,7 +273,10 @@ class SelfTestListener:
             self._test.record_success(_("{count} colours").format(count=colours))
 
     def run_finished(self, succeeded: bool, message: str) -> None:
-        """Record a failure, if there was one, and start the last step, the closing of the window."""
+        """Add the console's warnings and errors to the report, record a failure, and start the last step.
+
+        The last step is the closing of the window.
+        """
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer_info(
             console=[

@@ -171,14 +171,20 @@ class Engine(Protocol):
             text: Text.
             language: Language code, such as "en".
             volume: Volume from 0 to 1.
-            ended: Called once when the text was spoken; not called if this method returns an error.
+            ended: Called once when the text was spoken or speaking has failed; not called if this
+                method returns an error, or after `stop_voice`.
 
         Returns:
-            An error message, or "".
+            An error message, or "" if speaking has started.
         """
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones, given as (frequency in Hz, duration in s); return an error message, or ""."""
+        """Start to play tones; return an error message, or "" if they are played.
+
+        Args:
+            notes: Frequency in Hz (0 for a pause) and duration in s of each tone.
+            volume: Volume from 0 to 1.
+        """
 
     def stop_voice(self) -> None:
         """Stop speaking without calling `ended`."""
@@ -234,7 +240,11 @@ class QtEngine:
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones on the default audio output; return "", or an error message without one."""
+        """Start to play tones on the default audio output; return an error message or "".
+
+        There is an error if the computer has no audio output or the output doesn't support the format.
+        The oldest tones are stopped if `MAX_TONES` are being played.
+        """
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
@@ -345,7 +355,7 @@ class QtSpeaker(QObject):
 
     @property
     def problem(self) -> str:
-        """Error message of the last output, or ""."""
+        """Error message of the last speech or, if it had none, of the last tones; "" if there is none."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
     def is_valid(self, kind: str, generation: int) -> bool:

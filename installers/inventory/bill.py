@@ -75,7 +75,7 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
 
 
 def standard_texts(part: Part) -> Sequence[str]:
-    """Return the names of the `LICENCES` files that a licence expression requires.
+    """Return the names, without suffix, of the files in `LICENCES` that the licence of a part requires.
 
     For alternatives (OR), all available texts are returned.
 

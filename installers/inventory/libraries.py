@@ -207,7 +207,7 @@ def compiled_files(folder: Path) -> Iterator[Path]:
 
 
 def library_of(name: str) -> Library | None:
-    """Return the entry for a library's file name, or None if it is unknown."""
+    """Return the element of `LIBRARIES` for a file name, or None if the library is unknown."""
     return next((library for pattern, library in _PATTERNS if pattern.fullmatch(name)), None)
 
 

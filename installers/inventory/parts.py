@@ -41,7 +41,7 @@ Texts = Sequence[tuple[str, "Path | str"]]
 
 
 class InventoryError(Exception):
-    """Parts without a known licence were found; the message has a line for each."""
+    """Raised if parts without a known licence are found; the message has a line for each."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,13 @@ def _texts(distribution: metadata.Distribution) -> Iterator[tuple[str, Path]]:
 
 
 def others(resources: Path) -> Iterator[Part]:
-    """Yield the parts that aren't Python dependencies: CPython, Qt, npm packages, fonts and icons."""
+    """Yield the parts that aren't Python dependencies.
+
+    These are CPython, Qt, PyInstaller's boot loader, npm packages, fonts and icons.
+
+    Args:
+        resources: Folder of the project's resources.
+    """
     yield Part("cpython", platform.python_version(), "PSF-2.0", _texts_of_python(), "generic")
     qt = metadata.version("PySide6-Essentials")
     qt_texts = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]

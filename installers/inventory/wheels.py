@@ -199,6 +199,9 @@ def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
     Args:
         bill: Content of the bill of materials.
         within: Name of the distribution that contains the crates.
+
+    Raises:
+        InventoryError: A crate has no licence.
     """
     for component in bill.get("components", ()):
         if str(component.get("purl", "")).startswith("pkg:cargo/") and component.get("scope") != "excluded":

@@ -64,7 +64,7 @@ def strip(context: Context) -> None:
     """Remove debug information from Python's own libraries and from the packages in `WITH_DEBUG_INFO`.
 
     Debug information is up to two thirds of their size. Other libraries are stripped already, and
-    stripping again damages some of them.
+    stripping again damages some of them. Has no effect if the program `strip` isn't installed.
     """
     tool = shutil.which("strip")
     internal = context.frozen / "_internal"
@@ -102,7 +102,10 @@ def add_share(context: Context, folder: Path) -> None:
 
 
 def archive(context: Context) -> Path:
-    """Build the .tar.xz. Sorted names and a common time and owner make the archive reproducible."""
+    """Build the .tar.xz and return its path.
+
+    Sorted names and a common time and owner make the archive reproducible.
+    """
     target = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
     top = f"NEP-Studio-{context.version}"
     target.unlink(missing_ok=True)
@@ -117,7 +120,8 @@ def archive(context: Context) -> Path:
 def debian_package(context: Context) -> Path:
     """Build the .deb for Debian and Ubuntu and return its path.
 
-    Raises PackageError if dpkg-deb isn't installed or fails.
+    Raises:
+        PackageError: dpkg-deb isn't installed or has failed.
     """
     if shutil.which("dpkg-deb") is None:
         raise PackageError("dpkg-deb is not on this computer; the .deb is made on Debian and Ubuntu")
@@ -205,7 +209,12 @@ def _architecture(context: Context) -> str:
 
 
 def app_image(context: Context, tool: str) -> Path:
-    """Build the AppImage. `tool` is the path of `appimagetool`."""
+    """Build the AppImage and return its path.
+
+    Args:
+        context: Version and folders.
+        tool: Path of `appimagetool`.
+    """
     folder = context.work / "NEP-Studio.AppDir"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(context.frozen, folder, symlinks=True)

@@ -76,7 +76,7 @@ def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
 
 
 def libc_needed(folder: Path) -> str:
-    """Return the newest glibc version that a binary in a folder requires."""
+    """Return the newest glibc version that a binary in a folder requires, by default "2.28"."""
     versions = {
         (int(major), int(minor))
         for path in _binaries(folder)

@@ -119,7 +119,10 @@ _PAGES = "https://developer.apple.com/documentation/bundleresources/information-
 
 
 def apple_version(version: str) -> str:
-    """Return a version as up to three numbers, as macOS requires: "0.2.0" for "0.2.0rc1"."""
+    """Return a version as up to three numbers, as macOS requires: "0.2.0" for "0.2.0rc1".
+
+    Raises ValueError if the version doesn't start with a number.
+    """
     match = re.match(r"\d+(?:\.\d+){0,2}", version)
     if match is None:
         raise ValueError(f"no version '{version}'")

@@ -28,7 +28,7 @@ def application(context: Context) -> Path:
 
 
 def prepare(context: Context) -> Mapping[str, str]:
-    """Create the files needed for freezing; return the variables for the PyInstaller specification.
+    """Create the files needed for freezing; return environment variables for PyInstaller's specification.
 
     Raises:
         PackageError: A step has failed.

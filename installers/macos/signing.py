@@ -134,7 +134,8 @@ def notarise(context: Context, path: Path, identity: Identity) -> None:
     """Have Apple notarise an application or disk image and staple the ticket to it. Takes minutes.
 
     Raises:
-        PackageError: Notarisation was rejected; the text contains Apple's findings.
+        PackageError: A command has failed, or Apple rejected the file; the text then contains Apple's
+            findings.
     """
     sent = path
     if path.suffix == ".app":

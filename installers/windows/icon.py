@@ -22,6 +22,12 @@ def ico(pictures: dict[int, bytes]) -> bytes:
 
 
 def write_icon(painted: Path, name: str, target: Path) -> Path:
-    """Combine the painted images of a name (`installers.icon_files`) into an .ico file and return it."""
+    """Combine images into an .ico file and return its path.
+
+    Args:
+        painted: Folder of the images in all `SIDES` (`installers.icon_files`).
+        name: Name of the images without the size.
+        target: Path of the .ico file.
+    """
     target.write_bytes(ico({side: (painted / f"{name}-{side}.png").read_bytes() for side in SIDES}))
     return target

@@ -20,7 +20,10 @@ VSVersionInfo(
 
 
 def version_numbers(version: str) -> tuple[int, int, int, int]:
-    """Return a version as the four numbers that Windows requires, such as (1, 2, 3, 0) for "1.2.3rc1"."""
+    """Return a version as the four numbers that Windows requires, such as (1, 2, 3, 0) for "1.2.3rc1".
+
+    Raises ValueError if the version doesn't start with a number.
+    """
     match = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
     if match is None:
         raise ValueError(f"no version: '{version}'")

@@ -332,11 +332,11 @@ class ClientTransport(Protocol):
 
         Raises:
             ClosedError: The client is closed.
-            NepError: Too many calls or bytes are in flight.
+            NepError: The request is too large, or too many calls or bytes are in flight.
         """
 
     def cancel(self, call: OpenCall) -> None:
-        """Cancel a call; `then` isn't called."""
+        """Cancel a call; its callback isn't called."""
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty if the back end can't list services."""
@@ -373,7 +373,7 @@ class SurveyTransport(Protocol):
         """
 
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel several calls; `then` isn't called for them."""
+        """Cancel several calls; their callbacks aren't called."""
 
     def close(self) -> None:
         """Unregister the surveyor; calls in flight fail with `ClosedError`."""
@@ -399,7 +399,7 @@ class ServiceTransport(Protocol):
 
 
 def check_call_limits(service: str, count: int, total_bytes: int, size: int) -> None:
-    """Raise `NepError` if a client has too many calls or bytes in flight for another call.
+    """Raise `NepError` if a call is too large, or if its client has too many calls or bytes in flight.
 
     Args:
         service: Name of the service.

@@ -56,7 +56,7 @@ class CallBody(Protocol):
         """Encode a map. Raises `EncodeError`."""
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """Decode a map. Raises `DecodeError`."""
+        """Decode a body to a map. Raises `DecodeError`."""
 
 
 @dataclass(frozen=True)

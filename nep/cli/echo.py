@@ -157,7 +157,13 @@ def _receive_messages(
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
     """Split the words of a command line into topics and field paths.
 
-    A word is a topic if the graph contains it, if it starts with "/", or if it is a pattern.
+    A word is a topic if the graph contains it, if it starts with "/", or if it is a pattern. A status
+    message is printed for each topic of the graph whose name could also be a field.
+
+    Args:
+        topic: First word, which is always a topic.
+        more: Further words.
+        graph: Graph with the published topics.
     """
     topics, fields = [topic], []
     for argument in more:
@@ -209,10 +215,7 @@ def _receive_all(
             waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:
             names = format_list(
-                [
-                    f"'{subscriber}'"
-                    for subscriber in (*(sub.topic for sub in subscribers), *patterns.patterns)
-                ],
+                [f"'{topic}'" for topic in (*(sub.topic for sub in subscribers), *patterns.patterns)],
                 "or",
             )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
@@ -228,7 +231,14 @@ def _matches(condition: MessageFilter, message: Message) -> bool:
 
 
 def show_record(message: Message, fields: FieldExtractor | None = None) -> None:
-    """Print a message as a line of JSON. Values of `fields`, if given, replace the payload."""
+    """Print a message as a line of JSON.
+
+    An undecodable message is printed as hexadecimal digits with the error, an image as its extension.
+
+    Args:
+        message: Message to print.
+        fields: Fields to print instead of the payload; undecodable messages are then skipped.
+    """
     record: dict[str, object] = {
         "topic": message.topic,
         "msg_type": message.msg_type,
@@ -274,7 +284,7 @@ class MessagePrinter:
         self._is_untruncated = in_full or self._paint is None
 
     def __call__(self, message: Message) -> None:
-        """Print one message."""
+        """Print one message. If fields were chosen, an undecodable message is skipped."""
         header = _format_head(message)
         if self._names_topic:
             header += f"  {escaped(message.topic)}"

@@ -46,8 +46,8 @@ def open_command_node(command: str, master: str | None, backend: str | None = No
 def open_node(name: str, master: str | None, backend: str | None = None) -> Node:
     """Open a node whose name ends with the process id.
 
-    NEP_MASTER is used for the default back end only. Raises `UnknownBackendError` or
-    `BackendUnavailableError`.
+    NEP_MASTER is used for the default back end only. Raises `UnknownBackendError` if `backend` doesn't
+    exist, and `BackendUnavailableError` if a package that it needs is not installed.
     """
     name = f"{name}-{os.getpid()}"
     if backend is None:
@@ -59,7 +59,7 @@ def open_node(name: str, master: str | None, backend: str | None = None) -> Node
 def query_graph(master: str | None, backend: str | None = None) -> GraphView:
     """Return the graph without the querying node.
 
-    Raises `MasterUnreachable`, and the exceptions of `open_node`.
+    Raises `MasterUnreachable` if no master replies, and the exceptions of `open_node`.
     """
     if backend is None:
         return view(master)

@@ -108,7 +108,7 @@ def info(
         return
     for number, node_info in enumerate(matching_nodes):
         write(("\n" if number else "") + _description(graph, node_info))
-    show_alerts(node_info for node_info in graph.alerts if node_info.id.partition(":")[2] == node)
+    show_alerts(alert for alert in graph.alerts if alert.id.partition(":")[2] == node)
 
 
 def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:

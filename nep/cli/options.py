@@ -35,7 +35,10 @@ JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
 def check_duration(duration_s: float | None) -> float | None:
-    """Validate a duration in seconds, which must not be negative; raise `typer.BadParameter` otherwise."""
+    """Return a duration in seconds unchanged; raise `typer.BadParameter` if it is negative or NaN.
+
+    None is valid, too: the option was not given.
+    """
     if duration_s is not None and not duration_s >= 0.0:  # rejects NaN, too
         raise typer.BadParameter(
             _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(

@@ -130,7 +130,7 @@ def _named_topics(recording: reader.Recording, patterns: Sequence[str], *, publi
 
 
 class _MotionPermissions:
-    """Topics that are blocked because their messages would move robots without permission."""
+    """Permissions of replayed topics. Topics that would move robots without permission are blocked."""
 
     def __init__(
         self,

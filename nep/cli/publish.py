@@ -217,7 +217,15 @@ def _encode_argument(text: str) -> bytes:
 
 
 def read_file(file: Path, msg_type: str) -> bytes:
-    """Read a file of at most `_MAX_FILE_BYTES`. Raises `EncodeError` if the file is larger or unreadable."""
+    """Read a file of at most `_MAX_FILE_BYTES`.
+
+    Args:
+        file: Path of the file.
+        msg_type: Message type, for error messages.
+
+    Raises:
+        EncodeError: The file is larger, or can't be read.
+    """
     shown_path = escaped(str(file))
     try:
         with file.open("rb") as opened:  # bounded: it may be a pipe or an endless device
@@ -304,7 +312,7 @@ def repeat(
 
 
 def wait_for_subscribers(publisher: Publisher, count: int) -> None:
-    """Block until `count` subscribers are connected."""
+    """Block until `count` subscribers are connected; print a status message first if any are missing."""
     if publisher.subscribers >= count:
         return
     template = ngettext(

@@ -79,7 +79,10 @@ class RateWindow:
             self._messages.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
 
     def frequency(self, now: float) -> Frequency | None:
-        """Return the rate at the time `now`, or None if the window has fewer than two messages."""
+        """Return the rate at the time `now`.
+
+        Returns None if the window has fewer than two messages, or if all have the same time stamp.
+        """
         moments = sorted(stamp for _, stamp, _ in self._recent_messages(now))
         if len(moments) < 2 or moments[-1] <= moments[0]:
             return None
@@ -89,7 +92,10 @@ class RateWindow:
         return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
 
     def bandwidth(self, now: float) -> Bandwidth | None:
-        """Return the bandwidth at the time `now`, or None if the window has fewer than two messages."""
+        """Return the bandwidth at the time `now`.
+
+        Returns None if the window has fewer than two messages, or if all arrived at the same time.
+        """
         recent = self._recent_messages(now)
         if len(recent) < 2:
             return None

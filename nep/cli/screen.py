@@ -34,7 +34,14 @@ UNKNOWN = "\N{EN DASH}"
 
 @dataclass(frozen=True)
 class TextColumn:
-    """Column of a table: heading, alignment and style."""
+    """Column of a table.
+
+    Attributes:
+        heading: Heading, which is translated when the table is printed.
+        justify: Alignment of the cells.
+        style: Style of the cells, as for rich.
+        is_folded_last: True to narrow other columns first if the table is too wide.
+    """
 
     heading: str
     justify: Literal["left", "right"] = "left"
@@ -68,7 +75,7 @@ def _console_class() -> type[Console]:
 
 
 def json_highlighter() -> Callable[[str, str], Text]:
-    """Return a function (head, body) that formats a message with a dimmed head and a coloured JSON body."""
+    """Return a function (header, body) that formats a message: header dimmed, JSON body coloured."""
     from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
     from rich.text import Text  # noqa: PLC0415
 
@@ -83,7 +90,10 @@ def json_highlighter() -> Callable[[str, str], Text]:
 
 
 def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table to stdout; long cells are wrapped to fit the width of the terminal."""
+    """Print a table to stdout; long cells are wrapped to fit the width of the terminal.
+
+    If the terminal is too narrow for the columns, each row is printed as a block of lines.
+    """
     columns = [replace(column, heading=_(column.heading)) for column in columns]
     is_terminal = sys.stdout.isatty()  # files and pipes have no width
     room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH

@@ -93,7 +93,7 @@ class CsvMessageWriter:
         self._out.flush()
 
     def __call__(self, message: Message) -> None:
-        """Write one row for a message."""
+        """Write one row for a message; skip an undecodable message."""
         values = self._fields.extract(message)
         if values is not None:
             topic = [message.topic] if self._names_topic else []

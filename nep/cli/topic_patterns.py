@@ -31,7 +31,7 @@ class TopicPatterns:
     """Tracker of published topics that match patterns. Queries the graph once a second."""
 
     def __init__(self, node: Node, patterns: Sequence[str], subscribed: Collection[str]) -> None:
-        # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
+        # `subscribed`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
         self.patterns = tuple(map(check_topic, patterns))
         self._node = node
         self._known_topics = set(subscribed)

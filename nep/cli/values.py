@@ -27,9 +27,10 @@ _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 
 
 def encode_json(value: object, *, indent: bool = False) -> bytes:
-    r"""Encode any value as JSON: NaN and infinity become `null`, bytes become hexadecimal digits.
+    """Encode any value as JSON; NaN and infinity become `null`, bytes become hexadecimal digits.
 
-    Control characters of terminals are escaped, such as U+009B as ``\u009b``, which is equivalent JSON.
+    Other objects that JSON lacks become their `str`. Control characters of terminals are escaped, which
+    is equivalent JSON.
     """
     option = orjson.OPT_NON_STR_KEYS | numpy_option() | (orjson.OPT_INDENT_2 if indent else 0)
     try:

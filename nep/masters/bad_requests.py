@@ -79,9 +79,10 @@ class BadRequestCounter:
             self._senders.popitem(last=False)
 
     def alerts(self, now: float) -> tuple[Alert, ...]:
-        """Return one alert for each of the most recent senders, and one for all others.
+        """Return alerts about requests of the last 10 seconds.
 
-        The result is updated once per second.
+        There is one alert for each of the most recent senders, and one for all others. The result is
+        updated once per second.
         """
         if (self._senders or self._alerts) and now >= self._alerts_at + _ALERT_INTERVAL_S:
             self._alerts_at = now

@@ -51,7 +51,11 @@ class Clocks:
             member.clock = None
 
     def differences(self, member: RegisteredNode, now: float) -> ClockDifferences:
-        """Return the known clock differences to remote nodes whose publishers the node receives."""
+        """Return the known clock differences to remote nodes that the node receives from, by node id.
+
+        Each value is (offset, uncertainty) in nanoseconds: the clock of the node is the other node's
+        clock plus the offset. The result is empty if the node's own clock is unknown.
+        """
         own_clock = member.clock
         if own_clock is None:
             return {}

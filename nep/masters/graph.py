@@ -2,7 +2,7 @@
 
     apply(request, call, now, sender) -> messages to send, in this order (pushes first, then the reply)
     tick(now)                         -> messages to send after expired leases and the end of learning
-    drop(node ids)                    -> messages to send because connections of nodes are lost
+    unregister_nodes(node_ids)        -> messages to send because nodes are dead or don't respond
     view()                            -> GraphView
 
 A master that has just started is *learning*: for `learn_s` seconds, nodes of a previous master rejoin,
@@ -77,7 +77,7 @@ class OutgoingMessage(NamedTuple):
     Attributes:
         to: Id of the node for a push; connection of the request for a reply.
         body: Content of the message.
-        call: Number of the request, or None for a push.
+        call: Id of the request, or None for a push.
     """
 
     to: str
@@ -86,9 +86,9 @@ class OutgoingMessage(NamedTuple):
 
 
 def without_nodes(reply: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
-    """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead.
+    """Return a copy of `reply` without the given nodes, which have turned out to be dead.
 
-    Answers other than `FoundReply` and `AddedReply` are returned unchanged.
+    Pushes, and replies other than `FoundReply` and `AddedReply`, are returned unchanged.
     """
     if isinstance(reply, FoundReply) and node_ids:
         return replace(
@@ -104,9 +104,10 @@ def without_nodes(reply: Reply | Push, node_ids: frozenset[str]) -> Reply | Push
 
 
 def with_hosts(reply: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
-    """Return a copy of an answer that contains the addresses at which the master serves other computers.
+    """Return a copy of `reply` with the addresses at which the master serves other computers.
 
-    Answers without a field for them are returned unchanged, and all answers if `hosts` is empty.
+    Pushes, and replies without a field for the addresses, are returned unchanged; so is every message
+    if `hosts` is empty.
     """
     if not hosts:
         return reply

@@ -20,7 +20,14 @@ _logger = logging.getLogger("nep.master")
 def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[str, ...]:
     """Validate addresses and return them without duplicates.
 
-    Raises `NepError` for an address that doesn't belong to this computer (`own_addresses`).
+    `ANY_HOST` and loopback addresses are always valid.
+
+    Args:
+        hosts: Addresses to validate.
+        addresses: Addresses of this computer, as returned by `own_addresses`.
+
+    Raises:
+        NepError: An address isn't an IPv4 address, or doesn't belong to this computer.
     """
     own_hosts = {own_address.host for own_address in addresses}
     checked = tuple(dict.fromkeys(hosts))
@@ -73,10 +80,10 @@ class ListenAddresses:
         return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
 
     def serve(self, hosts: Iterable[str]) -> None:
-        """Bind to exactly these addresses; release all others.
+        """Bind to exactly these addresses and release all others; `ANY_HOST` means all addresses.
 
-        Raises `NepError` for an address that doesn't belong to this computer, and `AddressInUseError`
-        for a port in use. If it raises, the bindings are unchanged.
+        Raises `NepError` for an address that isn't an IPv4 address of this computer, and
+        `AddressInUseError` for a port in use. If it raises, the bindings are unchanged.
         """
         addresses = self._list_addresses()
         checked_hosts = check_hosts(hosts, addresses)

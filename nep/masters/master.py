@@ -155,11 +155,12 @@ class Master:
         return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:
-        """Serve other computers at these addresses of this computer; without any, serve only this computer.
+        """Serve other computers at these addresses of this computer; if empty, serve only this computer.
 
         Raises:
             RequestRefusedError: An address can't be bound.
             ClosedError: The master has stopped.
+            WaitTimeoutError: The master did not reply in time.
         """
         reply = self.submit(Listen(tuple(hosts)))
         if isinstance(reply, RejectedReply):

@@ -78,7 +78,7 @@ class PatternIndex(Generic[T]):
             self._topics[pattern].discard(topic)
 
     def topics_of(self, pattern: str) -> set[str]:
-        """Return the published topics that match a pattern."""
+        """Return the published topics that match a pattern; empty if the pattern has no subscriber."""
         return self._topics.get(pattern, set())
 
     def subscribers_of(self, topic: str) -> list[tuple[T, int]]:

@@ -130,8 +130,8 @@ class MasterRouter:
     def send(self, to: bytes, body: bytes) -> bool:
         """Send a body; return False if the receiver has no connection.
 
-        A large body is dropped while the receiver has more than `MAX_UNREAD_BYTES` of unread large
-        bodies.
+        A body is dropped, with the result True, if the receiver's queue is full. A large body is also
+        dropped while the receiver has more than `MAX_UNREAD_BYTES` of unread large bodies.
         """
         try:
             if len(body) < _LARGE_BODY_BYTES:

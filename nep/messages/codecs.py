@@ -309,7 +309,7 @@ def fast_encoder(codec: Codec) -> Callable[[Any], bytes] | None:
 
 
 def codec_for(msg_type: str) -> Codec:
-    """Return the codec of a message type: the codec with the same name, or json."""
+    """Return the codec of a message type: the codec with this name or alias, else json."""
     return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)
 
 
@@ -340,7 +340,7 @@ class JsonEncoder:
         self._warned_at = -math.inf
 
     def encode(self, payload: object) -> Encoded:
-        """Encode a payload as JSON. Raises `EncodeError`.
+        """Encode a payload as JSON. Raises `EncodeError` if JSON can't represent it.
 
         NaN and infinity are replaced by `null`; such messages are counted and logged.
         """
@@ -397,7 +397,7 @@ def find_nan(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | No
     elif isinstance(value, Sequence):
         parts = ((f"{path}[{number}]", part) for number, part in enumerate(value))
     elif is_dataclass(value) and not isinstance(value, type):
-        names = (part.name for part in fields(value))
+        names = (data_field.name for data_field in fields(value))
         parts = ((f"{path}.{name}" if path else name, getattr(value, name, None)) for name in names)
     else:
         to_list = getattr(value, "tolist", None)  # numpy

@@ -79,9 +79,9 @@ def _format_step(step: str | int) -> str:
 
 
 def leaf_paths(payload: object, max_count: int = 200) -> Iterator[str]:
-    """Yield the paths of at most `max_count` scalar values.
+    """Yield the paths of at most `max_count` scalar values, of each list only those in its first 10 items.
 
-    A value below the depth limit is treated as a scalar.
+    An empty list or map, or a value at the depth limit, counts as a scalar.
     """
     remaining = [max_count]
     yield from _leaf_paths(payload, "", remaining, _MAX_DEPTH)

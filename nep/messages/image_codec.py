@@ -74,7 +74,8 @@ class ImageFormat:
     def encode(self, payload: object) -> Encoded:
         """Encode an image in this format; JPEG and PNG files pass unchanged.
 
-        Raises `EncodeError` if the payload isn't an image, or if a package for encoding is missing.
+        Raises `EncodeError` if the payload isn't an image that this format supports, or if a package
+        for encoding is missing.
         """
         if isinstance(payload, bytes | bytearray | memoryview):
             return encode(payload)
@@ -284,7 +285,8 @@ def _as_contiguous(payload: object) -> NDArray[Any]:
 def decode(data: memoryview, extension: Mapping[str, object]) -> object:
     """Decode an image to an array (height, width) or (height, width, channels) in BGR order.
 
-    Raises `DecodeError`, before allocating memory, if the limits of `nep.messages.image_files` are exceeded.
+    Raises `DecodeError` if the data is invalid, exceeds a limit of `nep.messages.image_files`, or
+    can't be decoded because a package is missing. The limits are checked before memory is allocated.
     """
     try:
         layout = raw_layout(extension.get("encoding"))
@@ -347,7 +349,10 @@ def raw_layout(encoding: object) -> RawLayout | None:
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
-    """View raw bytes as an array in their original channel order, without a copy. Raises `DecodeError`."""
+    """View raw bytes as an array in their original channel order, without a copy.
+
+    Raises `DecodeError` if `shape` is invalid, doesn't match the size of `data`, or exceeds a limit.
+    """
     np = _numpy()
     numbers = np.dtype(layout.dtype)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
@@ -368,7 +373,10 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
 
 
 def image_info(data: bytes | memoryview) -> dict[str, object] | None:
-    """Return the message extension for a JPEG or PNG file; None if `decode` would reject the file."""
+    """Return the message extension for a JPEG or PNG file.
+
+    None if the file isn't a valid JPEG or PNG, or exceeds a limit. The pixels are not decoded.
+    """
     try:
         return parse_header(data).extension
     except DecodeError:

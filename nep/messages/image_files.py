@@ -102,7 +102,7 @@ def parse_header(data: bytes | memoryview) -> ImageFile:
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
-    """Raise `DecodeError` if an image exceeds the limits of pixels or memory.
+    """Raise `DecodeError` if an image has no pixels, or exceeds the limits of pixels or memory.
 
     Args:
         width: Width in pixels.

@@ -122,7 +122,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
 
 
 def unpack_first(data: bytes) -> object:
-    """Decode the first of several msgpack values. Raises `ValueError` if the first value is incomplete."""
+    """Decode the first of several msgpack values. Raises `ValueError` if it is invalid or incomplete."""
     unpacker = msgpack.Unpacker(raw=False, strict_map_key=False)
     unpacker.feed(data)
     try:

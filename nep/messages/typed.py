@@ -78,8 +78,8 @@ def message_type(declared: type) -> MessageType:
     The name of the message type is the class attribute `MSG_TYPE`, or else the name of the class.
 
     Raises:
-        ValueError: The class is neither a dataclass nor a TypedDict, or JSON can't represent the type
-            of a field.
+        ValueError: The class is neither a dataclass nor a TypedDict, its name of the message type is
+            invalid or that of a built-in type, or JSON can't represent the type of a field.
     """
     is_map = _is_typed_dict(declared)
     if not is_map and not is_dataclass(declared):
@@ -198,7 +198,7 @@ class TypedReader:
 
 
 def _shape(hint: Any, location: str, known_shapes: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
-    # `where` names the field for errors. Raises `ValueError`.
+    # `location` names the field for errors. Raises `ValueError`.
     hint = _unwrap(hint)
     try:
         hash(hint)

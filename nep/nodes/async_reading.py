@@ -27,7 +27,9 @@ class AsyncReader:
     """Reader of one subscriber's messages in an asyncio event loop.
 
     Args:
-        poll: Returns the next message without waiting, or None.
+        transport: Transport of the subscriber.
+        poll: Returns the next message without waiting, or None. Raises `ClosedError` if the subscriber
+            is closed.
     """
 
     def __init__(self, transport: SubscriberTransport, poll: Callable[[], Message | None]) -> None:
@@ -36,7 +38,11 @@ class AsyncReader:
         self._reads_in_turn = 0
 
     async def receive(self, timeout_s: float | None) -> Message | None:
-        """Return the next message; None after `timeout_s` seconds. Cancelling loses no message."""
+        """Return the next message; None after `timeout_s` seconds. Cancelling loses no message.
+
+        If `timeout_s` is None, it waits without limit. Raises `ClosedError` if the subscriber is
+        closed.
+        """
         self._reads_in_turn += 1
         if self._reads_in_turn >= _MAX_READS_PER_TURN:
             self._reads_in_turn = 0

@@ -25,7 +25,10 @@ _MAX_BUSY_TURNS = 64
 
 
 async def spin(work: Work, timeout_s: float | None) -> None:
-    """Run the work of a node until the node is stopped or closed, or for `timeout_s` seconds."""
+    """Run the work of a node until the node is stopped or closed.
+
+    Returns after `timeout_s` seconds at the latest; None is no limit.
+    """
     loop = asyncio.get_running_loop()
     deadline = math.inf if timeout_s is None else work.clock() + timeout_s
     waiter = _LoopWaiter(work, loop, loop_wait())

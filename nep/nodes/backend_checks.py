@@ -16,7 +16,10 @@ from nep.protocol.topic_pattern import is_pattern
 
 
 def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | None) -> bool:
-    """Return True if `topic` is a pattern. Raises `ValueError` if the back end has no patterns."""
+    """Return True if `topic` is a pattern; always False for a direct connection.
+
+    Raises `ValueError` if the back end has no patterns.
+    """
     if isinstance(configuration, Direct) or not is_pattern(topic):
         return False
     if not backend.has_patterns:
@@ -45,7 +48,11 @@ def codec_with_image_format(codec: Codec, image: ImageFormat | None) -> Codec:
 
 
 def check_history(backend: Backend, history: int, configuration: Configuration) -> int:
-    """Validate a history length and return it. Raises `ValueError` if the back end or wire has no history."""
+    """Validate a history length and return it.
+
+    Raises `ValueError` if it is out of range, or if the back end or the wire supports no history and
+    the length isn't 0.
+    """
     check_range("history", history, 0, MAX_HISTORY)
     is_original = isinstance(configuration, Direct) and configuration.wire == "original"
     if history and (is_original or not backend.has_history):

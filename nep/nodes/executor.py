@@ -74,7 +74,7 @@ def _wait(shared_wait: SharedWait, works: Sequence[Work], timeout_s: float) -> N
             if not call_queue.enter_wait(shared_wait.wake):
                 return
             entered.append(call_queue)
-        if all(shared_wait.arm(call_queue) for work in works for call_queue in work.waiting_subscribers):
+        if all(shared_wait.arm(subscriber) for work in works for subscriber in work.waiting_subscribers):
             shared_wait.wait(timeout_s)
     finally:
         shared_wait.disarm_all()

@@ -93,7 +93,7 @@ class LogRecord:
         """Return the record in a received payload. Invalid fields are ignored.
 
         Args:
-            payload: Any received value.
+            payload: Any received value; a value that isn't a map becomes the text of the record.
             stamp_ns: Time stamp to use if the record has none.
         """
         fields = payload if isinstance(payload, Mapping) else {"text": payload}

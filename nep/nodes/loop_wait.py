@@ -54,7 +54,8 @@ forks.call_in_child(_forked)
 def loop_wait() -> LoopWait:
     """Return the `LoopWait` of the running loop; create it if needed.
 
-    Raises `TooManyFilesError`, or `RuntimeError` if no loop is running.
+    Raises `RuntimeError` if no loop is running, and `TooManyFilesError` if the process has too many
+    open files.
     """
     loop = asyncio.get_running_loop()
     with _lock:

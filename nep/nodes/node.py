@@ -119,6 +119,7 @@ class Node(ServiceNode):
         BackendUnavailableError: The back end is not installed.
         BadNameError: The name is invalid.
         TooManyFilesError: The process has too many open files.
+        ValueError: `wait_s` or `strict` is invalid.
     """
 
     def __init__(

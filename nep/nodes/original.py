@@ -39,7 +39,7 @@ _REPLACEMENTS: Mapping[str, str] = {
 
 
 def original_hint(name: str) -> str:
-    """Return the replacement of a name that only the original module has; "" for any other name."""
+    """Return a hint at the replacement of a name that only the original module has; "" for any other name."""
     replacement = _REPLACEMENTS.get(name)
     if replacement is None:
         return ""
@@ -178,6 +178,9 @@ def dict2json(value: object) -> str:
 
 
 def read_json(json_file: str | Path) -> object:
-    """Parse a JSON file in UTF-8. Raises `OSError` or `ValueError`."""
+    """Parse a JSON file in UTF-8.
+
+    Raises `OSError` if the file can't be read, and `ValueError` if it isn't valid JSON.
+    """
     value: object = json.loads(Path(json_file).read_text("utf-8-sig"))
     return value

@@ -449,8 +449,8 @@ def _escaped_unencodable_path(payload: object, encode: Callable[[object], Encode
 def unencodable_path(payload: object, encode: Callable[[object], Encoded]) -> str:
     """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
-    Returns "" if the payload itself can't be encoded, or if the value is not among the first ten
-    thousand.
+    Returns "" if the payload itself can't be encoded. After ten thousand values the search ends with
+    the path of the innermost value found so far.
 
     Args:
         payload: Payload that `encode` rejects.

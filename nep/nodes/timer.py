@@ -60,7 +60,7 @@ class Timer:
         return is_due
 
     def take_turn(self) -> bool:
-        """Return True if the timer is due; the caller must then call the function.
+        """Claim the current tick; return True if the timer is due and this thread must run the callback.
 
         If several threads call this at the same time, only one gets True. The next due time is set
         before the call, so that it is correct even if the function raises or spins itself.

@@ -39,7 +39,10 @@ def name_of(msg_type: object) -> str:
 
 
 def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
-    """Return the codec of a publisher's message type."""
+    """Return the codec of a publisher's message type; for a class, the codec of its instances.
+
+    Raises `ValueError` if the class can't be a message type.
+    """
     if not isinstance(msg_type, type):
         return backend.codec_for(msg_type)
     declared = typed.message_type(msg_type)
@@ -75,7 +78,7 @@ class TypedSubscriber(Subscriber):
         self._empty = _empty_payload
 
     def typed(self, message: Message) -> Message:
-        """Return a message with a typed payload."""
+        """Return a copy of `message` whose payload is an instance of the declared type."""
         return self._reader.convert(message)
 
     def decoded_unshared(self, message: Message) -> object:

@@ -64,7 +64,7 @@ class Work:
     # ---- callbacks and timers
 
     def add_callback(self, callback: Callback) -> None:
-        """Add a callback."""
+        """Add a callback, unless its subscriber or the node is closed."""
         with self._lock:
             if not callback.transport.is_closed and not self.is_closed:
                 self.callbacks = (*self.callbacks, callback)
@@ -263,7 +263,10 @@ class Work:
         return has_more
 
     def next_item(self, callback: Callback) -> object:
-        """Return the next message or payload for a callback, or `NO_MESSAGE` if there is none."""
+        """Return the next message or payload for a callback.
+
+        Returns `NO_MESSAGE` if there is none, or if the next message can't be decoded.
+        """
         subscriber, transport = callback.subscriber, callback.transport
         if subscriber.payloads:
             subscriber.want_messages()

@@ -71,7 +71,7 @@ def encode_batch(
 
     Args:
         topic: Topic part.
-        form: Result of `encode_form` for each message.
+        form: Result of `encode_form`, the same for all messages.
         seq: Sequence number of the first message.
         publisher: Id of the publisher.
         stamps_ns: Time stamps of the messages.
@@ -85,7 +85,7 @@ def encode_batch(
 
 
 def parse_entries(body: bytes) -> list[BatchEntry]:
-    """Parse the table of a batch's body. Raises `WireError`."""
+    """Parse the table of a batch's body. Raises `WireError` if it is invalid or doesn't match the body."""
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
     if not 1 <= count <= MAX_BATCH_MESSAGES:
         raise WireError(

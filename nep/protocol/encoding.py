@@ -1,8 +1,9 @@
 """Wire encoding of requests, replies and pushes. Pure functions; specification: `docs/wire.md`.
 
-A body is one msgpack map. Requests have `do` (the operation) and `call` (a number that the reply repeats as
-`re`); replies and pushes have `is`; `what` holds the fields. `write` converts values to maps; `read` parses
-and validates received maps. Graphs have a separate encoder that caches unchanged parts.
+A body is one msgpack map. Requests have `do` (the operation) and `call` (a number that the reply
+repeats as `re`); replies and pushes have `is`; `what` holds the fields. `to_plain` converts values to
+maps; `from_plain` parses and validates received maps. Graphs have a separate encoder that caches
+unchanged parts.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ class ReceivedRequest(NamedTuple):
     """Result of decoding a request.
 
     Attributes:
-        call: Id of the request.
+        call: Id of the request; 0 if it is missing or invalid.
         request: The request, or the error if it is malformed.
     """
 
@@ -197,7 +198,7 @@ def encode_reply(reply: Reply | Push, call: int = 0) -> bytes:
 
 
 def call_of_graph_reply(body: bytes) -> int | None:
-    """Return the call number of a graph reply without decoding it, or None for other bodies.
+    """Return the call id of a graph reply without decoding it; None for other bodies and invalid ids.
 
     Decoding a graph of thousands of topics takes 0.1 s.
     """
@@ -211,7 +212,7 @@ def call_of_graph_reply(body: bytes) -> int | None:
 
 
 def decode_reply(body: bytes) -> tuple[int, Reply | Push]:
-    """Decode a reply or push; return (call, answer). The call number of a push is 0. Raises `WireError`."""
+    """Decode a reply or push; return (call, answer). The call id of a push is 0. Raises `WireError`."""
     if len(body) < _LARGE_BODY_BYTES:
         return _decode_reply(body)
     with gc_disabled():
@@ -283,7 +284,7 @@ def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
 
 
 def read(kind: type[T], value: object) -> T:
-    """Parse a value of type `kind` from the result of `write`.
+    """Parse a value of type `kind` from the result of `to_plain`.
 
     Unknown fields are ignored, because newer peers may send more fields.
 
@@ -303,7 +304,7 @@ class _MismatchError(Exception):
     """Validation error, whose field path is completed while the exception propagates.
 
     Attributes:
-        words: Message with the placeholder ``field`` and those in ``values``.
+        template: Message with the placeholder ``field`` and those in ``values``.
         values: Values of the other placeholders.
         path: Field path, innermost first.
     """

@@ -157,12 +157,12 @@ class PublisherCount:
 
 @dataclass(frozen=True)
 class SubscriberCount:
-    """Statistics of a subscriber.
+    """Statistics of a subscriber or client.
 
     Attributes:
         id: Id of the subscriber.
-        received: Number of received messages, or None if unknown.
-        lost: Number of lost messages, or None if unknown.
+        received: Number of received messages, or of a client's answered calls; None if unknown.
+        lost: Number of lost messages, or of a client's calls without a reply; None if unknown.
         problem: Reason why messages can't be decoded, or "".
     """
 

@@ -220,12 +220,14 @@ def hello_part(
 ) -> bytes:
     """Return the hello filter of a subscriber, which is also the first part of messages addressed to it.
 
+    Each of the three abilities includes the ones before it.
+
     Args:
         subscriber: Id of the subscriber.
         topic: Name of the topic.
-        one_part: The subscriber reads messages of one part.
-        tells: The subscriber also acknowledges echoes.
-        batches: The subscriber also reads batches.
+        one_part: True if the subscriber reads messages of one part.
+        acknowledges_echoes: True if the subscriber also acknowledges echoes.
+        batches: True if the subscriber also reads batches.
     """
     begin = (
         HELLO_BATCHES if batches else HELLO_ACKNOWLEDGES if tells else HELLO_ONE_PART if one_part else HELLO
@@ -328,7 +330,7 @@ def join(
     payload: bytes | memoryview,
     extension: Mapping[str, object] | None = None,
 ) -> tuple[bytes | memoryview, ...]:
-    """Return all parts of a message. The flag EXTENSION is set if `extension` is not None."""
+    """Return all parts of a message. The flag EXTENSION is set if `extension` is not empty."""
     if not extension:
         return topic_part(topic), header.pack(), payload
     flagged = header._replace(flags=header.flags | EXTENSION)

@@ -90,10 +90,10 @@ class Bookmarks:
 
         Args:
             at_ns: Time in ns since 1970; clamped to the time span of the recording.
-            name: Name of the bookmark.
+            name: Name of the bookmark; long names are truncated.
 
         Raises:
-            RecordingError: The bookmark can't be saved.
+            RecordingError: There are already `MAX_BOOKMARKS`, or the bookmark can't be saved.
         """
         if len(self._saved) >= MAX_BOOKMARKS:
             reason = _("the recording already has {most} bookmarks, the maximum; delete one first").format(

@@ -92,14 +92,15 @@ def export(
         kind: One of `FORMATS`.
         folder: Target folder.
         part: Part of the recording.
-        fps: Frame rate of videos.
+        fps: Frame rate of videos in Hz.
         progress: Called with the number of messages done and in total.
 
     Returns:
         The exported files.
 
     Raises:
-        RecordingError: No topic is suitable, or a file can't be written.
+        RecordingError: No topic is suitable, the part has no messages, there are too many topics or
+            fields, a file already exists, or a file can't be written.
         RecordingsUnavailableError: A package is not installed.
         ValueError: The format is unknown.
     """

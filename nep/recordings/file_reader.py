@@ -52,8 +52,8 @@ class FileInfo:
     """Properties of an open recording file.
 
     Attributes:
-        channels: Channels by number.
-        counts: Number of messages by channel, including channels without messages.
+        channels: Channels by id.
+        counts: Number of messages by channel id; channels without messages may be missing.
         start_ns: Time of the first message in ns since 1970; 0 if there are no messages.
         end_ns: Time of the last message in ns since 1970; 0 if there are no messages.
         size_bytes: Size of the intact part of the file.
@@ -101,8 +101,8 @@ class RawFile(Protocol):
         Args:
             start_ns: Start in ns since 1970 (inclusive); None for no limit.
             end_ns: End in ns since 1970 (exclusive); None for no limit.
-            channels: Numbers of the channels.
-            pieces: Numbers of the chunks to read, as returned by `chunks_with`; None for all.
+            channels: Ids of the channels.
+            pieces: Indexes of the chunks to read, as returned by `chunks_with`; None for all.
         """
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
@@ -110,26 +110,31 @@ class RawFile(Protocol):
 
         Args:
             at_ns: Time in ns since 1970.
-            groups: Groups of channel numbers.
+            groups: Groups of channel ids.
         """
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """Return the log time of the last message at or before `at_ns`, by channel. Reads only indexes."""
+        """Return the log time of the last message at or before `at_ns`, by channel id.
+
+        Channels without such a message are omitted. Messages are read only where indexes are missing.
+        """
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """Return the number of messages in each of several equal time intervals, by channel.
+        """Return the number of messages in each of several equal time intervals, by channel id.
+
+        Long spans may be estimated. Channels without messages in the span may be missing.
 
         Args:
             start_ns: Start of the first interval in ns since 1970.
             end_ns: End of the last interval (exclusive).
             buckets: Number of intervals.
-            channels: Numbers of the channels.
+            channels: Ids of the channels.
         """
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
-        """Return the numbers of the chunks that contain messages of these channels, in order."""
+        """Return the indexes of the chunks that contain messages of these channels, in order."""
 
     def close(self) -> None:
         """Close the file. Later calls raise `ClosedError`. Idempotent."""
@@ -193,6 +198,7 @@ class FileReader:
         Raises:
             RecordingError: The file can't be opened or is not a recording.
             RecordingTooLargeError: The file exceeds a limit.
+            RecordingsUnavailableError: Packages for recordings are not installed.
         """
         check_packages()
         self.path = Path(path)
@@ -426,7 +432,7 @@ class FileReader:
         return dict(result)
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
-        """Return the numbers of the chunks with messages of these channels. See `RawFile.chunks_with`."""
+        """Return the indexes of the chunks with messages of these channels. See `RawFile.chunks_with`."""
         return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
 
     def _chunk_counts(self, number: int) -> Mapping[int, int]:

@@ -148,10 +148,10 @@ class VideoFile:
         self._last = frame
 
     def finish(self) -> None:
-        """Write the last frame and complete the file.
+        """Write the last frame and complete the file; do nothing if no image was added.
 
-        Raises `RecordingError` if frames are missing: OpenCV does not report a full disk, so the frames in
-        the file are counted.
+        Raises `RecordingError` if frames are missing: OpenCV does not report a full disk, so the frames
+        in the file are counted.
         """
         if self._film is None:
             return

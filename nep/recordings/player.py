@@ -154,7 +154,7 @@ class Playback:
             self._set_anchor()
 
     def seek(self, at_ns: int) -> None:
-        """Move to a time in ns since 1970.
+        """Move to a time in ns since 1970, clamped to the recording.
 
         The newest message of each topic at or before that time becomes due at once.
         """
@@ -408,7 +408,7 @@ def moving_topics(recording: Recording) -> MovingTopics:
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:
-    """Return the subset of `topics` that is latched in the recording."""
+    """Return the subset of `topics` whose newest message in the recording is latched."""
     newest = recording.newest(recording.end_ns, list(topics))
     return frozenset(each.message.topic for each in newest.values() if each.message.is_latched)
 

@@ -200,7 +200,7 @@ class Recording:
         return totals
 
     def stats_chunks(self) -> Sequence[int]:
-        """Return the numbers of the chunks that contain message counts, sorted by time.
+        """Return the indexes of the chunks that contain message counts, sorted by time.
 
         The chunks are not read.
         """
@@ -212,7 +212,7 @@ class Recording:
         """Iterate over the message counts in the recording, to locate losses in time.
 
         Args:
-            pieces: Numbers of the chunks to read, from `stats_chunks`; None for the whole file.
+            pieces: Indexes of the chunks to read, from `stats_chunks`; None for the whole file.
 
         Yields:
             Time in ns since 1970, and the changed counts by topic.
@@ -228,7 +228,7 @@ class Recording:
 
         Args:
             role: Role of the entries, such as "alerts" or "notes".
-            pieces: Numbers of the chunks to read; None for the whole file.
+            pieces: Indexes of the chunks to read; None for the whole file.
 
         Yields:
             Time in ns since 1970, and the value of the entry.
@@ -270,7 +270,7 @@ class Recording:
     ) -> Iterator[RawMessage]:
         """Iterate over raw messages, sorted by time of receipt.
 
-        The arguments are those of `read`. The channel numbers of messages refer to `facts.channels`.
+        The arguments are those of `read`. The channel ids of messages refer to `info.channels`.
         """
         return self.file.read_raw(start_ns, end_ns, self._channels(topics))
 
@@ -302,7 +302,9 @@ class Recording:
         )
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
-        """Return the time of the newest message at or before a time, by topic. Reads only indexes.
+        """Return the time in ns since 1970 of the newest message at or before a time, by topic.
+
+        Topics without such a message are omitted. Messages are read only where indexes are missing.
 
         Args:
             at_ns: Time in ns since 1970.
@@ -329,7 +331,7 @@ class Recording:
 
         Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the
         messages of a chunk are distributed evenly over its duration, which is at most half a second in
-        recordings of nep.
+        recordings of nep. Topics without messages in the span may be missing.
 
         Args:
             start_ns: Start of the first interval in ns since 1970.
@@ -360,7 +362,7 @@ class Recording:
 
 
 class _Decoders(dict[int, ChannelDecoder]):
-    """Decoders by channel number, created when they are first used."""
+    """Decoders by channel id, created when they are first used."""
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition]) -> None:
         super().__init__()

@@ -79,7 +79,7 @@ class RepairReport:
 
     @property
     def is_complete(self) -> bool:
-        """True if no message was lost, because the old file only was not closed properly."""
+        """True if nothing was lost, as when the old file merely wasn't closed properly."""
         return not self.discarded_bytes and not self.discarded
 
 
@@ -119,7 +119,9 @@ def repair(
         progress: Called with bytes done and in total.
 
     Raises:
-        RecordingError: There is no readable message, the target exists, or it can't be written.
+        RecordingError: The recording can't be read, no message can be decoded, or the target exists or
+            can't be written.
+        RecordingsUnavailableError: A package is not installed.
     """
     check_packages()
     target = repaired_path(path) if target is None else target

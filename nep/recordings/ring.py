@@ -1,8 +1,8 @@
 """`FlightRecorder`: ring buffer on disk that contains the newest messages, limited in bytes and seconds.
 
 Messages are written to files, called segments. The oldest segment is deleted if the ring exceeds its size, or
-if the segment is older than the time limit. `keep` copies the chunks of the last seconds to a recording while
-the ring continues.
+if the segment is older than the time limit. `FlightRecorder.save` copies the chunks of the last seconds
+to a recording while the ring continues.
 """
 
 from __future__ import annotations
@@ -226,7 +226,7 @@ class FlightRecorder:
 
         with FlightRecorder("ring", seconds=60.0) as ring, Recorder(node, ring):
             ...
-            ring.keep("incident.mcap", seconds=30.0)
+            ring.save("incident.mcap", seconds=30.0)
     """
 
     def __init__(
@@ -287,16 +287,17 @@ class FlightRecorder:
     def save(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> SavedRecording:
         """Save the last seconds, up to the newest message, as a recording.
 
-        The recording may start up to half a second earlier. The call returns when all bytes are copied; the
-        ring continues meanwhile.
+        The recording may start up to half a second earlier. The call returns when all bytes are copied;
+        the ring continues meanwhile.
 
         Args:
-            path: File to write.
+            path: File to write, which must not exist.
             seconds: Duration to save in seconds.
             note: Text for the metadata.
 
         Raises:
-            RecordingError: No message was received yet, or the file can't be written.
+            RecordingError: No message was received yet, the ring has stopped because of an error, or
+                the file exists or can't be written.
             ValueError: `seconds` is not positive.
         """
         if not 0.0 < seconds < _MAX_SECONDS:

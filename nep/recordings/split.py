@@ -18,7 +18,7 @@ def part_path(path: Path, number: int) -> Path:
 
 
 class SplitFiles:
-    """Destination that starts a new file at a given size (a `nep.recordings.writer.Destination`).
+    """Destination that starts a new file at a given size.
 
     A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one
     message.

@@ -94,7 +94,7 @@ class RecordingStatus:
 
 @dataclass
 class _KindCache:
-    """Cached counter and channels for messages with the same `MessageKind` and publisher."""
+    """Counter and channels of the messages with the same `MessageKind` and publisher, looked up once."""
 
     kind: MessageKind
     publisher: int | None
@@ -274,6 +274,8 @@ class RecordingWriter:
     def write_entry(self, role: Role, value: object) -> None:
         """Queue an entry of the recorder itself, which is written as JSON. Never blocks.
 
+        The entry is dropped if the queue is full or the writer has stopped.
+
         Args:
             role: Role of the entry, such as "alerts" or "notes".
             value: JSON-serializable value.
@@ -291,6 +293,9 @@ class RecordingWriter:
 
     def flush(self, timeout_s: float = 10.0) -> bool:
         """Wait until all messages posted so far are in the file.
+
+        Args:
+            timeout_s: Maximum time in seconds to wait.
 
         Returns:
             False if the time limit has passed or an error has stopped the writer.
@@ -469,7 +474,7 @@ class RecordingWriter:
         if len(self._kind_cache) >= _MAX_CACHED_KINDS:
             self._kind_cache.clear()
         cached = _KindCache(message.kind, message.publisher, self._counter(message.topic))
-        self._kind_cache[id(message.kind)] = cached  # `known` keeps the kind alive, so its id stays unique
+        self._kind_cache[id(message.kind)] = cached  # `cached` keeps the kind alive, so its id stays unique
         return cached
 
     def _counter(self, topic: str) -> TopicCounter:

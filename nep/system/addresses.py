@@ -161,7 +161,7 @@ def own_addresses() -> tuple[OwnAddress, ...]:
 
 
 def has_address(host: str) -> bool:
-    """Return True if an interface of this computer currently has the IP address `host`."""
+    """Return True if this computer has the IP address `host`, also for 0.0.0.0 and loopback addresses."""
     if host == ANY_HOST or ipaddress.ip_address(host).is_loopback:
         return True
     addresses = (each.address for group in psutil.net_if_addrs().values() for each in group)
@@ -236,7 +236,7 @@ class MasterNameResolver:
 
     Args:
         address: Address of the master; a numeric address needs no resolution.
-        on_change: Called in the resolver thread with each new value of `known`.
+        on_change: Called in the resolver thread with each new value of the attribute `address`.
         look_up: Resolves a host name.
     """
 

@@ -52,7 +52,7 @@ def close_in_child(*endpoints: str) -> None:
 def call_in_child(call: Callable[[], None]) -> None:
     """Register a function to be called in every child process, after the `forked` of all objects.
 
-    For the global state of modules; use `watch` for objects.
+    For the global state of modules; use `notify_after_fork` for objects.
     """
     _handlers.append(call)
 

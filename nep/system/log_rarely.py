@@ -17,8 +17,8 @@ def is_logged(count: int) -> bool:
 class SuppressedErrors:
     """Context manager that suppresses, counts and logs exceptions, for threads that must keep running.
 
-    Exceptions are logged at increasing intervals. SystemExit, which a callback may raise, is
-    suppressed too, because it would end the thread.
+    Exceptions are logged at increasing intervals. All exceptions are suppressed, also SystemExit, which
+    a callback may raise and which would end the thread.
     """
 
     def __init__(self, logger: logging.Logger, operation: str) -> None:
@@ -26,7 +26,7 @@ class SuppressedErrors:
 
         Args:
             logger: Logger for the exceptions.
-            operation: Name of the work; the log message is "WORK failed (N so far)".
+            operation: Name of the work, which begins the log message "OPERATION failed (N so far)".
         """
         self.count = 0
         self._logger, self._operation = logger, operation

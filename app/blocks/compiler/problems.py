@@ -185,12 +185,15 @@ class ProblemCollector:
     def report_unsupported(
         self, placed_block: PlacedBlock, block: Block | None, parent: PlacedBlock | None
     ) -> bool:
-        """Report a block that is unknown or not supported by its robot, and return True if it was reported.
+        """Report a block that can't run, and return True if it was reported.
+
+        Such a block is unknown, or its robot is not connected or doesn't support it.
 
         Args:
             placed_block: Block in the workspace.
             block: Description of the block; None if the type is unknown.
-            parent: Block that contains the block in a slot, and that is skipped too; None for a statement.
+            parent: Block that contains the block in a slot, and that is skipped too; None for a
+                statement.
         """
         robot = placed_block.fields.get("ROBOT")
         name = self.label(placed_block, block)

@@ -45,13 +45,15 @@ def block_types_of(robot: Robot) -> frozenset[str]:
 def supports_blocks(
     block_types: Collection[str], model: str, robot: Robot, supported_types: Collection[str] | None = None
 ) -> bool:
-    """Return True if a robot supports all given block types of another robot; False if there are none.
+    """Return True if a robot supports all given block types of another robot.
+
+    False if `block_types` is empty.
 
     Args:
         block_types: Block types that the other robot uses.
         model: Model of the other robot.
         robot: Robot to check.
-        supported_types: Result of ``types_of(robot)`` if it was already computed.
+        supported_types: Result of `block_types_of(robot)` if it was already computed.
     """
     supported_types = block_types_of(robot) if supported_types is None else supported_types
     return bool(block_types) and all(

@@ -32,7 +32,7 @@ def block_text(
 ) -> str:
     """Return a block with its arguments as one line of text, truncated to 80 characters.
 
-    A block without description is represented by its type and field values.
+    A block without description is represented by the result of `label_of_unknown`.
 
     Args:
         placed_block: Block in the workspace.

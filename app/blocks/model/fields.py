@@ -63,7 +63,7 @@ class ValueInput(Argument):
 
     Attributes:
         check: Type of the accepted values; None for any.
-        default: Value of the shadow block; None leaves the slot empty.
+        default: Value of the shadow block; None or a boolean leaves the slot empty.
         unit: Unit of the value, for the help.
         only_if: Name and value of a field; the slot exists only while the field has this value.
         variable: Name of a variable whose block is in the slot in the toolbox.
@@ -211,8 +211,11 @@ class ChoiceField(Field):
     def read(self, saved: object) -> object:
         """Return the selected value; the first option if nothing is saved.
 
-        With a `source`, any other text is returned unchanged. Otherwise FieldError is raised if the
-        value is not an option.
+        With a `source`, a value that is not an option is returned as text, and an empty text is
+        returned if nothing is saved and there are no options.
+
+        Raises:
+            FieldError: The value is not an option, and there is no `source`.
         """
         if saved is None and self.options:
             return self.options[0][1]

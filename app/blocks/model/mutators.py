@@ -126,7 +126,7 @@ class FunctionInput:
 
 
 def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
-    """Return the inputs of a function definition or call; duplicate ids are dropped.
+    """Return the inputs of a function definition or call, at most `MAX_INPUTS`; duplicate ids are dropped.
 
     Args:
         extra: Saved ``extraState`` of the block.

@@ -22,7 +22,8 @@ class Problem:
         subject: Part of `message` that is shown in bold.
         message: Message for the user.
         fix: Text of the button that fixes the problem; None for no button.
-        fix_action: Action of the button (`app.blocks.fixes.fixes`, or ``connect:<robot>``).
+        fix_action: Action of the button: an action of `app.blocks.fixes.fixes.fix`, ``connect:<robot>``
+            or ``variable.rename:<id>``; None for no button.
         icon: Icon of the block.
     """
 
@@ -105,7 +106,11 @@ class Program:
 
     @classmethod
     def from_json(cls, saved: Mapping[str, object]) -> Program:
-        """Create a program from the result of `to_json`. Raises KeyError or TypeError for invalid data."""
+        """Create a program from the result of `to_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is invalid.
+        """
         return cls(
             name=str(saved["name"]),
             source="",

@@ -36,7 +36,7 @@ class Receiver:
     Attributes:
         name: Name of the broadcast.
         script: Function to run.
-        waiting: Pending delivery, or None.
+        pending: Delivery that waits for the script, or None.
         runs_in: Script of the scheduler in which `serve` runs; None before.
     """
 

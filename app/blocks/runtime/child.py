@@ -83,7 +83,10 @@ class RunnerOutput:
                 return
 
     def print(self, text: str) -> None:
-        """Queue printed text for `send_printed`."""
+        """Queue the lines of a printed text for `send_printed`; lines are dropped while the queue is full.
+
+        Only the first ``4 * MAX_LINE_LENGTH`` characters of the text are printed.
+        """
         for line in text[: MAX_LINE_LENGTH * 4].splitlines() or [""]:
             try:
                 self._printed.put_nowait(line[:MAX_LINE_LENGTH])
@@ -120,7 +123,7 @@ class PrintStream(io.TextIOBase):
         self._out = out
 
     def write(self, text: str) -> int:
-        """Queue a text without line breaks at its ends; an empty text is ignored."""
+        """Queue a text without the line breaks at its ends; a text of line breaks only is ignored."""
         if text.strip("\n"):
             self._out.print(text.strip("\n"))
         return len(text)

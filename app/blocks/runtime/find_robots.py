@@ -106,8 +106,9 @@ def find_robots(
     Args:
         node: Node that is used to read the graph and to subscribe to descriptions.
         timeout_s: Maximum wait in seconds.
-        expected: Names of robots to wait for; if empty, the currently connected robots are returned.
-        previous: Descriptions of robots that were connected before.
+        expected: Names of robots to wait for; if empty, the function waits for the descriptions of all
+            announced robots.
+        previous: Descriptions of robots that were connected before; only robots of RIZE are used.
         clock: Monotonic clock in seconds.
         wait: Sleeps for a number of seconds.
     """

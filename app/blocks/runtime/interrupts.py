@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:
-    """Return a context manager that ignores Ctrl+C.
+    """Return a context manager that ignores Ctrl+C; it has no effect outside of the main thread.
 
     Use it only for code that always ends by itself.
     """

@@ -233,7 +233,11 @@ class Network:
             self._send(described, self._make_command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
-        """Return the newest value of a sensor; None if no value has been received yet."""
+        """Return the newest value of a sensor; None if no value has been received yet or decoding fails.
+
+        Raises:
+            KeyError: The robot has no sensor or event with this name.
+        """
         topic = self._topic(robot, name)
         self._subscribe(topic)
         message = self._newest.get(topic)
@@ -263,7 +267,11 @@ class Network:
         self.on_message(self._topic(robot, name), callback)
 
     def on_message(self, topic: str, callback: Callback) -> None:
-        """Call `callback` with the payload of each message of a topic."""
+        """Call `callback` with the payload of each message of a topic.
+
+        Messages that can't be decoded are skipped, and so are messages of other programs if the topic
+        belongs to a robot whose own program publishes it.
+        """
         with self._lock:
             self._callbacks.setdefault(topic, []).append(callback)
         self._subscribe(topic)

@@ -28,6 +28,7 @@ class ProgramQuestion:
         id: Id of the question.
         text: Text of the question.
         answer: Answer as text; None until the user has answered.
+        choices: Labels of the buttons; empty if the user enters a text.
     """
 
     id: int
@@ -73,12 +74,13 @@ class Questions:
         self.answer = parse_answer(self._wait_for_answer(text(words)))
 
     def ask_with_choices(self, question_text: object, choices: object) -> None:
-        """Ask a question with a button for each item of a list, and wait until `answer` is the selected item.
+        """Ask a question with a button for each item of a list, and store the selected item in `answer`.
 
         The answer is an empty text if the user presses Esc.
 
         Raises:
-            BehaviourError: The program runs outside of Studio, or the list is empty or too long.
+            BehaviourError: The program runs outside of Studio, or `choices` is not a list, is empty or
+                is too long.
         """
         if self._on_question is None:
             raise BehaviourError(

@@ -66,7 +66,10 @@ class StatusText:
         _set_or_remove(self._warned, self._block(), warning)
 
     def text(self, blocks: Sequence[str]) -> str:
-        """Return the text for the run bar: the activity of a robot at these blocks, or the first block."""
+        """Return the text for the run bar: the activity of a robot at these blocks, or the first block.
+
+        Returns an empty text if there are no blocks.
+        """
         return _first_text(self._status_by_block, blocks) or self.block_text(blocks[0] if blocks else None)
 
     def warning(self, blocks: Sequence[str]) -> str:
@@ -470,9 +473,9 @@ def _check_hint(robot: Robot) -> str:
 def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
     """Return the input for the remaining part of a cancelled action; None if there is nothing left to do.
 
-    An action that reports the remaining amount continues with that amount; other actions start again. An
-    action that drives the robot without reporting the amount would go too far, so its remaining part is
-    skipped.
+    An action that reports the remaining amount continues with that amount; other actions start again.
+    If the amount is unknown (`is_remainder_unknown`), the robot could go too far, so the remaining part
+    is skipped.
 
     Args:
         action: Description of the action.
@@ -493,7 +496,11 @@ def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall
 
 
 def is_remainder_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
-    """Return True if a cancelled action drove the robot without reporting the remaining amount."""
+    """Return True if it is not known how much of a cancelled action is left.
+
+    This is the case for a started action that should report the remaining amount but has not, and for
+    one that drives the robot and never reports it.
+    """
     name = remainder_parameter(action, input)
     if not call.has_started or name is None:
         return call.has_started and action.risk == "locomotes"

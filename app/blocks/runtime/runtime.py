@@ -93,8 +93,9 @@ class Runtime:
     """Running program.
 
     Attributes:
-        finished: Set when all scripts have ended, or when one of them has failed.
-        error: Error of the script that failed, else None.
+        finished: Set when all scripts have ended, a script has failed or stopped the program, or
+            another program has stopped a robot.
+        error: Error of the script that failed, or of the robot that another program stopped; else None.
 
     Args:
         printed: Called with each line that the program writes.
@@ -270,9 +271,11 @@ class Runtime:
     def number(self, block: str, work_out: Callable[[], object]) -> object:
         """Compute and return the result of a block that must return a number; see `value`.
 
+        An unknown result (None) is returned as well.
+
         Raises:
-            BehaviourError: The computation failed, or the result is not a number, such as a text joined by
-                "+".
+            BehaviourError: The computation failed, or the result is not a number, such as a text joined
+                by "+".
         """
         result = self.value(block, work_out)
         if result is None or isinstance(result, (int, float)):

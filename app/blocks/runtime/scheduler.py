@@ -29,7 +29,8 @@ class Snapshot:
 
     Attributes:
         blocks: Ids of the current blocks.
-        next_block: Id of the block that a single step runs; None if no script is suspended.
+        next_block: Id of the block that a single step runs: the block of a suspended script, else of a
+            script that waits for time or a condition; None if there is neither.
         is_paused: True once every script is suspended by a pause.
     """
 
@@ -87,13 +88,13 @@ class Scheduler:
     # ---- scripts
 
     def start(self, name: str, body: Callable[[], None], *, idle: bool = True) -> threading.Thread:
-        """Start a script in a new thread, in which ``body`` is called.
+        """Start a script in a new thread, in which `body` is called, and return the thread.
 
         Args:
             name: Name of the script.
             body: Body of the script, which calls `start_run` before it runs blocks.
-            idle: True for a script that first waits for an event; False for one that counts as running at
-                once.
+            idle: True for a script that first waits for an event; False for one that counts as running
+                at once.
         """
         script = Script(name, self._lock)
         script.idle = idle
@@ -309,7 +310,10 @@ class Scheduler:
         self.wake_scripts()
 
     def step_once(self) -> None:
-        """Run one block of the script that has waited longest. Has no effect unless the program is paused."""
+        """Run one block of the script that has waited longest.
+
+        Has no effect unless the program is paused, or while a script runs.
+        """
         with self._lock:
             if not self._paused or self._stepping is not None or self._owner is not None:
                 return

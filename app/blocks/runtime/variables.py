@@ -94,7 +94,8 @@ class VariableWatch:
     def changes(self) -> list[VariableValue]:
         """Return the variables whose displayed value has changed since the last call.
 
-        The first call returns all variables.
+        The first call returns all variables. Beyond `MAX_TOTAL_CHARACTERS`, the rest is left to the
+        next call.
         """
         changed, characters = [], 0
         for python, variable in self._variables.items():
@@ -175,6 +176,8 @@ def short_text(value: object) -> str:
 
 def limited_text(value: object, max_length: int) -> str:
     """Format a value as text of limited length; parts of the value that exceed the length aren't read.
+
+    A very large integer is described by its approximate number of digits.
 
     Args:
         value: Value.

@@ -105,7 +105,7 @@ class Backpack:
             self._report_once(str(error))
 
     def add(self, blocks: Sequence[Json]) -> list[BackpackStack]:
-        """Add stacks of blocks, the first on top, and return the new items.
+        """Add stacks of blocks, the first on top, and return the new stacks.
 
         Raises BackpackError if the backpack is full or can't be written.
         """

@@ -20,6 +20,8 @@ class Difference:
         added: Number of added blocks.
         removed: Number of removed blocks.
         changed: Number of blocks whose fields, values or texts differ.
+        is_rearranged: True if the blocks are the same, but their positions or anything else in the
+            workspace differs.
     """
 
     block_count: int

@@ -51,7 +51,7 @@ class CompiledProgram:
     Attributes:
         key: Key of the source that was compiled.
         program: Compiled program.
-        compile_s: Compile time.
+        compile_s: Compile time in seconds.
     """
 
     key: Key
@@ -129,7 +129,11 @@ class Document:
         self._write_journal()
 
     def new(self, name: str = "") -> None:
-        """Replace the content with an empty behaviour."""
+        """Replace the content with an empty behaviour.
+
+        Args:
+            name: Name of the behaviour; "" for the default name.
+        """
         self._replace(BehaviourFile(name or _(DEFAULT_NAME), {}, {}), None)
 
     def open(self, path: Path) -> None:
@@ -238,7 +242,8 @@ class Document:
         """Replace a missing robot in all blocks with another robot.
 
         Returns:
-            False if no block uses the missing robot.
+            False if no block uses the missing robot, or if the behaviour has no valid description of
+            this robot.
         """
         missing_robot = next((each for each in self._known_robots() if each.name == missing), None)
         if missing_robot is None or not blocks_of(self.workspace, missing):
@@ -265,7 +270,7 @@ class Document:
 
     @property
     def is_changed_externally(self) -> bool:
-        """True if another program changed the file since it was opened or saved."""
+        """True if another program changed the file since it was opened or saved; False if it is missing."""
         now = stamp_of(self.path) if self.path is not None else None
         return now is not None and now != self._stamp
 

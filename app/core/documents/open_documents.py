@@ -100,7 +100,10 @@ class Documents:
         self.revision += 1
 
     def recover(self, unsaved: UnsavedWork) -> Document:
-        """Restore unsaved work into the tab of its file, or into a new tab."""
+        """Restore unsaved work into the tab of its file, or into another tab.
+
+        Another tab is used if the file isn't open, or if its tab contains unsaved changes.
+        """
         open_document = self.find_by_path(unsaved.path) if unsaved.path is not None else None
         if open_document is None or open_document.dirty:
             return self._open_with(lambda document: document.recover(unsaved))
@@ -140,7 +143,7 @@ class Documents:
             self.revision += 1
 
     def close(self, document: Document) -> None:
-        """Close a tab and discard unsaved work, which must be saved before.
+        """Close a tab. Unsaved work must be saved before; otherwise it is offered again at the next start.
 
         The last tab is replaced with an empty behaviour.
         """

@@ -62,8 +62,8 @@ def problem_lines(
 ) -> tuple[ProblemLine, ...]:
     """Return the rows of the problem list.
 
-    All problems of a missing robot are combined into one row with the number of disabled blocks. Fixes
-    for such a row are connected robots with the same actions, and a virtual robot of the same model.
+    All problems of a missing robot are combined into one row with the number of disabled blocks; see
+    `robot_fixes` for the fixes of such a row.
 
     Args:
         problems: Problems that the compiler found.
@@ -108,10 +108,13 @@ def robot_fixes(
 ) -> tuple[Fix, ...]:
     """Return the fixes for a missing robot, best first.
 
+    These are at most `MAX_FIXES` connected robots, preferably of the same model, and a virtual robot of
+    the same model. If there is none of them, the only fix shows the robots.
+
     Args:
         name: Name of the missing robot.
         robot: Missing robot; None if it has no description.
-        able: Connected robots that have the same actions.
+        able: Connected robots that support all blocks that use the missing robot.
         virtual_models: Models that are available as virtual robots.
     """
     if robot is None:

@@ -17,7 +17,7 @@ class SavedTabs:
     """Storage of the open tabs in the settings, restored at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
-        # `complain` is called with a sentence when they can't be saved.
+        # `report_error` is called with a message if the tabs can't be saved.
         self._settings, self._documents, self._complain = settings, documents, complain
         self.active = False
         """True if the tabs of this window are saved; False in a second window."""

@@ -1,4 +1,4 @@
-"""Titles of behaviours: file names, preceded by parent folders if several names are equal."""
+"""Titles of behaviours: file names, followed by parent folders if several names are equal."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def name_of(path: Path, stored_name: str) -> str:
 
 
 def unique_titles(named_paths: Sequence[tuple[str, Path | None]]) -> list[str]:
-    """Return a unique title for each pair of name and file.
+    """Return a title for each pair of name and file; titles of different files differ.
 
-    A title is the name, preceded by as many parent folders as necessary.
+    A title is the name, followed by as many parent folders as are needed to distinguish equal names.
     """
     alike: dict[str, set[Path]] = {}
     for name, path in named_paths:

@@ -72,8 +72,9 @@ def save_version(
 ) -> SavedVersion | None:
     """Copy the current content of a file as a version; return None if the file is missing or empty.
 
-    At most 300 versions are stored in total, and 30 of each file. If the newest version has the same
-    content, it is returned and nothing is copied. Raises DocumentError if the file can't be copied.
+    At most 300 versions (500 MB) are stored in total, and 30 of each file. If the newest version has
+    the same content, it is returned and nothing is copied. Raises DocumentError if the file can't be
+    copied.
 
     Args:
         path: File that will be overwritten.

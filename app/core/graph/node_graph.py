@@ -47,6 +47,7 @@ class GraphInput:
         topics: Topics of all networks.
         services: Services of the native network, by name.
         robots: Names of the robots.
+        host: Name of this computer.
         pages: Connected web pages, by the name of their node.
     """
 
@@ -161,11 +162,11 @@ class NodeGraph:
     """Drawing of a graph. Boxes, lines and groups are in a stable order.
 
     Attributes:
-        node_count: Number of all nodes, including hidden ones.
-        topic_count: Number of all topics.
-        service_count: Number of all services.
+        node_count: Number of connected nodes, including hidden ones.
+        topic_count: Number of topics that lines represent.
+        service_count: Number of services that lines represent.
         hidden_quiet_count: Number of nodes that are hidden because they are quiet.
-        page_count: Number of web pages.
+        page_count: Number of connected web pages.
     """
 
     nodes: tuple[DrawnNode, ...] = ()

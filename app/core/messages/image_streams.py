@@ -228,9 +228,12 @@ class Images:
             self._arrived.notify()
 
     def reset(self, topics: Collection[str] = ()) -> None:
-        """Discard all images except images of the given topics.
+        """Discard the images of all streams, except frozen images and those of the given topics.
 
         Called when the source seeks to another time.
+
+        Args:
+            topics: Keys of the topics whose images remain visible until their next image arrives.
         """
         with self.lock:
             self._times += 1
@@ -274,7 +277,7 @@ class Images:
                 self._arrived.notify()
 
     def set_look(self, stream: ImageStream, look: PictureLook) -> None:
-        """Set a stream's style; see `ImageStream.set_look`."""
+        """Set a stream's style; see `ImageStream.set_style`."""
         with self.lock:
             if stream.look == look:
                 return

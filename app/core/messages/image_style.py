@@ -38,7 +38,7 @@ class PictureLook:
     high: float | None = None
 
     def to_json(self) -> dict[str, object]:
-        """Return the style as JSON data for a layout; `parse_look` parses it."""
+        """Return the style as JSON data for a layout; `parse_style` parses it."""
         return {
             "brightness": self.brightness,
             "contrast": self.contrast,
@@ -52,7 +52,7 @@ PLAIN = PictureLook()
 
 
 def parse_look(saved: object) -> PictureLook:
-    """Parse the result of `PictureLook.to_json`; invalid values become defaults."""
+    """Parse the result of `PictureStyle.to_json`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
     saved_numbers = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
@@ -109,7 +109,8 @@ def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[
         numbers: Array (rows, columns).
 
     Returns:
-        Array (rows, columns, 4) of blue, green, red and 255, black for NaN; and the colour scale.
+        Array (rows, columns, 4) of blue, green, red and 255, black for NaN and infinity; and the colour
+        scale.
     """
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
@@ -142,6 +143,8 @@ def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> 
 
 def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
     """Scale values linearly to the range 0 (``low`` and below) to 255 (``high`` and above).
+
+    The result is 0 everywhere if ``high`` is not greater than ``low``.
 
     Args:
         frame: Values.

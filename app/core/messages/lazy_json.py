@@ -50,7 +50,8 @@ class UnreadableValue:
 class JsonIndex:
     """Positions of the brackets, commas and colons of one JSON text.
 
-    Raises ValueError for unbalanced brackets.
+    Raises ValueError for unbalanced brackets, an unterminated string, a text that isn't an object or
+    array, and more than `MAX_DEPTH` nested levels. Other errors become `UnreadableValue`.
     """
 
     def __init__(self, data: memoryview) -> None:

@@ -17,7 +17,7 @@ class NewestJobWorker(Generic[Job, Result]):
     """
 
     def __init__(self, process_job: Callable[[Job], Result], name: str) -> None:
-        # `work` is called in the thread and must not raise.
+        # `process_job` is called in the thread and must not raise.
         self._process_job, self._name = process_job, name
         self._wake = threading.Condition()
         self._waiting: list[Job] = []  # at most one

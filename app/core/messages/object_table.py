@@ -34,8 +34,9 @@ class ObjectRow:
     """Row of a table.
 
     Attributes:
-        index: Index of the row.
+        index: Index of the object in its array, or in the query result.
         name: Index as text, or the path of the object in the message.
+        value: The object.
     """
 
     index: int
@@ -58,7 +59,7 @@ def is_list(value: object) -> bool:
 
 
 def is_list_of_objects(value: object) -> bool:
-    """Return True if a value is an array whose first elements are non-empty objects."""
+    """Return True if a value is an array whose first five elements are objects, not all of them empty."""
     if not is_list(value) or not len(value):  # type: ignore[arg-type]
         return False
     first = list(islice(value, 5))  # type: ignore[call-overload]
@@ -68,7 +69,8 @@ def is_list_of_objects(value: object) -> bool:
 def lists_of_objects(value: object, max_paths: int = MAX_LISTS) -> list[Steps]:
     """Return the paths of the arrays of objects in a message, outermost first.
 
-    The path ``()`` is the message itself. At most ``max_paths`` paths are returned.
+    The path ``()`` is the message itself. Arrays inside of other arrays are not found. At most
+    ``max_paths`` paths are returned; the search stops after `_MAX_SEARCHED_VALUES` values.
     """
     paths: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])

@@ -129,7 +129,8 @@ def reuse_picture(
 ) -> Picture | None:
     """Return the shown image for a new message without decoding, if both messages contain equal bytes.
 
-    Returns None if the bytes differ, or if another size or style is requested (see `decode`).
+    Returns None if no image or the image of this very message is shown, if the bytes differ, or if
+    another size or style is requested (see `decode`).
     """
     if (
         displayed is None
@@ -171,7 +172,7 @@ def encode_png(message: Message) -> bytes:
     """Return the image of a message in full resolution as the content of a PNG file.
 
     A message in PNG format is returned unchanged, without trailing data. Raises NepError if the message
-    is not an image, OSError if encoding fails.
+    is not an image or its values are not integers of 8 or 16 bits, OSError if encoding fails.
     """
     import cv2  # noqa: PLC0415  slow import
 

@@ -62,7 +62,10 @@ class QueryResult:
 
 
 class JsonQuery:
-    """Parsed query. Usable in any thread, but not in several threads at the same time."""
+    """Parsed query. Usable in any thread, but not in several threads at the same time.
+
+    Raises `QueryError` if the text isn't a valid query or is too long.
+    """
 
     def __init__(self, text: str) -> None:
         # Raises `QueryError` with the reason and its position.

@@ -37,8 +37,8 @@ def folder(settings: Settings | None = None) -> Path:
 def save(message: Message, target_folder: Path | None = None) -> Path:
     """Save the image of a message to a new file, named by topic and time; return its path.
 
-    Never overwrites a file. Raises NepError if the message is not an image, OSError if the file can't
-    be written.
+    Never overwrites a file. Raises NepError if the message is not an image or can't be stored as PNG,
+    OSError if the file can't be written or 999 files with this name exist.
 
     Args:
         message: Message with an image.

@@ -56,7 +56,7 @@ class DecodeChecker:
         clock: Callable[[], float] = time.monotonic,
         cpu_clock: Callable[[], float] = time.thread_time,
     ) -> None:
-        # `clock` is monotonic seconds; `work` is the CPU time of the calling thread in seconds.
+        # `clock` is monotonic seconds; `cpu_clock` is the CPU time of the calling thread in seconds.
         self._clock, self._cpu_clock = clock, cpu_clock
         self._lock = threading.Lock()
         self._results: dict[str, CheckResult] = {}

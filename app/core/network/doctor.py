@@ -28,14 +28,15 @@ class Doctor:
         diagnose: Callable[[str, doctor.ProgressCallback], Sequence[doctor.Finding]],
         clock: Callable[[], float] = time.time,
     ) -> None:
-        # `look` gets the missed topic and a progress callback (findings so far, checks done, checks in all).
+        # `diagnose` gets the expected topic and a progress callback (findings so far, checks done, checks in
+        # all).
         self._diagnose, self._clock = diagnose, clock
         self._thread: threading.Thread | None = None
         self._missed = self._checked_topic = ""
         self._findings: tuple[doctor.Finding, ...] = ()
         self._so_far: tuple[doctor.Finding, ...] | None = None
         self.looked_at = self.things = 0
-        """Number of checks done in the current or last run; ``things`` is the total number of checks."""
+        """Number of checks done in the current or last run; `total_checks` is the total number of checks."""
         self._looked_s: float | None = None
         self.revision = 0
 
@@ -61,16 +62,16 @@ class Doctor:
 
     @property
     def expected_topic(self) -> str:
-        """Topic on which the user misses messages; "" if none is selected."""
+        """Topic on which the user expects messages that don't arrive; "" if none is selected."""
         return self._missed
 
     @property
     def checked_topic(self) -> str:
-        """Topic on which the user missed messages in the run that produced `findings`; "" if none."""
+        """Value of `expected_topic` in the run that produced `findings`; "" if none was selected."""
         return self._checked_topic
 
     def expect_topic(self, topic: str) -> None:
-        """Set the topic on which the user misses messages ("" for none), and run the checks."""
+        """Set the topic on which the user expects messages ("" for none), and run the checks."""
         self._missed = topic
         self.start()
 
@@ -83,7 +84,7 @@ class Doctor:
         self.revision += 1
 
     def report(self, within_s: float) -> str:
-        """Return the findings as text for a report. Thread-safe.
+        """Return the findings of the last completed run as text for a report. Thread-safe.
 
         Args:
             within_s: Maximum time in seconds to wait for a run in progress.
@@ -94,7 +95,7 @@ class Doctor:
         return doctor.report_text(self._findings)
 
     def close(self) -> None:
-        """Wait for a run in progress."""
+        """Wait at most `JOIN_TIMEOUT_S` for a run in progress."""
         if self._thread is not None:
             self._thread.join(JOIN_TIMEOUT_S)
 

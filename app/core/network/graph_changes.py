@@ -24,8 +24,9 @@ MAX_NAMED = 3
 def change_messages(before: GraphView, after: GraphView) -> list[str]:
     """Return sentences about the differences between two graphs.
 
-    There is one sentence for each new node with its topics, each new topic of a known node, and each
-    node that left.
+    There is one sentence for each new node without topics or with more than `MAX_LISTED_TOPICS` new
+    ones, each other new topic, and each node that left. More than `MAX_LINES` sentences of one kind are
+    summarized in one.
     """
     join_messages: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []

@@ -119,7 +119,7 @@ class MasterStarter:
             self.ensure()
 
     def close(self) -> None:
-        """Wait for a start in progress."""
+        """Wait at most `JOIN_TIMEOUT_S` for a start in progress."""
         if self._thread is not None:
             self._thread.join(timeout=JOIN_TIMEOUT_S)
 

@@ -89,7 +89,7 @@ class Nodes:
         return self._nodes.get(id)
 
     def set_stale(self, stale: bool) -> None:
-        """Set ``stale`` of all nodes.
+        """Set `NodeEntry.is_stale` of all nodes. A change discards their CPU load.
 
         Args:
             stale: True while the network can't be queried.

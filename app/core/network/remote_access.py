@@ -48,7 +48,8 @@ class RemoteAccess:
         request_listen: Callable[[Sequence[str], str], None] = listen,
         local_addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
-        # `ask` sends the request to the master at `address`; `here` returns this computer's addresses.
+        # `request_listen` sends the request to the master at `address`; `local_addresses` returns this
+        # computer's addresses.
         self._address, self._settings, self._alerts = address, settings, alerts
         self._post_event, self._request_listen, self._local_addresses = (
             post_event,
@@ -110,7 +111,11 @@ class RemoteAccess:
             self._alerts.resolve(NOT_KEPT)
 
     def update_graph(self, view: GraphView) -> None:
-        """Apply a new graph. The saved addresses are sent to a new master."""
+        """Apply a new graph.
+
+        The saved addresses are sent to a new master on this computer that doesn't listen on all of
+        them.
+        """
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
@@ -135,7 +140,7 @@ class RemoteAccess:
         )
 
     def close(self) -> None:
-        """Wait for the request thread."""
+        """Wait at most three seconds for the request thread."""
         if self._asking is not None:
             self._asking.join(3.0)
 

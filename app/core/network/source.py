@@ -101,7 +101,7 @@ class Source(Protocol):
     address: str
 
     def start(self) -> None:
-        """Start to deliver messages to the sinks, and events to the callback."""
+        """Start delivering messages to the sinks and events to the callback."""
 
     def watch(self, topic: str) -> None:
         """Subscribe to ``topic`` as soon as it exists."""

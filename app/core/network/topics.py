@@ -121,8 +121,8 @@ class Topics:
     """All topics, in order of their first appearance. Not thread-safe; use it from the main thread."""
 
     def __init__(self, own_process: tuple[str, int] | None = None, network: str = "") -> None:
-        # `own` is (host, process id) of the watching process: a topic with no other subscriber counts as
-        # vanished.
+        # `own_process` is (host, process id) of the watching process: a topic with no other subscriber
+        # counts as vanished.
         self._network = network
         self._own_process = own_process if own_process is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
@@ -224,7 +224,7 @@ class Topics:
                 self._mark_vanished(topic, now)
 
     def set_stale(self, stale: bool) -> None:
-        """Set ``stale`` of all topics.
+        """Set `Topic.is_stale` of all topics. Topics that become stale lose their rates.
 
         Args:
             stale: True while the network can't be queried.
@@ -331,10 +331,11 @@ class Topics:
             topic.is_watched = False
 
     def set_stats(self, stats: Mapping[str, tuple[float | None, int | None]]) -> None:
-        """Set the statistics reported for each topic.
+        """Set the statistics reported for each topic. Unknown topics are ignored.
 
         Args:
-            stats: Messages per second and time of the newest message (ns since 1970), by topic.
+            stats: Messages per second and time of the newest message (ns since 1970), by topic; None
+                for an unknown value.
         """
         for name, (rate_hz, newest_ns) in stats.items():
             topic = self._topics.get(name)
@@ -345,7 +346,7 @@ class Topics:
         self.values_revision += 1
 
     def reset(self) -> None:
-        """Discard the newest messages and their times. Called when a replay seeks."""
+        """Discard the newest messages, their times and the history of rates. Called when a replay seeks."""
         for topic in self._topics.values():
             topic.newest = topic.previous = None
             topic.last_stamp_ns = topic.last_received_s = topic.age_s = None

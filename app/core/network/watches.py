@@ -29,7 +29,8 @@ class WatchHandle(Suspendable, Protocol):
 class Watch:
     """Watch of one or several topics.
 
-    The topics are subscribed to until `close`. Usable as a context manager.
+    The topics are subscribed to until `close`, except while the watch is suspended. Usable as a context
+    manager.
     """
 
     def __init__(self, topics: Iterable[str], watches: Watches) -> None:
@@ -113,7 +114,7 @@ class Watches:
                 self._end(topic)
 
     def release(self, topics: Iterable[str]) -> None:
-        """Release the topics of a watch that was closed while suspended. Called by `Watch`."""
+        """Release the topics of a closed watch, after `deactivate`. Called by `Watch`."""
         for topic in topics:
             self._open_counts[topic] -= 1
             if self._open_counts[topic] == 0:

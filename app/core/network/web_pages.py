@@ -46,7 +46,7 @@ class RunningServer(Protocol):
 
     @property
     def rejections(self) -> tuple[context.Rejection, ...]:
-        """Rejected connections, oldest first."""
+        """Rejected connections and commands, oldest first."""
 
     def set_access(self, access: access.Access) -> int:
         """Set the allowed origins and the token; return the number of pages that this disconnects."""
@@ -99,6 +99,7 @@ class WebServerStarted:
         number: Number of the start, which identifies results of outdated starts.
         server: Running server; None if the start failed.
         message: Reason for the failure, or "".
+        free_port: Unused port if the requested port is in use, else 0.
     """
 
     number: int
@@ -227,7 +228,10 @@ class WebPages:
 
     @property
     def is_port_taken(self) -> bool:
-        """True if the last start failed because another program uses the port."""
+        """True if the last start failed because the port is in use, and another port is free.
+
+        `use_free_port` uses the other port.
+        """
         return self.free_port > 0
 
     # ---- switches
@@ -257,7 +261,10 @@ class WebPages:
         self._run_in_thread(lambda: ended.close() if ended is not None else None)
 
     def use_free_port(self) -> None:
-        """Start the server on an unused port, after a start failed because the port was in use."""
+        """Start the server on an unused port with the protocols of the failed start.
+
+        Has no effect unless `is_port_taken` is True.
+        """
         if self.free_port:
             self.port, self.protocols = self.free_port, self._failed
             self._start_server()
@@ -287,7 +294,7 @@ class WebPages:
         return self.set_token(access.new_token())
 
     def set_token(self, token: str) -> int:
-        """Set the required token; return the number of pages that are disconnected by the change."""
+        """Set the required token ("" for none); return the number of pages that this disconnects."""
         self.token = token
         return self._apply_settings()
 

@@ -39,12 +39,12 @@ class PageNode:
 
 @dataclass(frozen=True, slots=True)
 class WebNotice:
-    """Notice about a rejected connection or a slow page, with a button.
+    """Notice about a rejected connection or a slow page.
 
     Attributes:
         key: Identifier of the problem, equal for all notices about the same problem.
-        next_step: Action of the button.
-        value: Argument of the action: an origin, a robot or a page.
+        next_step: Action of the button; "" for a notice without a button.
+        value: Argument of the action: an origin, a robot or the id of a page; "" if it has none.
     """
 
     key: tuple[str, ...]
@@ -93,7 +93,10 @@ def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
 
 
 def page_name(page: ConnectedPage) -> str:
-    """Return the display name of a page: its title, or for a program without a title, the library in use."""
+    """Return the display name of a page.
+
+    This is its title, or else the library in use, the origin, or the name of its node.
+    """
     is_named = page.title and page.title != page.name
     return page.title if is_named else page.client or page.origin or page.name
 
@@ -137,9 +140,9 @@ def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
 
 
 def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
-    """Return the notices to show, newest first.
+    """Return the notices to show: rejected connections, newest first, then slow pages.
 
-    Notices are about slow pages, and about rejected connections that are still not allowed.
+    A connection that has been allowed since has no notice.
 
     Args:
         web: Web server of Studio.

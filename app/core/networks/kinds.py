@@ -42,7 +42,7 @@ class NetworkKind:
     def checked(self, address: str) -> str:
         """Validate an address and return it in the form that the back end expects.
 
-        Raises `NepError` if it is invalid.
+        A blank address becomes `default_address`. Raises `NepError` if the address is invalid.
         """
         return find_backend(self.name).master(address.strip() or self.default_address)
 

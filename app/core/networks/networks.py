@@ -160,7 +160,7 @@ class Networks:
         return iter(self._networks.values())
 
     def get(self, name: str) -> OtherNetwork | None:
-        """Return the network of this kind; None for the native one."""
+        """Return the network of this kind; None for "" (the native network) and unknown kinds."""
         return self._networks.get(name)
 
     @property
@@ -288,7 +288,7 @@ class Networks:
         )
 
     def add(self, key: str, batch: Batch, now: float) -> None:
-        """Add messages received on a watched topic."""
+        """Add messages received on a watched topic. Messages of other topics are discarded."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None or not network.is_selected or topic not in self._watched[name]:
@@ -298,7 +298,7 @@ class Networks:
         network.unread.pop(topic, None)
 
     def watch(self, key: str) -> None:
-        """Watch a topic."""
+        """Watch the topic with this key (see `key_of`). Keys of native topics are ignored."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None:
@@ -311,7 +311,7 @@ class Networks:
             network.source.watch(topic)
 
     def unwatch(self, key: str) -> None:
-        """Stop watching a topic."""
+        """Stop watching the topic with this key. Keys of native topics are ignored."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None:

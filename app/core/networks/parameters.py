@@ -136,7 +136,7 @@ class NodeParameters:
         self._applied_message: Message | None = None
 
     def show(self, node: NodeEntry | None) -> None:
-        """Show the parameters of a node; None to show no node."""
+        """Show the parameters of a node. None, or a node that declares no parameters, shows nothing."""
         displayed = node if node is not None and node.has_parameters else None
         if displayed is self.node:
             return
@@ -242,9 +242,10 @@ def read_only_reason(node: NodeEntry, parameter: ReportedParameter) -> str:
 
 
 def parse_parameters(state: object) -> tuple[ReportedParameter, ...]:
-    """Parse and validate a parameter message. Raises `NepError` if the message is malformed.
+    """Parse and validate a parameter message. Raises `NepError` if it contains no list of parameters.
 
-    Validation is necessary, because any node can publish on a parameter topic.
+    Validation is necessary, because any node can publish on a parameter topic. Elements that aren't
+    objects and elements beyond `MAX_PARAMETERS` are ignored; of equal names, the last one is used.
     """
     entries = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(entries, list):

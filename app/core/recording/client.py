@@ -41,7 +41,7 @@ class RecorderEvent:
     """Event sent by a recorder process.
 
     Attributes:
-        process: Id of the process (PID).
+        process: Number of the process, counted by `RecorderClient` (not the PID).
         content: Content of the event, as described in `nep.recordings.child`.
     """
 
@@ -54,8 +54,9 @@ class RecorderExited:
     """Event: a recorder process has ended or could not be started.
 
     Attributes:
-        process: Id of the process (PID).
-        detail: Last output of the process, or the reason why it could not be started.
+        process: Number of the process, counted by `RecorderClient` (not the PID).
+        detail: Last line of the output of the process, or the reason why it could not be started; may be
+            empty.
     """
 
     process: int
@@ -264,8 +265,8 @@ class RecorderClient:
             topics: Topics or patterns to record; empty for all topics.
             left_out: Patterns of topics that are not recorded.
             note: Note stored in the file.
-            seconds: Maximum duration.
-            most_bytes: Maximum size.
+            seconds: Maximum duration in seconds; None for no limit.
+            most_bytes: Maximum size of the file in bytes; None for no limit.
         """
         if self.state.phase:
             return False
@@ -295,7 +296,7 @@ class RecorderClient:
             self._send(op="stop")
 
     def add_bookmark(self, text: str) -> None:
-        """Add a bookmark with this text to the recording."""
+        """Add a bookmark with this text to the recording. Has no effect unless the recorder is recording."""
         if self.state.phase == "recording":
             self._send(op="note", text=text)
 
@@ -305,7 +306,7 @@ class RecorderClient:
         Args:
             role: Channel of the event: "runs" or "alarms".
             value: JSON content of the event.
-            to: "recording" or "ring" to add the event only there.
+            to: "recording" or "ring" to add the event only there; "" for both.
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
         if self._process is not None and is_heard:

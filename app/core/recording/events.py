@@ -28,7 +28,7 @@ class SendEvent(Protocol):
         Args:
             role: Channel of the event: "runs" or "alarms".
             value: JSON content of the event.
-            to: "recording" or "ring" to add the event only there.
+            to: "recording" or "ring" to add the event only there; "" for both.
         """
 
 

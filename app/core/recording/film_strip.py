@@ -87,7 +87,10 @@ class FilmStripPreview:
 def film_strip(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
 ) -> FilmStripPreview | None:
-    """Read the preview of a recording; return None if the recording can't be read.
+    """Read the preview of a recording.
+
+    Returns None if the recording can't be read within the budget, or has no messages or too many
+    topics.
 
     Args:
         path: File of the recording.

@@ -82,7 +82,11 @@ class FolderScan:
 
 
 def default_folder() -> Path:
-    """Return the default folder of recordings."""
+    """Return the default folder of recordings.
+
+    This is ``Recordings`` (translated) in the documents folder of the user, or in ``$NEP_STUDIO_HOME``
+    if that is set.
+    """
     home = os.environ.get("NEP_STUDIO_HOME")
     return Path(home or platformdirs.user_documents_dir()) / _("Recordings")
 
@@ -169,13 +173,13 @@ class RecordingFolder:
 
 
 def read_info(file_info: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
-    """Return the facts of a recording with the fields that are read from the file.
+    """Return the description of a recording, with the values that are read from the file.
 
     If reading fails, `problem` contains the reason; if the file is too large to scan, `scan_problem`
     does.
 
     Args:
-        file_info: Facts from the file system.
+        file_info: Path, size and time of the file.
         opener: Opener of recordings.
     """
     try:

@@ -195,7 +195,8 @@ class SessionRecordings:
     def set_ring_settings(self, ring_settings: RingSettings) -> None:
         """Set and save the settings of the flight recorder.
 
-        A change of the topic selection restarts the flight recorder and discards its content.
+        A change of the topics, the duration or the size restarts the flight recorder and discards its
+        content.
         """
         self.wish = ring_settings
         self._save_setting(RING_KEY, ring_settings_to_json(ring_settings))
@@ -266,7 +267,7 @@ class SessionRecordings:
         self._apply_ring_settings()
 
     def check(self) -> None:
-        """Restart a recorder process that ended unexpectedly, and repeat active events.
+        """Restart the flight recorder if its process ended unexpectedly, and repeat active events.
 
         Called once a second. Active runs and alarms are sent to the flight recorder again, see
         `RecordedEvents.resend`.

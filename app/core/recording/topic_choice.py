@@ -51,11 +51,13 @@ class RecordingChoice:
     def expected_end(
         self, elapsed_s: float, size_bytes: float, speed: float | None
     ) -> tuple[float, float] | None:
-        """Return the expected duration (s) and size (bytes) of the finished recording; None if unknown.
+        """Return the expected duration (s) and size (bytes) of the finished recording.
+
+        Returns None if the recording has no limit, or if `speed` is unknown.
 
         Args:
             elapsed_s: Current duration in seconds.
-            size_bytes: Current size.
+            size_bytes: Current size in bytes.
             speed: Current data rate in bytes per second, or None.
         """
         limits_s = [] if self.max_minutes is None else [60.0 * self.max_minutes]
@@ -68,7 +70,7 @@ class RecordingChoice:
 
     @property
     def selection(self) -> recorder.TopicSelection:
-        """Selection as expected by the recorder. Raises `BadTopicError` for an invalid topic."""
+        """Selection as expected by the recorder. Raises `BadTopicError` for an invalid topic or pattern."""
         if self.mode == "chosen":
             return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
@@ -179,10 +181,12 @@ def _is_within(value: object, minimum: float, maximum: float) -> bool:
 
 
 def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Parse patterns such as "/arm/* *action* not /arm/raw".
+    """Parse patterns such as "/arm/* *action* not /arm/raw", separated by spaces or commas.
+
+    The word "not", or its translation, excludes the topics of the pattern directly after it.
 
     Returns:
-        Patterns of topics to record, and patterns after "not", whose topics are excluded.
+        Patterns of topics to record, and patterns of topics to exclude.
     """
     included: list[str] = []
     unwanted: list[str] = []

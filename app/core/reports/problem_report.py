@@ -174,7 +174,7 @@ class ReportWriter:
         return not self._thread.is_alive()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the report is written; return False on timeout (in seconds)."""
+        """Wait until the report is written or writing has failed; return False on timeout (in seconds)."""
         self._thread.join(timeout_s)
         return self.is_done
 

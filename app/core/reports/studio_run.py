@@ -108,7 +108,7 @@ class StudioRun:
         self.finish()
 
     def left(self) -> list[Crash]:
-        """Return the crashes of earlier runs.
+        """Return the crashes of earlier runs, and delete the files of these runs.
 
         If several instances call this, each crash is returned only once. Runs that ended because the
         computer restarted or because Studio was asked to exit are not crashes.

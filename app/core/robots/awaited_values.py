@@ -17,7 +17,8 @@ def awaited_values(
 ) -> tuple[str, ...]:
     """Return the values of an event field that blocks wait for, followed by the default of the field.
 
-    At most `MAX_VALUES` unique values are returned.
+    The values also include texts that blocks compare with a text sensor of the robot. At most
+    `MAX_VALUES` unique values are returned.
 
     Args:
         workspaces: Workspaces of the open behaviours, the current one first.

@@ -20,7 +20,10 @@ class CommandPublishers:
         self._submit = submit
 
     def open(self, link: RobotLink) -> None:
-        """Open the publishers for a robot's command and world topics, unless already requested."""
+        """Open the publishers for a robot's command and world topics.
+
+        Does nothing if they are open or being opened.
+        """
         topics = link.robot.topics
         if link.publisher is not None or link.is_opening:
             return
@@ -40,7 +43,7 @@ class CommandPublishers:
         self._submit(_failure_text(_("Can't connect to {robot}: {error}"), link), open_job)
 
     def close_outdated(self, link: RobotLink) -> None:
-        """Close the publishers for topics that are no longer in the robot's description."""
+        """Close the publishers of a robot whose description now names other topics."""
         old = [publisher for publisher in (link.publisher, link.world_publisher) if publisher is not None]
         link.publisher = link.world_publisher = None
 

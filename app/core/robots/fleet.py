@@ -97,7 +97,7 @@ class Fleet:
 
     @property
     def links(self) -> Sequence[RobotLink]:
-        """All robots found since the start, including disconnected ones."""
+        """All known robots in order of discovery, including disconnected ones until they are evicted."""
         return tuple(self._links.values())
 
     @property
@@ -120,7 +120,7 @@ class Fleet:
         return False if self._has_graph else None
 
     def link(self, name: str) -> RobotLink | None:
-        """Return the robot with this name, or None."""
+        """Return the robot with this name, even if it is disconnected; None if the name is unknown."""
         return self._links.get(name)
 
     @property
@@ -148,7 +148,7 @@ class Fleet:
         """Subscribe to the sensors of a robot; return the watch, which must be closed.
 
         Raises:
-            RobotUnknownError: No robot has this name.
+            UnknownRobotError: No robot has this name.
         """
         return self._watches.open(topics_of(self._get_link(name).robot))
 
@@ -161,7 +161,7 @@ class Fleet:
             input: Input of the action.
 
         Raises:
-            RobotUnknownError: No robot has this name.
+            UnknownRobotError: No robot has this name.
             RobotInputError: The robot lacks the action or rejects the input; contains a message for
                 each invalid value.
             MayNotMoveError: The user is asked to allow the motion. If the user allows it, the action is
@@ -194,17 +194,25 @@ class Fleet:
             return  # the robot changed or disconnected meanwhile, which its panel shows
 
     def cancel(self, name: str, action: str) -> None:
-        """Cancel the last invocation of an action, if it is still running."""
+        """Cancel the last invocation of an action, if it is still running.
+
+        Raises:
+            UnknownRobotError: No robot has this name.
+        """
         self._tries.cancel(self._get_link(name), action)
 
     def change_world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot, for example touch its head, move the ball or say a word.
 
-        If Studio doesn't know that the robot is virtual, the user must allow the change like a motion.
+        If Studio doesn't know that the robot is virtual, the user must allow the change like a motion. The
+        change is discarded while no publisher for the world topic is open.
 
         Args:
             name: Name of the robot.
             change: Message for the world topic.
+
+        Raises:
+            UnknownRobotError: No robot has this name.
         """
         link = self._get_link(name)
         actions = [action.name for action in link.robot.actions]
@@ -352,7 +360,10 @@ class Fleet:
 
     @property
     def claims(self) -> Mapping[str, Claim]:
-        """Rejected announcements of programs, by id."""
+        """Problems with announcements, by topic, see `Announcements.claims`.
+
+        Robots that use topics of other robots are included.
+        """
         return {**self._announcements.claims, **self._foreign_claims}
 
     def take_notices(self) -> tuple[str, ...]:
@@ -361,7 +372,7 @@ class Fleet:
         return notes
 
     def close(self) -> None:
-        """Stop the heartbeat and close the command publishers."""
+        """Record the connected robots as known, stop the heartbeat, and close the command publishers."""
         self.known.record([link.robot for link in self.connected])
         self._heartbeat.close()
         for link in self._links.values():

@@ -185,10 +185,10 @@ class Health:
         )
 
     def program(self, fate: ExecutableState) -> None:
-        """Raise or resolve the alert that Studio's installation was replaced or removed.
+        """Raise or resolve the alert that Studio's executable file was replaced or removed.
 
         Args:
-            fate: State of the installation.
+            fate: State of the file, see `OwnProgram.executable_state`.
         """
         if fate == "replaced":
             self._alerts.raise_alert(
@@ -210,7 +210,7 @@ class Health:
             self._alerts.resolve(INSTALLATION_ALERT)
 
     def update_graph_alerts(self, view: GraphView) -> None:
-        """Raise alerts for problems that the master reports.
+        """Raise alerts for problems that the master reports, and resolve those that it no longer reports.
 
         These are duplicate names, conflicting types and ports in use.
         """
@@ -306,7 +306,7 @@ class Health:
         self._claims = set(claims)
 
     def update_unreachable(self, problems: Mapping[str, str]) -> None:
-        """Raise alerts for robots that a Stop can't reach.
+        """Raise alerts for robots that a Stop can't reach, and resolve those of all other robots.
 
         Args:
             problems: Reason for each of these robots, by name.

@@ -1,6 +1,6 @@
-"""Health of one robot as a list of facts: connection, battery, sensors, Stop.
+"""Health of one robot as a list of items: connection, battery, sensors, Stop.
 
-The status of a fact tells if it needs attention. Unknown values are listed as unknown.
+The status of an item tells if it needs attention. Unknown values are listed as unknown.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FormatAge = Callable[[float], str]
 
 @dataclass(frozen=True, slots=True)
 class HealthItem:
-    """One fact about a robot.
+    """One item of a robot's health, such as the battery.
 
     Attributes:
         title: One of the constants of this module, to be translated with `nep.i18n`.
@@ -47,12 +47,12 @@ class HealthItem:
 
     @property
     def needs_attention(self) -> bool:
-        """True if the fact needs attention."""
+        """True if the status is "warn" or "error"."""
         return self.status in ("warn", "error")
 
 
 def health_items(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) -> tuple[HealthItem, ...]:
-    """Return all facts about a robot; those that need attention come first.
+    """Return the health of a robot; items that need attention come first.
 
     Args:
         link: State of the robot.

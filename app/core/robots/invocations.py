@@ -64,7 +64,7 @@ class ManualInvocations:
         return invocation
 
     def cancel(self, link: RobotLink, action: str) -> None:
-        """Cancel the invocation of an action if it is still running."""
+        """Cancel the invocation of an action if it is still running. Robots of RIZE don't support this."""
         invocation = link.invocations.get(action)
         if invocation is not None and invocation.is_running:
             self._send_cancel(link, invocation)
@@ -100,7 +100,10 @@ class ManualInvocations:
             invocation.execution_start_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
-        """Cancel invocations that exceed their time limit or whose robot doesn't respond; they failed."""
+        """Cancel invocations that exceed their time limit or whose robot doesn't respond.
+
+        Their final state is "failed".
+        """
         now = self._clock()
         for link in links:
             for invocation in link.running_invocations:

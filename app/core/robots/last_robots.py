@@ -40,7 +40,10 @@ class LastRobots:
         self._settings.set(COME_BACK, is_enabled)
 
     def start(self, launcher: RobotStarter) -> None:
-        """Start the robots of the last session. Returns immediately; starting a robot does not move it."""
+        """Start the robots of the last session if `is_restart_enabled` is set.
+
+        At most `MAX_ROBOTS` robots are started. Returns immediately; starting a robot does not move it.
+        """
         if not self.is_restart_enabled:
             return
         models_by_name: Mapping[str, object] = self._settings.get(KEPT, {})

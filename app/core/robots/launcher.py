@@ -57,7 +57,10 @@ class LaunchFailed:
     """Event: a process could not be started, or exited unexpectedly.
 
     Attributes:
+        name: Name of the virtual robot, or "master".
+        message: Problem in one sentence.
         detail: Last lines of the output, or the reason why the process could not be started.
+        is_robot: False for the master.
     """
 
     name: str
@@ -120,7 +123,7 @@ class Launcher:
         clock: Callable[[], float] = time.monotonic,
         start: StartProcess = start_process,
     ) -> None:
-        # `is_there` returns whether a robot is listed, from any instance, or None while unknown.
+        # `is_listed` returns whether a robot is listed, from any instance, or None while unknown.
         self._address = address
         self._is_listed = is_listed
         self._clock = clock
@@ -179,10 +182,9 @@ class Launcher:
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Request the start of a virtual robot, unless a robot with this name is listed.
 
-        Robots started by other Studios count as well. The request is valid for some seconds;
-        `start_requested_robots`
-        starts the robot as soon as the graph shows that no such robot is listed, or immediately if this
-        Studio started the master.
+        Robots started by other Studios count as well. The request is valid for some seconds.
+        `start_requested_robots` starts the robot as soon as the graph shows that no such robot is
+        listed, or immediately if this Studio started the master.
         """
         now = self._clock()
         self.wanted[name] = model
@@ -191,7 +193,7 @@ class Launcher:
         self.start_requested_robots()
 
     def start_requested_robots(self) -> None:
-        """Start the requested robots that are not listed. Called at each tick of the session."""
+        """Start the requested robots that are not listed; discard expired requests. Called at each tick."""
         if not self._requests:
             return
         now = self._clock()
@@ -234,7 +236,7 @@ class Launcher:
             self.ended -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
-        """Restart a virtual robot. A process that doesn't respond is killed."""
+        """Restart a virtual robot. The process that this Studio started, if any, is killed."""
         self.wanted[name] = model
         self._requests.pop(name, None)
         with self._lock:

@@ -74,7 +74,7 @@ class Invocation:
 
     @property
     def is_running(self) -> bool:
-        """True until the robot reports the end of the action."""
+        """True until the invocation has a final state: the robot reports the end, or the invocation fails."""
         return self.state not in FINAL_STATES
 
     @property
@@ -91,22 +91,26 @@ class RobotLink:
         values: Newest value of each sensor while the sensor is watched.
         past_invocations: Last manual invocations, newest last.
         is_unresponsive: True if the robot did not reply to a command.
-        last_contact_s: Time of the last reply of the robot or of the last command to it, whichever is later.
+        last_contact_s: Time of the last reply of the robot or of the last command to it, whichever is
+            later.
         last_reply_s: Time of the last reply; None before the first reply.
         gone_s: Time of the disconnection; None while connected.
+        last_stop: Result of the last Stop as a sentence, or None.
         stop_problem: Reason why the last Stop is not confirmed, such as "Arm may still move: the brake
             does not answer"; "" if it is confirmed.
         unended_actions: Message of the robot about actions that it could not end, or "".
-        motion_warning: Reason why the robot may be moving although it doesn't reply (`MovedRobots`), or "".
+        motion_warning: Reason why the robot may be moving although it doesn't reply (`MovedRobots`), or
+            "".
         has_confirmed_stop: True if the robot's program has ever confirmed a Stop.
         pending_stop_start_s: Time of a Stop that the robot has not replied to, or None.
         is_stopping: True if such a Stop takes long enough to be shown.
         is_reachable: True if a Stop sent now would reach the robot.
-        identity: Program of the robot.
+        identity: Program of the robot; None for a robot of RIZE.
         earlier_topics: Topics of the robot's earlier descriptions.
+        is_opening: True while the publishers are being opened.
         rejected: Number of messages that the robot's driver rejected.
         errors: Number of exceptions that the robot's driver caught.
-        was_real: True if the robot was not virtual at any time.
+        was_real: True if the robot's program has ever described the robot as real.
     """
 
     name: str

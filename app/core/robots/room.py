@@ -64,13 +64,15 @@ class SessionRoom:
     # -- commands of the user -------------------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float, robots: Mapping[str, tuple[float, float, float]]) -> bool:
-        """Move an object, limited by the walls; return False if a robot is in the way.
+        """Move an object, limited by the walls; return True if its position has changed.
+
+        Nothing is moved if a robot is in the way.
 
         Args:
             name: Name of the object.
-            x: New position.
-            y: New position.
-            robots: Position and radius (x, y, radius) of each robot, by name.
+            x: New x coordinate in metres.
+            y: New y coordinate in metres.
+            robots: Position and radius (x, y, radius) of each robot in metres, by name.
         """
         moved = self.room.with_moved(name, x, y).thing(name)
         for pose in robots.values():
@@ -79,12 +81,12 @@ class SessionRoom:
         return self._publish() if self._map.move(name, x, y) else False
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add an object; return its name, or None if the maximum number is reached.
+        """Add an object; return its name, or None if there are too many objects of this kind.
 
         Args:
             kind: Kind of the object.
-            x: Position.
-            y: Position.
+            x: x coordinate in metres.
+            y: y coordinate in metres.
         """
         name = self._map.add(kind, x, y)
         self._publish()

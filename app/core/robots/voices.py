@@ -63,7 +63,8 @@ class Speaker(Protocol):
         """Play tones, even while a voice is speaking.
 
         Args:
-            notes: Tones.
+            notes: Frequency in Hz and duration in seconds of each tone; an empty sequence stops the
+                tones.
             volume: Volume, 0 to 1.
         """
 
@@ -136,7 +137,7 @@ class RobotVoices:
         log: Callable[[str, str, str], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # `tell` writes to the Console: level, origin, sentence.
+        # `log` writes to the Console: level, origin, sentence.
         self._settings, self._fleet, self._watch, self._log = settings, fleet, watch, log
         self._clock = clock
         self.speaker: Speaker | None = None
@@ -166,7 +167,10 @@ class RobotVoices:
 
     @property
     def problem(self) -> str:
-        """Reason why robots are not audible, or ""."""
+        """Reason why robots are not audible, or "".
+
+        "" also before the first attempt to play a sound, and without a speaker.
+        """
         return self.speaker.problem if self.speaker is not None else ""
 
     @property

@@ -18,9 +18,9 @@ MAX_TEXT_LENGTH = 2_000
 
 
 class OutputReader:
-    """Iterator over the lines of a pipe. Limits the rate, so that the window remains responsive.
+    """Iterator over the lines of a pipe that may belong to the protocol. Other output is only counted.
 
-    A process that writes faster blocks.
+    The rate is limited, so that the window remains responsive. A process that writes faster blocks.
     """
 
     def __init__(
@@ -116,5 +116,5 @@ def parse_texts(value: object) -> tuple[str, ...]:
 
 
 def text_of(fields: Mapping[str, object], name: str) -> str:
-    """Return a field as a string, shortened for display."""
+    """Return a field as a string, shortened for display; "" if the field is missing."""
     return str(fields.get(name, ""))[:MAX_TEXT_LENGTH]

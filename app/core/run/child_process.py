@@ -67,7 +67,7 @@ class ChildProcess:
         return self.popen.poll() is not None
 
     def check(self) -> None:
-        """Search for new child processes, and kill the process if it uses too much memory."""
+        """Search for new child processes, and kill all processes if together they use too much memory."""
         if self._process is None:
             return
         if self._clock() >= self._next_family_s:
@@ -112,7 +112,7 @@ def child_command() -> tuple[str, ...]:
 
 
 def home() -> Path | None:
-    """Return the folder that contains ``app``; None in a frozen build."""
+    """Return the folder that contains the package ``app``; None in a frozen build."""
     return None if getattr(sys, "frozen", False) else Path(__file__).resolve().parents[3]
 
 

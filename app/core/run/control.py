@@ -186,7 +186,8 @@ class Runs:
     def run(self) -> None:
         """Run the current behaviour. A paused program is resumed, a running program is restarted.
 
-        Errors that prevent the start are shown on their blocks.
+        Errors that prevent the start are shown on their blocks. The second click of a double-click is
+        ignored.
         """
         run = self._run
         if run.state == "paused":
@@ -200,7 +201,10 @@ class Runs:
             self._request_run(replace(self._current_request, starts_paused=False))
 
     def try_stack(self, stack: Stack) -> None:
-        """Stop a running program, and run one stack of the current behaviour."""
+        """Stop a running program, and run one stack of the current behaviour.
+
+        A stack that is only a variable isn't run: its value in the current or last run is shown.
+        """
         variable = stack.variable_id(self._documents.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
@@ -252,7 +256,15 @@ class Runs:
             self._runner.set_pace(seconds)
 
     def set_variable(self, id: str, value: str | float | bool) -> bool:
-        """Set a variable of the running program; return False if the program has no such variable."""
+        """Set a variable of the running program.
+
+        Args:
+            id: Id of the variable.
+            value: New value.
+
+        Returns:
+            False if no program is running or paused, or if the program doesn't use the variable.
+        """
         variable = self._variables.get(id)
         if self._runner is None or not self.active or variable is None or not variable.python:
             return False
@@ -323,7 +335,7 @@ class Runs:
             self._robots.update()
 
     def confirm_stopped(self) -> None:
-        """Record that the robots without a reply are not moving, according to the user."""
+        """Record that the user has confirmed that the robots without a reply are not moving."""
         if self._run.state == "unanswered" and self._run.report is not None:
             silent = self._run.report.unconfirmed_names
             self._fleet.confirm_stopped(silent)

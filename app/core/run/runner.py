@@ -62,16 +62,19 @@ class RunnerEvent:
         kind: Kind of event.
         run: Id of the run.
         blocks: Ids of the running blocks (running), of the blocks before which the program is paused,
-            the next one first (paused), or of the failed blocks (error).
-        description: Description of the running block, or of the next block (paused).
-        text: Printed line; warning (paused); error message (error); reason for a failure (ended);
-            question (ask).
-        is_ok: True if the program ended without a failed block.
-        unresponsive_robots: Names of robots that did not reply to the Stop that the program sent at its end.
-        values: Variables that have changed.
-        count: Number of occurrences of a warning.
-        question: Number of a question; 0 withdraws the open question.
-        choices: Possible answers to a question; empty if any answer is allowed.
+            the next one first (paused), or of the block that failed or caused the warning (error,
+            warning).
+        description: Description of the running block (running), or of the next block (paused).
+        text: Printed line (print); message (error); warning (warning, paused); reason for a failure
+            (ended); question (ask).
+        is_ok: True if the program ended without a failed block (ended).
+        elapsed_s: Duration of the run in seconds (ended).
+        unresponsive_robots: Names of robots that did not reply to the Stop that the program sent at its
+            end (ended).
+        values: Variables that have changed (variables).
+        count: Number of occurrences (warning).
+        question: Number of the question; 0 withdraws the open question (ask).
+        choices: Possible answers; empty if any answer is allowed (ask).
     """
 
     kind: EventKind
@@ -139,7 +142,7 @@ class Runner:
         pace_s: float = 0.0,
         owners: Mapping[str, str] | None = None,
     ) -> None:
-        """Start the program. Raises RunnerError if the process can't be started.
+        """Start the program.
 
         Args:
             program: Compiled program.
@@ -150,6 +153,9 @@ class Runner:
             pace_s: Delay before each block in seconds.
             owners: Node ids of the robots' programs, by the robot's name. Messages of other nodes are
                 ignored.
+
+        Raises:
+            RunnerError: The process can't be started, or this runner has already started a program.
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))

@@ -57,7 +57,7 @@ class Trial:
         return self._request.label(program)
 
     def parse_line(self, line: str) -> str | None:
-        """Return the value in a printed line as formatted text; None if the tried block has no value."""
+        """Format and store the value in a printed line; return None if no value block is being tried."""
         request = self._request
         if request is None or request.stack is None or not request.has_value:
             return None
@@ -66,5 +66,11 @@ class Trial:
         return text
 
     def show(self, document: Document, stack: Stack, words: str) -> None:
-        """Set the formatted value of a tried stack."""
+        """Set the value of a tried block.
+
+        Args:
+            document: Behaviour of the block.
+            stack: Stack that was tried.
+            words: Formatted value.
+        """
         self.value = TriedValue(document, stack.id, words, next(self._tries))

@@ -29,12 +29,12 @@ class StepReport:
     """Report of one step. Times are in milliseconds since the start of the process.
 
     Attributes:
-        description: Expectation.
+        description: Expected result, as a sentence.
         timeout_s: Time limit in seconds.
         start_ms: Start of the step.
         duration_ms: Duration; None while the step is in progress.
         is_ok: True if the step succeeded.
-        details: Details of the result.
+        details: Details of the result, or the reason for the failure.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Report:
             return newest if newest is not None and newest.duration_ms is None else None
 
     def add_computer_info(self, **info: object) -> None:
-        """Add facts about this computer."""
+        """Add information about this computer."""
         with self._lock:
             self._system_info.update(info)
 

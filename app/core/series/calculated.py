@@ -29,7 +29,7 @@ class CalculatedSamples:
         self._next = self._inputs[0].begun  # absolute index in the first input
 
     def advance(self) -> None:
-        """Calculate all samples for which the inputs are available."""
+        """Calculate the samples for which all inputs are available, at most `BATCH_SIZE` per call."""
         base = self._inputs[0]
         changed = [
             each.earliest_change_s(revision)
@@ -125,7 +125,8 @@ class ExpressionCurve(CalculatedSamples):
 def held_values(samples: Samples, times: Floats) -> Floats:
     """Return the newest value at each of the given times.
 
-    The result is NaN before the first sample, in a gap, and long after the last sample.
+    The result is NaN before the first sample, in a gap, and if the newest sample is much older than the
+    usual interval between samples.
     """
     if not len(samples):
         return np.full(len(times), np.nan)

@@ -38,8 +38,8 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
 
     Args:
         curves: Curves to export.
-        begin_s: Start of the range.
-        end_s: End of the range.
+        begin_s: Start of the range in seconds, inclusive.
+        end_s: End of the range in seconds, inclusive.
     """
     columns = []
     for curve in curves:

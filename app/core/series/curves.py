@@ -39,7 +39,7 @@ class Curve:
     """Curve of a plot.
 
     Attributes:
-        text: Expression as typed by the user.
+        text: Expression of the source, which is unique within the plot.
         source: Source of the samples.
         samples: Numbers over time.
         series: Series of the field; None for a calculated curve.
@@ -103,18 +103,18 @@ class Curves:
     # -- commands of the user ----------------------------------------------------------------------
 
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
-        """Add and return the curves for a typed expression.
+        """Add and return the curves for a typed expression, except for curves that are already plotted.
 
-        A path with ``[*]`` adds a curve for each array element. If the expression is invalid, nothing
-        is added. A field that does not exist is no error, because fields are known only after the first
-        message of a topic.
+        A path with ``[*]`` adds a curve for each array element. A field that does not exist is no
+        error, because fields are known only after the first message of a topic.
 
         Args:
             text: Expression that the user typed.
             also: Names of topics that are valid although they don't exist at the moment.
 
         Raises:
-            CurveError: The expression is invalid; the message says how to fix it.
+            CurveError: The expression is invalid, its array is empty, or there are too many curves.
+                Nothing is added; the message says how to fix it.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
@@ -124,7 +124,13 @@ class Curves:
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
-        """Add and return the curves of a field, even if its topic doesn't exist."""
+        """Add and return the curves of a field, even if its topic doesn't exist.
+
+        Curves that are already plotted are left out.
+
+        Raises:
+            CurveError: The array of a path with ``[*]`` is empty, or there are too many curves.
+        """
         paths = path.expanded(self.payload_of(topic)) if path.has_wildcard else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
@@ -133,7 +139,10 @@ class Curves:
 
         Args:
             sources: Sources of the curves.
-            text: Expression that the user typed.
+            text: Expression that the user typed, for error messages.
+
+        Raises:
+            CurveError: There are no sources, or too many curves.
         """
         existing = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in existing]

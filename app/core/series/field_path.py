@@ -122,8 +122,9 @@ class FieldPath:
     def expanded(self, payload: object) -> list[FieldPath]:
         """Return the paths in which each `ALL` is replaced with the indices of the array in a message.
 
-        A path without `ALL` is returned unchanged. At most 65 paths are returned, one more than the
-        maximum number of curves in a plot, so that the caller can detect that there are too many.
+        A path without `ALL` is returned as the only one. At most 65 paths are returned, one more than
+        the maximum number of curves in a plot, so that the caller can detect that there are too many.
+        The list is empty if there is no array.
         """
         if not self.has_wildcard:
             return [self]
@@ -183,7 +184,8 @@ class PlottableField:
 def fields_of(payload: object, max_fields: int = MAX_FIELDS) -> Iterator[PlottableField]:
     """Yield the plottable values of a message, outermost first.
 
-    The first elements of an array are included, and ``[*]`` for all its elements.
+    The first four elements of an array are included, and ``[*]`` for all elements of an array of
+    numbers.
 
     Args:
         payload: Decoded message.
@@ -227,9 +229,9 @@ def kind_of_value(value: object) -> FieldKind | None:
 
 
 def complete(text: str, candidates: Sequence[str]) -> str:
-    """Complete a text up to the next dot, bracket or slash that all matching entries of ``candidates`` share.
+    """Complete a text as far as all matching candidates agree, up to the next dot, bracket or slash.
 
-    Returns ``text`` unchanged if no entry starts with it.
+    Returns ``text`` unchanged if no candidate starts with it.
     """
     matching = [candidate for candidate in candidates if candidate.startswith(text)]
     if not matching:

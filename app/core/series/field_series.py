@@ -53,7 +53,7 @@ class FieldSeries:
 
         Args:
             times_s: Time of each message in seconds.
-            payloads: Decoded messages.
+            payloads: Decoded messages; `UNREADABLE` for a message that can't be decoded.
             gaps: True for each message before which messages are missing.
         """
         find = self.path.value_in
@@ -113,7 +113,7 @@ class TopicSeries:
         lost: Number of messages that did not arrive.
         unread: Number of messages that can't be decoded or are too large.
         unplaced: Number of messages with an invalid time stamp.
-        payload: Payload of the newest message.
+        payload: Payload of the newest decoded message; `MISSING` before the first one.
     """
 
     def __init__(self, topic: str, origin_ns: int) -> None:

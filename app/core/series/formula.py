@@ -107,13 +107,17 @@ Source = FieldSource | WindowSource | ExpressionSource
 
 
 def parse_field(text: str, topics: Sequence[str]) -> FieldSource | None:
-    """Parse an expression that is a single field; return None if it is a formula.
-
-    Raises `CurveError` if the text consists of a topic and an invalid path.
+    """Parse an expression that is a single field.
 
     Args:
         text: Text that the user typed.
         topics: Names of the existing topics.
+
+    Returns:
+        The field; None if the text is a formula or doesn't start with an existing topic.
+
+    Raises:
+        CurveError: The text is a topic without a field, or with an invalid path.
     """
     topic = _topic_at(text, topics)
     if topic is None:

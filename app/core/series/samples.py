@@ -51,6 +51,7 @@ class Polyline:
     Attributes:
         times: Times in seconds.
         values: Values, NaN at gaps.
+        points: Number of samples in the range.
         is_complete: True if the polyline contains all samples of the range.
     """
 
@@ -145,8 +146,9 @@ class Samples:
     Absolute indices count evicted samples too.
 
     Attributes:
-        begun: Number of evicted samples. When ``limit`` is reached, the oldest quarter is evicted.
-        undone: Number of samples that were removed because a clock was set back.
+        evicted_count: Number of evicted samples. When ``limit`` is reached, the oldest quarter is
+            evicted.
+        removed_count: Number of samples that were removed because a clock was set back.
     """
 
     def __init__(self, limit: int = MAX_SAMPLES) -> None:
@@ -202,7 +204,10 @@ class Samples:
         self._gap_pending = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
-        """Append samples in order of arrival. Samples that aren't finite become gaps.
+        """Add samples in order of arrival. Samples that aren't finite become gaps.
+
+        A sample up to `MAX_LATENESS_S` older than the newest one is inserted in order. A still older
+        one means that the clock was set back: the samples after it are removed first.
 
         Args:
             times: Times in seconds.
@@ -232,7 +237,7 @@ class Samples:
         self._evict_old()
 
     def add(self, time_s: float, value: float, *, gap: bool = False) -> None:
-        """Append one sample.
+        """Add one sample, as `extend` does.
 
         Args:
             time_s: Time in seconds.

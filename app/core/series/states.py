@@ -15,7 +15,7 @@ MAX_STATE_LENGTH = 200
 
 @dataclass(frozen=True, slots=True)
 class StateRun:
-    """Run of equal values from ``begin_s`` to ``end_s``.
+    """Run of equal values from `start_s` to `end_s`, in seconds.
 
     Attributes:
         value: Value; None if it is unknown.
@@ -42,7 +42,8 @@ class States:
     def add(self, time_s: float, value: str | None, *, gap: bool = False) -> None:
         """Add a value.
 
-        Slightly late values are ignored; a very late value means that the clock was set back.
+        A value up to `MAX_LATENESS_S` older than the newest one is ignored. A still older one means
+        that the clock was set back: the runs that begin after it are removed first.
 
         Args:
             time_s: Time in seconds.
@@ -85,11 +86,13 @@ class States:
     def runs(
         self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
     ) -> Iterator[StateRun]:
-        """Yield the runs in a time range, oldest first. The newest run ends with the last message.
+        """Yield the runs that overlap a time range, oldest first.
+
+        The newest run ends with the last message.
 
         Args:
-            begin_s: Start of the range.
-            end_s: End of the range.
+            begin_s: Start of the range in seconds.
+            end_s: End of the range in seconds.
             step_s: Time resolution; one run in each interval of this length is sufficient.
             without: Values to skip. If given, runs with unknown values are skipped too.
         """

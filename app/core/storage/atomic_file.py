@@ -28,12 +28,15 @@ _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     """Return the content of a regular file.
 
-    Raises OSError if the path is not a regular file, with the reason in ``strerror``. Never blocks on a
-    pipe, a device, a folder, or a link to one of these.
+    Never blocks on a pipe, a device, a folder, or a link to one of these.
 
     Args:
         path: Path of the file.
-        most_bytes: Maximum size; OSError is raised for a larger file.
+        most_bytes: Maximum size in bytes.
+
+    Raises:
+        OSError: The file can't be read, is not a regular file or is too large; ``strerror`` is the
+            reason.
     """
     # Without NONBLOCK, opening a pipe waits for its writer forever.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -62,8 +65,6 @@ def write_atomically(
 ) -> None:
     """Replace the content of a file. Readers see the old or the new content, never a part of it.
 
-    If OSError is raised, the old file is unchanged.
-
     Args:
         path: Path of the file; its folder is created if necessary.
         data: Content, or an iterable of its parts, so that a large file need not fit into memory. An
@@ -71,6 +72,10 @@ def write_atomically(
         durable: True to flush the data to disk before the old file is replaced, so that the old or the
             new content survives a power failure. If False, it survives only a crash of this process.
         private: True to make the file, and a folder that is created, accessible only to their owner.
+
+    Raises:
+        OSError: The file can't be written. The old file is unchanged.
+        ValueError: ``data`` is empty bytes.
     """
     if isinstance(data, bytes) and not data:
         raise ValueError("an empty file is never written over a full one")

@@ -112,10 +112,9 @@ class FileLock:
 def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
     """Return a context manager that holds the lock file ``<name>.lock`` of a file.
 
-    The value of the context manager is True if the lock was acquired.
-
-    If locks aren't possible (a network disk, a read-only folder), the body runs without a lock. A lock
-    is released immediately if its process crashes.
+    The value of the context manager is True if the lock was acquired. Otherwise the body runs without a
+    lock: after the timeout, or because locks aren't possible (a network disk, a read-only folder). A
+    lock is released immediately if its process crashes.
 
     Args:
         path: File to lock.

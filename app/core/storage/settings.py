@@ -144,7 +144,10 @@ class Settings:
         self._values: dict[str, object] = self._read()
 
     def get(self, key: str, default: T) -> T:
-        """Return the value of a key, or ``default`` if the value is missing or has another type."""
+        """Return the value of a key, or ``default`` if the value is missing or has another type.
+
+        With the default None, a value of any type is returned.
+        """
         value = self._values.get(key, default)
         if default is None or isinstance(value, type(default)):
             return value  # type: ignore[return-value]  # checked on the line above

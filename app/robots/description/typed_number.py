@@ -1,6 +1,6 @@
 """Parsing of numbers typed by the user: comma and point are both decimal separators.
 
-``editor/src/typed_number.ts`` implements the same rules for number fields of blocks;
+``app/blocks/editor/src/typed_number.ts`` implements the same rules for number fields of blocks;
 ``tests/data/typed_numbers.json`` contains test cases for both.
 """
 
@@ -35,8 +35,8 @@ class TypedNumberError(ValueError):
 def parse_number(text: str) -> float:
     """Parse a number typed by the user.
 
-    Thousands separators are rejected instead of removed: "1.234" may mean 1234 or 1.234, and it can't be
-    undone if a robot moves a thousand times too far.
+    A single comma or point is the decimal separator. Thousands separators, as in "1.234,5", are
+    rejected instead of removed, because it can't be undone if a robot moves a thousand times too far.
 
     Raises:
         TypedNumberError: The text is not a finite number.

@@ -99,7 +99,7 @@ def without_control_characters(document: Mapping[str, object]) -> dict[str, obje
 
 
 def _json_problem(value: object, counter: Iterator[int], path: str = "", depth: int = 0) -> str | None:
-    # Also rejects `$ref`, unusable numbers, and more than `MAX_VALUES` values, counted by `seen`.
+    # Also rejects `$ref`, unusable numbers, and more than `MAX_VALUES` values, counted by `counter`.
     if next(counter) > MAX_VALUES or depth > _MAX_DEPTH:
         if depth > _MAX_DEPTH:
             return _("{place} is nested too deeply").format(place=path)

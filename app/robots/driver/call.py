@@ -116,12 +116,12 @@ class Link(Protocol):
         """
 
     def subscriber_count(self, leaf: str) -> int:
-        """Return the number of subscribers of a sensor's topic.
+        """Return the number of subscribers of a topic of the robot; 0 if the topic isn't open.
 
         Use this method to skip expensive work while there are no subscribers.
 
         Args:
-            leaf: Name of the sensor.
+            leaf: Last level of the topic, such as the name of a sensor.
         """
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
@@ -148,7 +148,11 @@ class Link(Protocol):
     def run(self, awaitable: Awaitable[object]) -> object:
         """Run an awaitable in the robot's event loop and wait for the result.
 
-        The robot's ``async def`` actions run in the same event loop.
+        The robot's ``async def`` actions run in the same event loop. Exceptions of the awaitable are
+        raised.
+
+        Raises:
+            RuntimeError: Called in an ``async def`` action, whose event loop would be blocked.
         """
 
 
@@ -223,7 +227,7 @@ class Call:
             RuntimeError: Called in an ``async def`` action, whose event loop would be blocked.
         """
         if _is_in_event_loop():
-            raise RuntimeError("call.wait holds an async function up; use `await asyncio.sleep` there")
+            raise RuntimeError("call.wait blocks the event loop; use `await asyncio.sleep` there")
         if self.clock.wait(self._ended, seconds):
             raise Canceled
 

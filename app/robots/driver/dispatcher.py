@@ -86,10 +86,10 @@ class Dispatcher:
         return threading.current_thread() is self._thread
 
     def call(self, function: Callable[[], object]) -> None:
-        """Call a function in the thread; exceptions are counted and logged instead of raised.
+        """Call a function in the current thread; its exceptions are counted and logged instead of raised.
 
-        MemoryError, and exceptions such as SystemExit that aren't subclasses of Exception, end the loop,
-        which is restarted.
+        To be used in the dispatcher's thread. MemoryError, and exceptions such as SystemExit that
+        aren't subclasses of Exception, end the loop, which is restarted.
         """
         try:
             function()

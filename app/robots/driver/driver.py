@@ -43,8 +43,8 @@ _log = logging.getLogger(__name__)
 class Driver:
     """Driver of one robot, and the implementation of `Link`. Thread-safe.
 
-    Closing the driver closes its publishers and subscribers, but not the node, which belongs to the caller.
-    Usable as a context manager.
+    Closing the driver closes its publishers and subscribers, but not the node, which belongs to the
+    caller. Usable as a context manager.
 
     Args:
         kind: Kind of the robot.
@@ -53,7 +53,7 @@ class Driver:
         clock: Clock, replaceable in tests.
 
     Raises:
-        DescriptionError: The description is too large.
+        DescriptionError: The name is invalid, or the description is too large.
     """
 
     def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: Clock | None = None) -> None:
@@ -158,7 +158,7 @@ class Driver:
             try:
                 self._resolve(close(), within_s=_CLOSE_TIMEOUT_S)
             except Exception:  # noqa: BLE001 - the rest must be closed in any case
-                _log.warning("%s: its close broke off", self.name, exc_info=True)
+                _log.warning("%s: close() raised an exception", self.name, exc_info=True)
         self._loop.close()
         self._loop = EventLoop(self.name)
         with self._lock:
@@ -356,7 +356,7 @@ class EventLoop:
         self._call_soon(loop.stop)
         thread.join(_JOIN_TIMEOUT_S)
         if thread.is_alive():
-            _log.warning("%s: an async function holds the event loop up; it was left behind", self._name)
+            _log.warning("%s: an async function blocks the event loop; its thread was abandoned", self._name)
 
     def _running_loop(self, awaitable: Awaitable[object]) -> asyncio.AbstractEventLoop:
         with self._lock:
@@ -428,7 +428,7 @@ def _run_loop(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) ->
             try:
                 loop.run_forever()
             except BaseException:  # noqa: BLE001 - e.g. SystemExit of a driver's task; an async stop needs the loop
-                _log.error("a coroutine ended the event loop; it goes on", exc_info=True)
+                _log.error("a coroutine ended the event loop; restarting the event loop", exc_info=True)
         remaining = asyncio.all_tasks(loop)
         for task in remaining:
             task.cancel()

@@ -92,7 +92,8 @@ def run(
         name: Name of the robot.
         ended: Event that ends the driver.
         master: Address of the master; default as for `nep.node`.
-        owner_pid: Process id of the owner; None for no owner.
+        owner_pid: Process id of the owner; None for no owner. If the owner has already exited, nothing
+            is run.
     """
     owner = _owner_process(owner_pid)
     if owner_pid is not None and owner is None:

@@ -107,11 +107,14 @@ class MessageQueue:
         self._count = self._bytes = 0
 
     def put(self, message: Message, use: Callable[[object], object]) -> bool:
-        """Queue a message; return False if the message is too large.
+        """Queue a message, or reject it because it is too large or the queue is full.
 
         Args:
             message: Message.
             use: Called with the payload in the decoding thread.
+
+        Returns:
+            False if the message is too large. True also for a message that doesn't fit in the queue.
         """
         size = message.size_bytes
         if size > self.max_message_bytes:

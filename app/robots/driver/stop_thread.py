@@ -106,7 +106,7 @@ class StopThread:
         except Failed as failed:
             reason = bounded_str(failed, MAX_ERROR_LENGTH)
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
-            _log.warning("%s: its stop broke off", self._name, exc_info=True)
+            _log.warning("%s: stop() raised an exception", self._name, exc_info=True)
             reason = _("the stop command failed: {error}").format(error=bounded_str(failed, MAX_ERROR_LENGTH))
         else:
             return None

@@ -105,7 +105,8 @@ class Task:
         """Cancel the running function.
 
         Args:
-            how: Final reply, unless an earlier call has set one; the result of the function is ignored.
+            how: Final reply, unless an earlier call has set one. It replaces the function's result, but
+                not its error.
         """
         self.final_reply = self.final_reply or how
         if self.call is not None:

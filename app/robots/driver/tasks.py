@@ -199,9 +199,10 @@ class Tasks:
         """Stop the robot immediately, end all tasks and increment `epoch`. Thread-safe; does not block.
 
         Args:
-            on_reply: Called in the thread of the tasks when the robot stands still and every function has
-                ended. Functions that don't end within STOP_ANSWER_S are named in the reply, and no task is
-                accepted until they have ended. None for no reply.
+            on_reply: Called in the thread of the tasks when the robot stands still and every function
+                has ended. Functions that don't end within `STOP_REPLY_TIMEOUT_S` (or the robot's
+                ``within_s``, if longer) are named in the reply, and no task is accepted until they have
+                ended. Not called if too many stops are pending. None for no reply.
             reason: Reason in the replies to the tasks.
         """
         with self._lock:
@@ -238,7 +239,8 @@ class Tasks:
         """Run a task as soon as its resources are free.
 
         If resources are in use, the task waits, is rejected, or replaces other tasks, according to its
-        `on_busy`.
+        `on_busy`. It isn't run if the robot is stopping or was stopped after the command was received,
+        or if too many tasks are running or waiting.
         """
         if task.epoch is not None and task.epoch < self._epoch:
             self._send_reply(task.finish, _stopped_reply())
@@ -504,7 +506,7 @@ class Tasks:
         except Failed as failed:
             return TaskReply("failed", error=bounded_str(failed, MAX_ERROR_LENGTH))
         except BaseException as error:  # noqa: BLE001 - also SystemExit: a task must always be answered
-            _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
+            _log.warning("%s: %s raised an exception", self._name, task.action, exc_info=True)
             return TaskReply("failed", error=self._failure_message(task, error))
         return TaskReply("succeeded", output=output if isinstance(output, Mapping) else {})
 

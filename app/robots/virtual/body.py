@@ -62,8 +62,8 @@ class Speech:
         """Return a speech whose duration depends on the length of the text.
 
         Args:
-            text: Text.
-            speed_percent: Speed relative to normal speech.
+            text: Text to speak.
+            speed_percent: Speed in percent of normal speech; a higher speed shortens the duration.
         """
         return cls(text, max(_MIN_SPEECH_S, len(text) * _SECONDS_PER_CHARACTER) * 100.0 / speed_percent)
 
@@ -117,20 +117,20 @@ class Body:
     # ---- commands ---------------------------------------------------------------------------
 
     def walk(self, distance: float, speed: float) -> Motion:
-        """Start driving straight.
+        """Start driving straight; a current movement of the base ends as blocked.
 
         Args:
             distance: Distance in m; negative to drive backwards.
-            speed: Speed in m/s.
+            speed: Maximum speed in m/s.
         """
         return self._start(Motion.walk(distance, speed), turning=False)
 
     def turn(self, angle_deg: float, speed_deg: float) -> Motion:
-        """Start turning on the spot.
+        """Start turning on the spot; a current movement of the base ends as blocked.
 
         Args:
             angle_deg: Angle in degrees, positive to the left.
-            speed_deg: Turning speed in °/s.
+            speed_deg: Maximum turning speed in °/s.
         """
         return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
 
@@ -141,7 +141,12 @@ class Body:
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
-        """Start speaking a text; a current speech or sound ends."""
+        """Start speaking a text; a current speech or sound ends.
+
+        Args:
+            text: Text to speak.
+            speed_percent: Speed in percent of normal speech.
+        """
         self.stop_audio()
         self._speech = Speech.from_text(text, speed_percent)
         return self._speech
@@ -228,12 +233,12 @@ class Body:
 
     @property
     def spoken_fraction(self) -> float:
-        """Spoken fraction of the text, 0 to 1."""
+        """Spoken fraction of the text, 0 to 1; 0 if nothing is being spoken."""
         return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.duration_s)
 
     @property
     def is_rolling(self) -> bool:
-        """True while the base moves."""
+        """True until the current movement of the base ends, also while it is paused by lifting the robot."""
         return self._base_motion is not None and not self._base_motion.done
 
     @property

@@ -33,7 +33,10 @@ class Neighbours:
         self._published_s = -math.inf
 
     def receive(self, message: Mapping[str, object]) -> None:
-        """Process a position message; invalid messages and messages of this robot are ignored."""
+        """Process a position message.
+
+        Invalid messages, messages of this robot, and new robots beyond `MAX_NEIGHBOURS` are ignored.
+        """
         other = _parse_position(message)
         if other is None or other.name == self._name:
             return

@@ -226,7 +226,10 @@ class Room:
         )
 
     def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
-        """Return the free position of a disc nearest to a point, or the point itself if there is none."""
+        """Return the free position of a disc nearest to a point.
+
+        The point is limited to the room, and returned if there is no free position.
+        """
         x, y = self.clamped_position(x, y, radius)
         for ring in range(60):
             for step in range(1 if ring == 0 else 16):
@@ -272,7 +275,7 @@ class Room:
         The position is limited to the room. A marker near a wall is attached to the wall.
 
         Args:
-            name: Name of the object.
+            name: Name or kind of the object, see `Room.thing`.
             x: New x coordinate in metres.
             y: New y coordinate in metres.
         """

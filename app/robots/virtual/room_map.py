@@ -101,7 +101,10 @@ class RoomMap:
         return changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add an object and return its name; None if there are too many objects of this kind."""
+        """Add an object at a position in m, limited to the room, and return its name.
+
+        Returns None if the kind is unknown or if there are too many objects of this kind.
+        """
         existing = {each.name for each in self._entries.values() if not each.gone}
         free = [name for name in _names(kind) if name not in existing]
         if not free:
@@ -140,7 +143,8 @@ class RoomMap:
         """Merge newer entries of another participant's map; return True if the map has changed.
 
         Args:
-            message: Payload created by `RoomMap.message`; invalid entries are ignored.
+            message: Payload created by `RoomMap.message`. Invalid entries, entries that change the kind
+                of an object, and new objects beyond `MAX_OBJECTS` are ignored.
         """
         raw_entries = message.get("things")
         changed = False

@@ -166,6 +166,8 @@ class Simulation:
     def capture(self, *, publish: bool) -> None:
         """Render an image, detect objects, and publish the detections.
 
+        The last image is reused if nothing has moved since.
+
         Args:
             publish: True to publish the image too.
         """

@@ -22,7 +22,7 @@ class BlocklyBridge(QObject):
     """Object that the page accesses as ``bridge``: the page calls the slots, and the signals notify the view.
 
     Args:
-        begin: Returns the settings for `beginning`.
+        initial_settings: Returns the settings for the slot `initial_settings`.
     """
 
     told = Signal(str, str)  # to the page: a command and its JSON
@@ -49,7 +49,7 @@ class BlocklyBridge(QObject):
     # picture of the dragged blocks: a PNG as `data:` URL, and its device pixels per page pixel
     drag_picture_rendered = Signal(str, float)
     blocks_dropped_outside = Signal(int, int)  # position where the blocks were dropped outside the page
-    # number of blocks brought into this tab, "moved", "copied" or "added", and key of their former tab
+    # number of blocks transferred to this tab, "moved", "copied" or "added", and key of their former tab
     blocks_transferred = Signal(int, str, str)
     backpack_requested = Signal(str)  # backpack operation as JSON (`backpack.ts`)
 

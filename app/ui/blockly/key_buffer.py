@@ -28,9 +28,9 @@ class KeyBuffer:
             self._buffered_events = []
 
     def buffer_event(self, event: QEvent) -> bool:
-        """Buffer a key press and return True; return False for other events and while buffering is off.
+        """Buffer a key press or release and return True; return False for other events.
 
-        A click or the loss of focus sends the buffered keys.
+        Also returns False while buffering is off. A click or the loss of focus sends the buffered keys.
         """
         if self._buffered_events is None:
             return False

@@ -14,7 +14,8 @@ class Tab:
     Attributes:
         key: Key of the behaviour.
         program: Latest workspace.
-        generation: Number that changes when the program is replaced, for the detection of outdated edits.
+        generation: Number that changes when the program is replaced, to detect outdated edits.
+        is_loaded: True if the page has loaded the tab.
         states: Newest payload of each state of the blocks, such as highlights, by name of the command.
     """
 

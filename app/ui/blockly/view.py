@@ -57,7 +57,7 @@ class BlocklyView(BlocklyHost):
     # position where blocks were dropped outside the page; without `move_dragged_blocks` they return to
     # their place
     blocks_dropped_outside = Signal(QPoint)
-    # number of blocks brought into the shown tab, "moved", "copied" or "added", and key of their former tab
+    # number of blocks transferred to the shown tab, "moved", "copied" or "added", and key of their former tab
     blocks_transferred = Signal(int, str, str)
     backpack_requested = Signal(str)  # backpack operation as JSON: `BackpackController`
 

@@ -46,7 +46,7 @@ class ShowToast(Protocol):
         *,
         until: Callable[[], bool] | None = None,
     ) -> None:
-        # Shows `words`, such as "Copied robots.Pepper.pose.y", and a `button` that calls `run`. The toast
+        # Shows `text`, such as "Copied robots.Pepper.pose.y", and a `button` that calls `run`. The toast
         # closes early once `until` returns True.
         ...
 
@@ -89,7 +89,7 @@ class Blocker:
     Attributes:
         message: Sentence that states the reason.
         fix: Instruction for the user, or "".
-        button: Text of the button, such as "Resume".
+        button: Text of the button, such as "Resume"; "" for no button.
         run: Called when the button is clicked.
     """
 
@@ -100,7 +100,7 @@ class Blocker:
 
 
 def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
-    """Return the reason for a paused panel.
+    """Return the blocker for a panel that is paused.
 
     Args:
         panel: Title of the panel.
@@ -115,7 +115,7 @@ def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
 
 
 def filter_blocker(panel: str, text: str, clear: Callable[[], object]) -> Blocker:
-    """Return the reason for a panel whose filter hides data.
+    """Return the blocker for a panel whose filter hides data.
 
     Args:
         panel: Title of the panel.
@@ -211,7 +211,7 @@ class PanelWidget(QWidget):
         self.setAccessibleName(self.title())
 
     def subtitle(self) -> str:
-        """Return the topic shown; empty for panels that don't show a single topic."""
+        """Return the text next to the title: usually the topic shown; "" for none."""
         return self._subtitle
 
     def header_widgets(self) -> Sequence[QWidget]:

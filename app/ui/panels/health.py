@@ -63,7 +63,7 @@ class HealthRow(QWidget):
         self._text_layout.setSpacing(10 if is_wide else 0)
 
     def show_fact(self, item: HealthItem) -> None:
-        """Show the icon, title and text of a fact."""
+        """Show the icon, title and text of an item of a robot's health."""
         if item == self.fact:
             return
         self.fact = item

@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 
 
 class OneRobotPanel(PanelWidget):
-    """Base class of panels that show one robot: the selected one, else the first.
+    """Base class of panels that show one robot at a time, by default `Fleet.current`.
 
     A robot that disconnects stays visible until another one is available. Subclasses implement
-    `fleet_changed`, which is called when robots connect, disconnect or are selected, `show_robot`, which is
-    called before another robot is shown, and `refresh_robot`, which is called on every refresh.
+    `fleet_changed`, called when robots connect, disconnect or are selected; `show_robot`, called to
+    build the widgets for another robot or after `rebuild_key` changed; and `refresh_robot`, called on
+    every refresh.
     """
 
     def __init__(self, context: PanelContext, title: str) -> None:
@@ -68,13 +69,18 @@ class OneRobotPanel(PanelWidget):
         return link.name
 
     def fleet_changed(self) -> None:
-        """Handle that robots connected, disconnected or were selected."""
+        """Update the panel after robots connected, disconnected or were selected; does nothing by default."""
 
     def show_robot(self, link: RobotLink) -> None:
         """Build the widgets for a robot."""
 
     def refresh_robot(self, link: RobotLink | None) -> None:
-        """Update the panel to the current state of the robot; None before the first robot connects."""
+        """Update the panel to the current state of the robot.
+
+        Args:
+            link: Robot shown, which may be disconnected; None if no robot was shown yet or it is
+                unknown now.
+        """
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)

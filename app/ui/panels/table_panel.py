@@ -33,6 +33,8 @@ class TableTexts:
         filter: Placeholder of the filter, such as "Filter topics".
         no_matches: Title of the empty state if no row matches the filter.
         clear_filter_hint: Text of the empty state if no row matches the filter.
+        not_recorded: Title of the empty state while a recording is open; "" for the same empty state
+            as for the live network.
     """
 
     title: str
@@ -44,7 +46,9 @@ class TableTexts:
 
 
 class TablePanel(PanelWidget, Generic[Row]):
-    """Panel with one table. Subclasses implement `make_model`, `make_table`, `rebuild` and `open_row`.
+    """Panel with one table.
+
+    Subclasses implement `make_model`, `make_table`, `rebuild`, `open_row` and `update_empty_state`.
 
     Attributes:
         pages: Stack of the table and the empty state; `show_table` selects the page.
@@ -181,7 +185,7 @@ class TablePanel(PanelWidget, Generic[Row]):
 
 
 class DoctorLine(QWidget):
-    """Line with the question "Expected to see something?" and a link to the connection doctor."""
+    """Line with the question "Is something missing?" and a link to the connection doctor."""
 
     def __init__(self, theme: Theme, on_click: Callable[[], object]) -> None:
         super().__init__()

@@ -43,7 +43,7 @@ class VariableRow:
 
     Attributes:
         variable: Variable of the row.
-        value: Current value; None before the first run.
+        value: Value of the variable, also in the row of an item; None before the first run.
         is_expanded: True if the list is expanded.
         item: Number of the item, counted from 1; 0 for the variable itself.
         is_new: True for a moment after the value changed.
@@ -64,7 +64,10 @@ class VariableRow:
 
     @property
     def value_text(self) -> str:
-        """Value as short text; "" before the first run. A list starts with its number of items."""
+        """Value as short text; "" before the first run.
+
+        A list is shown with its number of items, followed by the items if it is collapsed.
+        """
         if self.value is None:
             return ""
         if self.item:

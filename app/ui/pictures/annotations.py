@@ -76,7 +76,7 @@ def _paint_annotation(
 def _paint_text(
     painter: QPainter, theme: Theme, position: QPointF, height: float, drawn: AnnotationShape
 ) -> None:
-    # The lower left corner of the text is at `at`; the text is upright for any rotation of the image.
+    # The lower left corner of the text is at `position`; the text is upright for any rotation of the image.
     font, text = theme.font("small"), drawn.text
     font.setPixelSize(round(min(max(height, MIN_LETTERS), MAX_LETTERS)))
     metrics = QFontMetricsF(font)

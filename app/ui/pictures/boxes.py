@@ -44,6 +44,8 @@ class DetectionBox:
 def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     """Return the bounding boxes in the value of a detection sensor; malformed items are skipped.
 
+    The result is empty if the value lacks the items or the size of the image.
+
     Args:
         detections: Value of the sensor.
         kind: Index of the sensor, which selects the colour.
@@ -71,6 +73,8 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
 def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
     """Return the bounding boxes of all detections in a camera's images, with one colour per sensor.
 
+    Detection sensors that don't name a camera are included.
+
     Args:
         link: Robot.
         topic: Topic of the camera.
@@ -85,7 +89,7 @@ def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
 
 
 def camera_of(link: RobotLink) -> Sensor | None:
-    """Return the first camera of a robot, or None if the robot has no camera."""
+    """Return the first camera of a robot that publishes on a topic, or None if there is none."""
     return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
 
 

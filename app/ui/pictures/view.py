@@ -170,10 +170,12 @@ class PictureView(QWidget):
     ) -> None:
         """Show the newest image of a stream.
 
+        Bounding boxes and annotations don't change while the stream is frozen.
+
         Args:
             stream: Stream of images.
             boxes: Bounding boxes of detections on the image.
-            drawn: Returns the annotations for an image with the given width and height.
+            drawn: Returns the annotations for an image with the given width and height; None for none.
         """
         previous_text, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
         picture, displayed, silent_s = stream.picture, self._picture, stream.silent_s
@@ -237,12 +239,12 @@ class PictureView(QWidget):
         return QSize(320, 240)
 
     def picture_size(self) -> QSizeF:
-        """Return the size of the image in image pixels."""
+        """Return the size of the image in image pixels; without an image, the size of the view."""
         picture = self._picture
         return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
 
     def area(self) -> QRectF:
-        """Return the rectangle of the rotated image in the view, which it may exceed."""
+        """Return the rectangle of the rotated image, which may exceed the view; without an image, the view."""
         if self._picture is None:
             return QRectF(self.rect())
         return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)

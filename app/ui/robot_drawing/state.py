@@ -55,14 +55,20 @@ class RobotState:
 
     Attributes:
         x, y: Position in m.
-        theta_deg: Heading; 0 faces along x, towards the viewer, and positive angles turn to the robot's left.
+        theta_deg: Heading; 0 faces along x, towards the viewer, and positive angles turn to the robot's
+            left.
         head_yaw_deg: Direction of the head relative to the body, positive to the robot's left.
         head_pitch_deg: Inclination of the head, positive downwards.
         speech: Text that is being spoken, or None.
         spoken_fraction: Spoken fraction of the text, 0 to 1.
         sound: Title of the sound that is being played, such as "bell" or "440 Hz"; "" for none.
         heard_text: Words that the user recently said to the robot.
+        eyes: Colour of the eyes as "#rrggbb".
+        shoulders: Colour of the shoulders as "#rrggbb".
+        emotion: Name of the facial expression, one of `app.ui.robot_drawing.pepper.EMOTIONS`; any other
+            name is drawn as "neutral".
         arm_left_deg, arm_right_deg: 0 is hanging, 90 horizontal, 180 straight up.
+        is_moving: True while the robot moves.
         touched_parts: Names of the touched parts, such as "head".
         figure: ``pepper`` or ``turtle``.
         pressed_bumper: Side of the pressed bumper; "" for none.
@@ -103,7 +109,7 @@ class RobotState:
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
-        """Parse the payload of a state message; missing and malformed values have their defaults."""
+        """Parse the payload of a state message; missing and malformed values are replaced by defaults."""
         speech = data.get("speech")
         return cls(
             x=_parse_number(data.get("x")),

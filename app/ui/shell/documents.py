@@ -158,7 +158,8 @@ class DocumentController:
         """Close the tabs of documents, stopping their programs.
 
         Unsaved changes are saved to the document's file or, if it has none, to a new file in the list
-        of recent files. The toast offers to restore overwritten files.
+        of recent files. The toast offers to restore overwritten files. If saving fails, the tab stays
+        open and an alert is shown.
         """
 
         def close_documents() -> None:

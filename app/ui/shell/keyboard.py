@@ -38,7 +38,10 @@ class PanelFocus(QObject):
         bench.focus_panel(docks[(index + step) % len(docks)])
 
     def number(self, number: int) -> None:
-        """Focus an open panel by its number, counted from 1."""
+        """Focus the open panel at a position, counted from 1 in the order of creation.
+
+        Has no effect if there is no panel at this position.
+        """
         bench = self._bench()
         names = bench.open_names() if bench is not None else ()
         if bench is not None and 0 < number <= len(names):

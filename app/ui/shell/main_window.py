@@ -86,7 +86,7 @@ class MainWindow(QMainWindow):
         dialogs: FileDialogs | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # `asks` opens file dialogs, by default those of the system or Studio. `clock` returns monotonic
+        # `dialogs` opens file dialogs, by default those of the system or Studio. `clock` returns monotonic
         # seconds; it measures how long a panel has been hidden.
         super().__init__()
         self._clock = clock
@@ -235,7 +235,10 @@ class MainWindow(QMainWindow):
 
     @property
     def left(self) -> str:
-        """Name of the layout to return to from the start page, or ""."""
+        """Name of the layout to return to from the start page, or "".
+
+        If no layout was shown before, this is "behaviour" if a behaviour isn't blank, else "".
+        """
         if self._previous_layout:
             return self._previous_layout
         return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""

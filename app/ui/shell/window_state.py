@@ -35,7 +35,7 @@ class WindowState:
     """Accessor for the settings of the window: position, layouts, theme, text size, motion and contrast."""
 
     def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
-        # `complain` is called with a sentence if settings can't be saved.
+        # `report_error` is called with a message if settings can't be saved.
         self._settings = settings
         self._complain = complain
         self._reported_error = ""

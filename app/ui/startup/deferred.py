@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 class DeferredSteps(QObject):
-    """Runner for startup steps that begins after the first paint of a window.
+    """Runner for startup steps that begins after the first paint of a window, or after `MAX_DELAY_MS`.
 
     One step is run per iteration of the event loop, so that a click waits for at most one step.
     """
@@ -63,5 +63,5 @@ class DeferredSteps(QObject):
 
     @property
     def done(self) -> bool:
-        """True once all steps have been started."""
+        """True if no step is pending."""
         return not self._steps

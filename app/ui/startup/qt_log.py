@@ -62,8 +62,8 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, message: str) -
     """
     if kind == QtMsgType.QtFatalMsg and NO_PLATFORM_MESSAGE in message:
         _log.critical(
-            "no window can open; see that the screen is there and lets you in (DISPLAY is %r), and that the "
-            "libraries that Qt names above are installed, or run a behaviour with no window: "
+            "no window can open; check that the display exists and accepts connections (DISPLAY is %r), and "
+            "that the libraries that Qt names above are installed, or run a behaviour without a window: "
             "nep-studio run FILE",
             os.environ.get("DISPLAY", ""),
         )
@@ -82,7 +82,10 @@ class ConsoleHandler(logging.Handler):
         self._records: deque[tuple[str, str, str]] = deque(maxlen=MAX_RECORDS)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store a record; repetitions are combined and stored with their count."""
+        """Store a record; repetitions are combined and stored with their count.
+
+        Records that are already in the Console (attribute ``in_console``) are ignored.
+        """
         if getattr(record, "in_console", False):
             return
         filtered = self._repeat_filter.filter(record)

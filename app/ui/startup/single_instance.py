@@ -143,7 +143,7 @@ def send_request(name: str, request: StartRequest) -> bool:
         request: Request.
 
     Returns:
-        True if the instance accepted the request, False if there is none.
+        True if the instance accepted the request; False if there is none or it doesn't reply in time.
     """
     if not is_own_socket(name):
         return False  # checked on Unix before Qt's network module is loaded, which takes time
@@ -170,12 +170,12 @@ def pass_to_running(name: str, request: StartRequest, lock: FileLock, within_s: 
         name: Name of the socket.
         request: Request.
         lock: Lock of the instance that is starting.
-        within_s: Maximum time to wait for an instance that is starting.
+        within_s: Maximum time in seconds to wait for an instance that is starting.
 
     Returns:
-        True if an instance accepted the request. Otherwise this process must open a window; it holds
-        the lock, which must be released when the window can receive requests, unless the time limit was
-        exceeded.
+        True if an instance accepted the request. False if this process must open a window. It then
+        holds `lock`, unless the time limit was exceeded or `name` is empty; release the lock when the
+        window can receive requests.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
     while not send_request(name, request):
@@ -204,7 +204,7 @@ class SingleInstanceServer(QObject):
     def __init__(
         self, name: str, on_request: Callable[[StartRequest], object], parent: QObject | None = None
     ) -> None:
-        # `do` is called with each request.
+        # `on_request` is called with each request.
         super().__init__(parent)
         self._on_request = on_request
         self._received: dict[QtNetwork.QLocalSocket, bytes] = {}

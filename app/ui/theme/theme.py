@@ -106,10 +106,10 @@ class Theme(QObject):
         """Apply all settings in one update.
 
         Args:
-            mode: Mode.
+            mode: "light", "dark" or "system".
             text_percent: Text size in percent, clamped to 100 to 200.
-            motion: Reduced motion.
-            contrast: High contrast.
+            motion: Reduced motion: "on", "off" or "system".
+            contrast: High contrast: "on", "off" or "system".
         """
         self._mode, self.contrast = mode, contrast
         self.high_contrast = self._resolve_contrast()
@@ -226,11 +226,11 @@ class Theme(QObject):
         return QColor(block[self._colour_scheme][part])
 
     def block_text(self, category: str) -> QColor:
-        """Return the colour of text and icons on blocks of a category."""
+        """Return the colour of text and icons on blocks of a category, by default that of "values"."""
         return QColor(self._tokens.block_text.get(category, self._tokens.block_text["values"]))
 
     def block_icon(self, category: str) -> str:
-        """Return the name of the icon of a block category."""
+        """Return the name of the icon of a block category; that of "values" for an unknown category."""
         return self._tokens.block_icons.get(category, self._tokens.block_icons["values"])
 
     def status(self, name: str) -> Status:
@@ -238,6 +238,9 @@ class Theme(QObject):
 
         Args:
             name: "ok", "warn", "error", "info", "off", "running" or "recording".
+
+        Raises:
+            KeyError: The status is unknown.
         """
         return self._tokens.status[name]
 
@@ -267,7 +270,7 @@ class Theme(QObject):
         return round(value)
 
     def size_pair(self, *path: str) -> QSize:
-        """Return a width and height in px by their path in the tokens, such as ``pair("stop", "runBar")``.
+        """Return a width and height in px by path in the tokens, as in ``size_pair("stop", "runBar")``.
 
         Raises:
             KeyError: There is no such pair.
@@ -280,7 +283,11 @@ class Theme(QObject):
         return QSize(int(value[0]), int(value[1]))
 
     def radius(self, name: str) -> int:
-        """Return a corner radius in px by name."""
+        """Return a corner radius in px by name, such as "small", "control" or "panel".
+
+        Raises:
+            KeyError: The name is unknown.
+        """
         return self._tokens.radii[name]
 
     def duration(self, name: str) -> int:

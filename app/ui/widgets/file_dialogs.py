@@ -47,7 +47,7 @@ def resolve_kind(path: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple
 class FileDialogs(Protocol):
     """Interface of dialogs that ask for a file.
 
-    The callback ``take`` of each method is called with the path; it isn't called on cancel.
+    Each method calls its `callback` with the path, or doesn't call it on cancel.
     """
 
     def open(self, folder: str, callback: Callable[[Path], None]) -> None:

@@ -186,7 +186,7 @@ class StatusIcon(QWidget):
     """Icon of a status, next to a text with the same meaning."""
 
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, colour: str = "") -> None:
-        # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
+        # `height` is that of the adjacent line of text (0: the icon's own); `colour` overrides the default.
         super().__init__()
         self._theme, self._status, self._height, self._colour = theme, "", height, colour
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)

@@ -42,7 +42,7 @@ class ElidedLabel(QLabel):
     mode = Qt.TextElideMode.ElideMiddle
 
     def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
-        # `least` is the minimum width in px.
+        # `min_width` is the minimum width in px.
         super().__init__()
         self._min_width = min_width
         self.setTextFormat(Qt.TextFormat.PlainText)

@@ -51,7 +51,12 @@ def set_round_corners(widget: QWidget) -> None:
 
 
 def cut(widget: QWidget, radius: float) -> None:
-    """Clip a popup to its round corners, on platforms that may have no compositor."""
+    """Clip a popup to round corners, on platforms that may have no compositor.
+
+    Args:
+        widget: Popup.
+        radius: Corner radius in px.
+    """
     if QGuiApplication.platformName() in MASKED_PLATFORMS:
         widget.setMask(round_region(widget.size(), radius))
 
@@ -272,7 +277,7 @@ def open_below(menu: Menu, anchor: QWidget) -> None:
 
 
 class ContextMenuFilter(QObject):
-    """Event filter that gives a text field a context menu in Studio's style."""
+    """Context menu of a text field in Studio's style, in place of the standard one."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:
         super().__init__(field)

@@ -214,7 +214,7 @@ class MemorySubscriber(WakingSubscriber):
             return None if self.is_closed else self.inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
+        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 
@@ -366,7 +366,7 @@ class MemoryTransport:
         )
 
     def begin_close(self) -> None:
-        """Reject queued calls. Messages don't need flushing."""
+        """Unregister the servers and reject their queued calls. Messages don't need flushing."""
         self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:

@@ -174,7 +174,7 @@ class DirectPublisher:
             )
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
-        """Do nothing, because the socket receives nothing."""
+        """Return a state that pauses reading, because the socket receives nothing."""
         return PollState(pause_reading=True)
 
     def close(self, timeout_s: float) -> None:

@@ -27,7 +27,10 @@ def format_endpoint(host: str, messages: int, hellos: int) -> str:
 
 
 def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
-    """Return the addresses (`HOST:PORT`) for messages and for hellos; None for endpoints of other schemes."""
+    """Return the addresses (`HOST:PORT`) for messages and for hellos.
+
+    Returns None for endpoints of other schemes and for invalid ones.
+    """
     match = _ENDPOINT.fullmatch(endpoint)
     if match is None or not all(0 < int(port) < 65536 for port in match.groups()[1:]):
         return None

@@ -140,7 +140,10 @@ class NanomsgPublisher(HandshakePublisher):
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish one message. Raises `WireError` for an extension that can't be encoded."""
+        """Publish one message.
+
+        Raises `ClosedError`, and `WireError` for an extension that can't be encoded.
+        """
         data, extension_fields = encoded
         extension = extension_part(extension_fields) if extension_fields else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension_fields else 0)
@@ -159,7 +162,7 @@ class NanomsgPublisher(HandshakePublisher):
             self._history.add(tail, size)
             self._message_socket.send(self._topic + tail, block=False)
 
-    # ---- subscribers, in the node's thread
+    # ---- subscribers, in the I/O thread
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
         """Process hellos, connections and disconnections."""

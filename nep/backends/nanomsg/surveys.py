@@ -89,10 +89,10 @@ class NanomsgSurveyor:
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> list[OpenCall]:
-        """Send a request to all respondents; return one entry per respondent.
+        """Send a request to all connected respondents; return one entry for each of them.
 
-        All entries are the same object, because nng has no separate call for each respondent. See
-        `SurveyTransport.start_survey`.
+        All entries are the same object, because nng has no separate call for each respondent. The list
+        is empty if no respondent is connected. See `SurveyTransport.start_survey`.
         """
         with self._changed:
             if self.is_closed:

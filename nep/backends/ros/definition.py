@@ -133,7 +133,11 @@ class Definition:
         return bytes(out)
 
     def decode(self, data: bytes | memoryview) -> dict[str, object]:
-        """Decode a map. Raises `DecodeError` with the path of the invalid field."""
+        """Decode a message to a map.
+
+        Raises `DecodeError`, whose reason contains the path of the invalid field, or the number of
+        unexpected bytes at the end.
+        """
         reader = _Reader(data)
         try:
             values = _read_fields(self.fields, reader, "")

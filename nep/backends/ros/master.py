@@ -117,7 +117,10 @@ class NodeRegistrations:
 
 
 class RosMaster:
-    """Client for the ROS master at `address`. Requests raise `RosMasterUnreachable` if no reply arrives."""
+    """Client for the ROS master at `address`.
+
+    Methods raise `RosMasterUnreachable` if no reply arrives, unless they describe another result.
+    """
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -182,14 +185,14 @@ class RosMaster:
         return True
 
     def uri_of(self, name: str, timeout_s: float) -> str:
-        """Return the address of a node, or "" if it is unknown."""
+        """Return the address of a node, or "" if it is unknown or the master doesn't reply."""
         try:
             return str(_call(self.uri, timeout_s, "lookupNode", _CALLER_ID, name))
         except _REQUEST_ERRORS:
             return ""
 
     def system_state(self, timeout_s: float) -> RosSystemState:
-        """Return a snapshot of the master."""
+        """Return a snapshot of the master, without the logger services of rospy."""
         state = self._request("getSystemState", timeout_s)
         publishers, subscribers, services = (
             {str(each): tuple(names) for each, names in part} for part in state[:3]
@@ -202,12 +205,12 @@ class RosMaster:
         return RosSystemState(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the names of services that have a server."""
+        """Return the names of services that have a server, without the logger services of rospy."""
         services = self._request("getSystemState", timeout_s)[2]
         return tuple(str(name) for name, _nodes in services if not str(name).endswith(_ROSPY_SERVICES))
 
     def service_uri(self, name: str, timeout_s: float) -> str:
-        """Return the address of a service, or "" if it is unknown."""
+        """Return the address of a service, or "" if it is unknown or the master doesn't reply."""
         try:
             return str(_call(self.uri, timeout_s, "lookupService", _CALLER_ID, name))
         except _REQUEST_ERRORS:

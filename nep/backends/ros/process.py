@@ -98,7 +98,10 @@ class RosProcess:
         return bool(self.rospy.core.is_shutdown_requested())
 
     def shut_down(self) -> None:
-        """Shut rospy down at the end of the program, which unregisters the node from the master."""
+        """Shut rospy down at the end of the program, which unregisters the node from the master.
+
+        If the master doesn't reply, rospy isn't shut down, because unregistering would block.
+        """
         self._ended.set()
         try:
             self.master.wait(_REQUEST_TIMEOUT_S)
@@ -131,7 +134,7 @@ class RosProcess:
             ) and self.master.register(self.name, self.uri, registrations, _REQUEST_TIMEOUT_S)
 
     def resolved(self, topic: str) -> str:
-        """Return the full name of a topic."""
+        """Return the full name of a topic or service. Raises `BadTopicError`."""
         return str(self.rospy.resolve_name(ros_topic(topic)))
 
     # ---- publishers
@@ -342,9 +345,12 @@ class RosProcess:
 
 
 def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
-    """Run `call` in a thread and wait up to `timeout_s` seconds for its end; return False on timeout.
+    """Run `call` in a thread and wait for its end, up to `timeout_s` seconds but at least 0.2 s.
 
     Needed because rospy's requests to a master have no timeout.
+
+    Returns:
+        False on timeout, or if no thread can be started because Python is exiting.
     """
     thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
     try:

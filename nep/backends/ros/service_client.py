@@ -197,7 +197,7 @@ class RosClient(ClientCalls[_Call]):
             call.connection.interrupt()
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the names of services that have a server."""
+        """Return the names of services that have a server; empty if the master doesn't reply."""
         try:
             return tuple(sorted(self.process.master.services(timeout_s)))
         except RosMasterUnreachable:

@@ -52,9 +52,10 @@ def installed_service(name: str) -> ServiceType:
 
 
 def service_type_for(msg_type: str) -> ServiceType:
-    """Return the ROS service type for the `msg_type` of a server. Raises `NepError` for other types.
+    """Return the ROS service type for the `msg_type` of a server.
 
-    "json" and "msgpack" select `nep_msgs/Call`.
+    "json" and "msgpack" select `nep_msgs/Call`. Raises `NepError` for a ROS type that isn't installed,
+    and for all other types.
     """
     if is_ros_type(msg_type):
         return installed_service(msg_type)

@@ -105,7 +105,7 @@ class RospySubscriber(WakingSubscriber):
 
     @property
     def problem(self) -> str:
-        """Reason why the newest message was rejected; "" if it was accepted."""
+        """Reason why messages can't be decoded or were rejected in the last seconds; "" if there is none."""
         return self._reader_problem or self.rejections.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
@@ -214,7 +214,10 @@ class RospySubscriber(WakingSubscriber):
         return message
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
+        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier.
+
+        Raises `RosShutdownError` after rospy was shut down.
+        """
         self._owner.wait((self,), timeout_s)
         return self.poll()
 

@@ -121,7 +121,7 @@ class RospyPublisher:
     def send(self, encoded: Encoded) -> None:
         """Add a message to the queue of each connection. Full queues drop their oldest messages.
 
-        Raises `ClosedError`, and the same errors as `to_ros`.
+        Raises `ClosedError`, and the same errors as `to_ros_body`.
         """
         body = to_ros_body(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
@@ -232,7 +232,7 @@ class RospyTransport:
     def create_server(self, spec: ServerSpec) -> RosServer:
         """Create a server.
 
-        Raises the same errors as `publisher`, and `NepError` for a type that isn't installed.
+        Raises the same errors as `create_publisher`, and `NepError` for a type that isn't installed.
         """
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         server = RosServer(process, spec, self.discard)

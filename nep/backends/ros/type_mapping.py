@@ -326,7 +326,7 @@ def _type_mismatch_error(msg_type: str, ros_type: str) -> NepError:
 
 
 def _read_sized(body: memoryview, offset: int) -> tuple[memoryview, int]:
-    # Returns the bytes after the length at `at`, and the offset of their end.
+    # Returns the bytes after the length at `offset`, and the offset of their end.
     (size,) = _LENGTH.unpack_from(body, offset)
     if offset + 4 + size > len(body):
         raise WireError(_("the data is truncated"), len(body))

@@ -72,7 +72,7 @@ class _NameCache:
 
 
 def current_graph(participant: Participant) -> GraphView:
-    """Return the current graph."""
+    """Return the current graph of the participant's domain."""
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _NameCache()
     for local in participant.local_nodes:
         _add_local(graph, local, names)

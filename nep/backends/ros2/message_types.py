@@ -163,7 +163,8 @@ class MessageTypes:
         """Add all .msg files of a folder, such as `my_robot/msg/Arm.msg`.
 
         The package of a file outside a `msg` folder is the name of its folder. An error in a file is
-        reported when its type is used. Raises `NepError` if no file is valid.
+        reported when its type is used. Raises `NepError` if no file is valid, there are too many files,
+        a file is too large, or a known type has other fields.
         """
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):

@@ -30,7 +30,7 @@ class NodeEndpoint:
 def mismatches(
     topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]
 ) -> Iterator[Alert]:
-    """Yield alerts for readers that can't receive from a writer of the topic."""
+    """Yield an alert for each kind of mismatch between the writers and readers of a topic."""
     readers, writers = tuple(_merge_readers(readers[:_MAX_ENDPOINTS])), writers[:_MAX_ENDPOINTS]
     kinds: tuple[tuple[Callable[[DdsEndpoint, DdsEndpoint], bool], Callable[..., Alert]], ...] = (
         (lambda writer, reader: writer.type != reader.type, _type_alert),

@@ -179,7 +179,10 @@ class Ros2Publisher:
         return None
 
     def send(self, encoded: Encoded) -> None:
-        """Publish a message. Blocks for up to 0.1 s while the queue of a slow reader is full."""
+        """Publish a message. Blocks for up to 0.1 s while the queue of a slow reader is full.
+
+        Raises `ClosedError`, and `WireError` if the data isn't a message of the ROS type.
+        """
         cdr = self._mapping.pack(encoded)
         sample = create_sample(self._kind, cdr)
         if self._is_closed:

@@ -256,7 +256,7 @@ class Ros2Subscriber(WakingSubscriber):
             return None if self.is_closed else self.inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
+        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 

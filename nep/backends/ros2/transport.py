@@ -96,7 +96,7 @@ class Ros2Transport:
             subscriber.update_latched_reader()
 
     def create_publisher(self, spec: PublisherSpec) -> Ros2Publisher:
-        """Create a publisher and wait until its writer is matched with the discovered readers."""
+        """Create a publisher; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered readers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
@@ -108,7 +108,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
-        """Create a subscriber and wait until its reader is matched with the discovered writers."""
+        """Create a subscriber; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered writers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
@@ -125,7 +125,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_server(self, spec: ServerSpec) -> Ros2Server:
-        """Create a server and wait until it is matched with the discovered clients."""
+        """Create a server; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered clients."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             server = Ros2Server(participant, self.node.id, spec, self._discard_service)
@@ -137,7 +137,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_client(self, spec: ClientSpec) -> Ros2Client:
-        """Create a client and wait until it is matched with the discovered servers."""
+        """Create a client; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered servers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._discard_service)
@@ -221,7 +221,7 @@ class Ros2Transport:
         return self._load.ratio()
 
     def begin_close(self) -> None:
-        """Reject queued and new calls. Messages don't need flushing."""
+        """Reject queued and new calls. `close` waits until messages are acknowledged."""
         with self._lock:
             self._is_closing = True
         for server in self._servers:

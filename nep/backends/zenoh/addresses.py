@@ -59,9 +59,10 @@ class OpenSession:
     Attributes:
         session: Session of zenoh.
         rendezvous: Rendezvous of a local network; None for other networks.
-        entry: Entry of this session in `meeting`, or None.
-        endpoints: Endpoints to close in a forked child process (`forks.give_up`).
-        routers: Endpoints of routers. At least one must be connected to reach other nodes. Empty for peers.
+        entry: Entry of this session in `rendezvous`, or None.
+        endpoints: Endpoints to close in a forked child process (`nep.system.forks.close_in_child`).
+        routers: Endpoints of routers, of which at least one must be connected to reach other nodes.
+            Empty for peers.
     """
 
     session: Any

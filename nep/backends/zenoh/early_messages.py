@@ -62,7 +62,7 @@ class EarlyMessages(Generic[T]):
         return count < self._max_messages and self._bytes < MAX_HISTORY_BYTES
 
     def pop(self, publisher: int) -> list[T]:
-        """Remove a publisher's queued messages and return them in order.
+        """Remove a publisher's queued messages and return them in order of their sequence numbers.
 
         Messages that the history contained as well are left out.
         """

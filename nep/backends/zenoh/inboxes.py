@@ -54,8 +54,8 @@ class Inboxes:
         Args:
             subscribers: Subscribers to wait for.
             timeout_s: Maximum time to wait in seconds.
-            wakes: Earlier value of the property `wakes`; returns immediately if `wake` was called since
-                then.
+            wakes: Earlier value of `wake_count`; returns immediately if `wake` was called since then.
+                None selects the current value.
         """
         with self.changed:
             before = self._wakes if wakes is None else wakes

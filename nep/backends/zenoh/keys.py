@@ -89,7 +89,10 @@ def _pattern_chunk(pattern: str) -> str:
 
 
 def topic_of(key: str) -> str:
-    """Return the topic of a message, or of a reply to a hello, from its key."""
+    """Return the topic of a message, or of a reply to a hello, from its key.
+
+    Returns "" if the key is too short to contain a topic.
+    """
     return _decode_chunk(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 

@@ -118,7 +118,10 @@ class ZenohPublisher:
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish a message. Raises `WireError` for an extension that can't be encoded."""
+        """Publish a message.
+
+        Raises `ClosedError`, and `WireError` for an extension that can't be encoded.
+        """
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         extension = extension_part(encoded.extension) if encoded.extension else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)

@@ -40,7 +40,8 @@ class SessionEntry(NamedTuple):
     Attributes:
         port: Port of the session.
         pid: Id of its process.
-        start_time: Start time of the process, which detects a reused process id.
+        start_time: Start time of the process in hundredths of a second since the epoch, which detects a
+            reused process id.
     """
 
     port: int
@@ -97,7 +98,10 @@ class Rendezvous:
                     _unlock(file.fileno())
 
     def entries(self) -> list[SessionEntry]:
-        """Return the sessions of running processes; delete the files of processes that have ended."""
+        """Return the sessions of running processes; delete the files of processes that have ended.
+
+        Suspended processes are skipped with a warning.
+        """
         live_entries = []
         for path in self._folder.iterdir():
             entry = _parse_entry(path.name)

@@ -22,7 +22,7 @@ _MAX_TOKENS = 100_000
 
 
 class Roster:
-    """Known nodes, publishers and subscribers. `update` updates the roster. Thread-safe."""
+    """Known nodes, publishers and subscribers, including servers and clients. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

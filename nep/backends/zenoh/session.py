@@ -105,7 +105,7 @@ class PendingQuery:
             self._on_finished()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
-        """Wait for replies and return the keys in `wanted` that have no reply yet.
+        """Wait for replies; return the keys in `wanted` without a reply, or an empty set if it is None.
 
         Args:
             wanted: Keys whose replies to wait for; None waits until the query is finished.

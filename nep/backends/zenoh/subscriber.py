@@ -34,8 +34,8 @@ The inbox and a batch together thus stay within the subscriber's `max_bytes`.
 
 
 class _TopicParser(NamedTuple):
-    # Parser for one topic. `topic` and `own` are the first parts of messages to all, and to this subscriber
-    # alone.
+    # Parser for one topic. `topic` and `subscriber_part` are the first parts of messages to all, and to
+    # this subscriber alone.
     topic: bytes
     subscriber_part: bytes
     parser: MessageParser
@@ -98,7 +98,7 @@ class ZenohSubscriber(WakingSubscriber):
     # ---- reading
 
     def poll(self) -> Message | None:
-        """Return the next message, or None."""
+        """Return the next message, or None if there is none or the subscriber is closed."""
         with self._inboxes.changed:
             return None if self.is_closed else self._inbox.pop()
 
@@ -220,14 +220,17 @@ class ZenohSubscriber(WakingSubscriber):
                 self._deliver_early_messages(publisher)
 
     def add_publisher(self, remote: RemotePublisher) -> None:
-        """Add a publisher, which removes silent publishers that it replaces."""
+        """Add a publisher or update its record; silent publishers that it replaces are removed."""
         with self._inboxes.changed:
             for old in self._sources.replaced_publishers(remote):
                 self._sources.pop(old)
             self._sources.add_listed(remote).is_silent = False
 
     def mark_silent(self, publisher: int) -> None:
-        """Mark a publisher as not responding. It isn't removed, because it may only be unreachable."""
+        """Mark a publisher as not responding. It isn't removed, because it may only be unreachable.
+
+        The oldest silent publishers beyond `MAX_UNLISTED_PUBLISHERS` are removed.
+        """
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:

@@ -143,8 +143,8 @@ class Bindings:
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind these hosts and unbind all others; return the endpoints in the order of `hosts`.
 
-        Each host gets its own port. Hosts that can't be bound are skipped. Raises `AddressInUseError` or
-        `TooManyFilesError` if no host is bound.
+        Each host gets its own port. Hosts that can't be bound are skipped. If none of them can be
+        bound, raises `AddressInUseError` or `TooManyFilesError`.
         """
         for host in [bound_host for bound_host in self._bound if bound_host not in hosts]:
             self._unbind_host(host)

@@ -354,6 +354,7 @@ class SharedContext:
 
         Raises:
             TooManyFilesError: The process is out of file descriptors.
+            ClosedError: The context was terminated.
         """
         self._wait_for_room(owner)
         try:
@@ -376,7 +377,10 @@ class SharedContext:
         check_free_descriptors(_FDS_PER_SOCKET, owner)
 
     def acquire_waker(self) -> Waker:
-        """Return a waker for a waiting thread, from the pool if possible. Raises `TooManyFilesError`."""
+        """Return a waker for a waiting thread, from the pool if possible.
+
+        Raises `TooManyFilesError` if the process is out of file descriptors.
+        """
         with self._lock:
             return self._idle_wakers.pop() if self._idle_wakers else Waker()
 
@@ -431,7 +435,7 @@ Never destroyed, because destroying them would affect the parent process.
 def shared_context() -> SharedContext:
     """Add a user to the ZeroMQ context of this process and return the context; create it if needed.
 
-    Raises `TooManyFilesError`.
+    Raises `TooManyFilesError` if the process is out of file descriptors.
     """
     global _shared_context  # noqa: PLW0603 - one per process
     with _lock:

@@ -185,7 +185,10 @@ class OriginalPublisher:
             self.count += 1
 
     def send(self, encoded: Encoded) -> None:
-        """Publish one frame."""
+        """Publish one frame; drop the frame if the backlog is full.
+
+        Raises `ClosedError` if the publisher is closed.
+        """
         frame = to_frame(
             self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
         )
@@ -218,7 +221,7 @@ class OriginalPublisher:
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
-        """Stop accepting messages."""
+        """Stop accepting messages. Sends nothing, because the original wire has no bye."""
         with self._changed:
             self._is_closed = True
 

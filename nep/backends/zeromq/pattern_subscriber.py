@@ -69,7 +69,7 @@ class PatternSubscriber(WakingSubscriber):
     # ---- reading
 
     def poll(self) -> Message | None:
-        """Return the next message, or None."""
+        """Return the next message, or None if there is none or the subscriber is closed."""
         with self._changed:
             return None if self.is_closed else self._inbox.pop()
 
@@ -141,11 +141,12 @@ class PatternSubscriber(WakingSubscriber):
     # ---- publishers
 
     def member(self, topic: str, *, may_create: bool = True) -> NativeSubscriber | None:
-        """Return the member for a topic, or None if there is none.
+        """Return the member for a topic, or None if there is none and it isn't created.
 
         Args:
             topic: Name of the topic.
-            may_create: True to create a missing member, unless there are already `_MAX_MEMBERS`.
+            may_create: True to create a missing member. Not possible after `close`, beyond
+                `_MAX_MEMBERS` or if the process is out of file descriptors.
         """
         with self._members_lock:
             member = self._members.get(topic)
@@ -216,7 +217,10 @@ class PatternSubscriber(WakingSubscriber):
             member.set_clock_differences(clocks)
 
     def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Handle a renewal like `NativeSubscriber.handle_renewal`; remove members without publishers."""
+        """Handle a renewal like `NativeSubscriber.handle_renewal`.
+
+        Members without publishers are removed, unless the subscriber has a sink.
+        """
         seqs = tuple(last_seqs)
         for topic, member in list(self._members.items()):
             member.handle_renewal(now, seqs)

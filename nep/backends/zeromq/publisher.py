@@ -122,7 +122,7 @@ class HandshakePublisher:
 
 
 class NativePublisher(HandshakePublisher):
-    """Publisher on the native wire. Owns its socket, an XPUB that is already bound or connected."""
+    """Publisher on the native wire. Owns its socket, an XPUB that `move` or `legacy.attach` binds later."""
 
     is_closed = False
     has_subscribers = False
@@ -250,7 +250,8 @@ class NativePublisher(HandshakePublisher):
     def send(self, encoded: Encoded) -> None:
         """Publish a message. Immutable data of 64 kB and more is sent without a copy.
 
-        Raises `WireError` for an extension that can't be encoded.
+        Raises `WireError` for an extension that can't be encoded, and `ClosedError` if the publisher is
+        closed.
         """
         data, extension_fields = encoded
         if extension_fields is None and type(data) is bytes:
@@ -345,7 +346,11 @@ class NativePublisher(HandshakePublisher):
             self._poll_subscriptions_locked(stamp_ns)
 
     def borrow_memory(self, size_bytes: int) -> memoryview | None:
-        """Return writable shared memory for a payload; None if no subscriber shares memory."""
+        """Return writable shared memory for a payload.
+
+        Returns None if no subscriber shares memory, the payload is smaller than `MIN_SHARED_BYTES`, or
+        no slot is free.
+        """
         shared = self._subscriptions.shared
         with self._lock:
             return None if shared is None or self.is_closed else shared.borrow_memory(size_bytes)

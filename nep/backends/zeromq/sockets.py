@@ -108,7 +108,8 @@ def set_receive_timeout(owner: Socket) -> None:
 def bind_free_port(owner: Socket, host: str) -> str:
     """Bind to a free port of `host` that the original NEP doesn't use; return the endpoint.
 
-    Raises `AddressInUseError` if `host` can't be bound or no such port is found.
+    Raises `AddressInUseError` if `host` can't be bound or no such port is found, and
+    `TooManyFilesError` if the process is out of file descriptors.
     """
     for _port in range(100):
         endpoint = bind(owner, f"{host}:*")
@@ -119,7 +120,11 @@ def bind_free_port(owner: Socket, host: str) -> str:
 
 
 def bind(owner: Socket, address: str) -> str:
-    """Bind to an address and return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    """Bind to an address and return the endpoint.
+
+    Raises `AddressInUseError` if the address can't be bound, and `TooManyFilesError` if the process is
+    out of file descriptors.
+    """
     check_free_descriptors(_FDS_PER_PORT, f"a port of '{host_of(address)}'")
     try:
         owner.bind(endpoint_of(address))

@@ -145,7 +145,7 @@ class MessageParser:
         return self._parse_message(*parse_remaining_parts(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
-        """Return the messages of a batch, given as one part. Raises `WireError`.
+        """Return the messages of a batch, given as one part. Raises `WireError` if the batch is malformed.
 
         Messages that the subscriber must not deliver are left out, such as those before the handshake.
         """
@@ -338,7 +338,7 @@ class SubSocket:
                 self._connect(source, source.endpoint)
 
     def reconnect(self, publisher: int) -> None:
-        """Reconnect to a publisher that is already connected."""
+        """Disconnect from the endpoint of a known publisher and connect to it again."""
         source = self.sources.get(publisher)
         self._connect(source, source.endpoint)
 

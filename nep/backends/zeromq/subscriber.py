@@ -145,7 +145,7 @@ class NativeReadable(Readable, Protocol):
         """Reconnect to publishers on other computers, which discards their unread messages."""
 
     def reconnect(self, publisher: int) -> None:
-        """Reconnect to a publisher that is already connected."""
+        """Disconnect from the endpoint of a known publisher and connect to it again."""
 
 
 R = TypeVar("R", bound=Readable)
@@ -256,7 +256,7 @@ class SocketSubscriber(Generic[R]):
 
     @property
     def lost(self) -> int | None:
-        """Number of messages lost in transit or dropped from the full queue."""
+        """Number of messages lost in transit or dropped from the full queue; None if unknown."""
         return self._readable.lost
 
     @property

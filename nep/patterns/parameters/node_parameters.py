@@ -156,13 +156,17 @@ class Parameters:
     # ---- changing
 
     def set(self, name: str, value: object) -> None:
-        """Set a parameter. Raises `ParameterError` if the value is invalid or a callback rejects it."""
+        """Set a parameter.
+
+        Raises `ParameterError` if the name is unknown, the value is invalid or a callback rejects it.
+        """
         self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, object]) -> None:
         """Set several parameters atomically: all of them, or none.
 
-        Raises `ParameterError` if a value is invalid or a callback rejects the change.
+        Raises `ParameterError` if a name is unknown, a value is invalid or a callback rejects the
+        change.
         """
         self._set(values, is_own=True)
 

@@ -158,7 +158,7 @@ def new_parameter(
         raise ParameterError(
             check_topic(name),
             short_repr(default),
-            _("the type must be {kinds}").format(kinds=format_list([f"'{limit}'" for limit in KINDS], "or")),
+            _("the type must be {kinds}").format(kinds=format_list([f"'{kind}'" for kind in KINDS], "or")),
         )
     for limit in (minimum, maximum):
         if limit is not None and (kind_name not in {"int", "float"} or not _is_finite(limit)):
@@ -170,7 +170,7 @@ def new_parameter(
     base = NodeParameter(check_topic(name), None, kind_name, None, _clean_description(description), form=form)
     if len(choices) > _MAX_CHOICES:
         raise ParameterError(name, short_repr(default), _("too many choices"))
-    allowed = tuple(base.with_value(limit).value for limit in choices)
+    allowed = tuple(base.with_value(choice).value for choice in choices)
     parameter = replace(base, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
     value = parameter.with_value(default).value
     return replace(parameter, value=value, default=value)

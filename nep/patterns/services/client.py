@@ -187,7 +187,10 @@ class Client:
         self._sent = self.call_async(request)
 
     def listen_info(self) -> object:
-        """Return the reply to `send_info`. Raises the exceptions of `call`."""
+        """Return the reply to `send_info`.
+
+        Raises the exceptions of `call`, and `NepError` if no request was sent.
+        """
         sent, self._sent = self._sent, None
         if sent is None:
             raise NepError(_("no request was sent; call 'send_info' first"))
@@ -257,7 +260,10 @@ class Client:
         self._on_close(self)
 
     def join(self) -> None:
-        """Wait until all calls of `call_async` have completed, and stop their thread."""
+        """Complete the futures of the calls that have ended and stop their thread, within two seconds.
+
+        Call this after the transport has closed, which ends all calls.
+        """
         with self._lock:
             future_thread, self._future_thread = self._future_thread, None
         if future_thread is not None:

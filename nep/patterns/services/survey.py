@@ -174,7 +174,10 @@ class Surveyor:
         self._sent = self.answers(question)
 
     def listen_json(self) -> tuple[bool, object]:
-        """Return (True, next answer), or (False, {}) after the time limit or the last answer."""
+        """Return (True, next answer), or (False, {}) after the time limit or the last answer.
+
+        Raises `NepError` if no question was sent.
+        """
         if self._sent is None:
             raise NepError(_("no request was sent; call 'send_json' first"))
         for reply in self._sent:

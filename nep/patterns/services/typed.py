@@ -30,7 +30,7 @@ class PayloadType:
         declared: Dataclass or TypedDict; None allows any value.
 
     Raises:
-        ValueError: The fields of the class can't be encoded.
+        ValueError: The class is neither a dataclass nor a TypedDict, or its fields can't be encoded.
     """
 
     def __init__(self, declared: type | None) -> None:
@@ -85,7 +85,7 @@ def call_types(**declared_types: object) -> CallTypes:
             replies.
 
     Raises:
-        ValueError: A value is not a class, or the fields of a class can't be encoded.
+        ValueError: A value is not a dataclass or TypedDict, or the fields of a class can't be encoded.
     """
     declared: list[PayloadType] = []
     for name, declared_type in declared_types.items():

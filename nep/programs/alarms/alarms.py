@@ -118,6 +118,8 @@ class Alarms:
     def take_action_results(self) -> list[tuple[AlarmRule, str, float]]:
         """Return the actions completed since the last call, including failed ones.
 
+        If there were more than 1000, only the newest 1000 are returned.
+
         Returns:
             Tuples of the rule, the result as text, and the time of completion (s since 1970).
         """

@@ -141,7 +141,10 @@ class AlarmStateMachine:
         return self.observe(is_so, number if observed is None else observed, now)
 
     def trigger(self, now: float) -> Transition | None:
-        """Process a momentary event: it turns the alarm on for `MIN_EVENT_DURATION_S`."""
+        """Process a momentary event, which turns the alarm on for at least `MIN_EVENT_DURATION_S`.
+
+        Returns the transition, or None if the alarm's state is unchanged.
+        """
         transition = self.observe(True, self.last_value, now)
         self.observe(False, self.last_value, now)
         return transition

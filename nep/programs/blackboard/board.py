@@ -180,12 +180,12 @@ class Blackboard:
         Args:
             topic: Topic or pattern.
             msg_type: Message type.
-            configuration: Further options, as for `Node.new_sub`.
-            key: Key to store messages under. A name in braces is replaced with that field of the message,
-                as in ``human.{id}``. With None, perceptions of RIZE are stored at the root
+            configuration: Result of `Node.hybrid` or `Node.direct`. Default: the node's master.
+            key: Key to store messages under. A name in braces is replaced with that field of the
+                message, as in ``human.{id}``. With None, perceptions of RIZE are stored at the root
                 (``touched.head``) and other messages under the topic's name.
             fields: Fields to store, or a mapping from fields to other names (default: all fields).
-            each: Field that contains a list of items to store one by one.
+            each: Field that contains a list of items to store one by one; "" stores the message itself.
             lives_s: Seconds after which a value expires unless it is updated; None for no expiry.
 
         Returns:

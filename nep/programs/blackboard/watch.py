@@ -63,7 +63,10 @@ class MessageMapping:
         )
 
     def items(self, payload: object) -> Sequence[object]:
-        """Return the items of a payload that are stored separately; most payloads are a single item.
+        """Return the items of a payload, which are stored separately.
+
+        These are the elements of the list in the field `each`; without `each`, the elements of the
+        payload if it is a list and the key has placeholders, else the payload as the only item.
 
         Raises `NepError` if the payload has no list in the field `each`.
         """
@@ -79,14 +82,14 @@ class MessageMapping:
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
     def perceived_values(self, topic: str, item: object) -> Iterator[PerceivedValue]:
-        """Yield the values of an item with their keys.
+        """Yield the values of an item with their keys. Fields that the item lacks are skipped.
 
         Args:
             topic: Topic of the message.
             item: Item returned by `items`.
 
         Raises:
-            NepError: The item lacks a field that is part of the key.
+            NepError: A field that is part of the key has no name or number in the item.
         """
         perception = None if self._fields is not None else parse_perception(item)
         if perception is not None:

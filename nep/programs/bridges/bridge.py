@@ -195,7 +195,7 @@ class Bridge:
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Create routes for published topics that match a pattern, and remove idle ones.
 
-        Runs in the side's thread.
+        Called with each new graph of a side, in the side's thread.
         """
         self._check_other_bridges()
         self._close_idle_routes(side, view, time.monotonic())

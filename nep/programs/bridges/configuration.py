@@ -73,7 +73,7 @@ class TopicEnd:
         return part if is_whole and (wildcard == "**" or "/" not in part) else ""
 
     def with_part(self, part: str) -> str:
-        """Return the name with the wildcard replaced by `part`."""
+        """Return the name with the wildcard replaced by `part`; the name itself if it has no wildcard."""
         return self.name.replace(self.wildcard, part, 1) if self.wildcard else self.name
 
 
@@ -137,7 +137,11 @@ class BridgeConfiguration:
 
 
 def checked_name(name: str) -> str:
-    """Validate the name of a bridge and return it. Raises `NepError`."""
+    """Return the name of a bridge if it is valid.
+
+    Raises `NepError` if the name is empty, too long, or has characters that a node's name must not
+    have.
+    """
     check_node_name(f"{NODE_PREFIX}{name}")
     if not name or len(name) > _MAX_NAME_LENGTH:
         raise NepError(
@@ -199,7 +203,7 @@ def check_topic_names(a: str, b: str) -> None:
 
 
 def parse_direction(name: str) -> Direction:
-    """Validate a direction and return it. Raises `NepError`."""
+    """Return a direction if it is valid. Raises `NepError` if it is none of `DIRECTIONS`."""
     if name not in DIRECTIONS:
         raise NepError(
             _("unknown direction '{name}'; {did_you_mean}").format(

@@ -48,7 +48,7 @@ class Pacer:
         self._is_closed = False
 
     def call_at(self, due: float, call: Callable[[], None]) -> None:
-        """Schedule a call without blocking.
+        """Schedule a call without blocking. Does nothing after `close`.
 
         Args:
             due: Time of the call (monotonic, s).

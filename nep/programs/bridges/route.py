@@ -51,6 +51,7 @@ class RouteEnd:
         msg_type: Message type; "" to detect the type.
         qos: Name of a QoS profile; "" for the default.
         loop_guard: Loop guard of the topic for networks that don't identify publishers.
+        guard: Motion guard of the side; None to publish every message.
     """
 
     side: SideName

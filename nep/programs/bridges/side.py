@@ -38,7 +38,7 @@ class SideOwner(Protocol):
         """All routes in both directions."""
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
-        """Process a new graph of a side."""
+        """Create and remove the routes of a side, given its new graph."""
 
     def status(self) -> dict[str, object]:
         """Return the status to publish."""

@@ -144,7 +144,7 @@ def _toml_error_message(path: str, text: str, message: str) -> str:
 class _Reader:
     """Converter of a parsed bridge file that finds the line of each key for error messages.
 
-    In its methods, `where` is the name of a table ("" for the root) and `number` the index of a
+    In its methods, `table_name` is the name of a table ("" for the root) and `number` the index of a
     `[[topics]]` table.
     """
 

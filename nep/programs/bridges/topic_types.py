@@ -38,7 +38,9 @@ class TopicFormat:
 
 
 def published_type(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
-    """Return the message type with which nodes other than the bridge publish a topic; "" if there are none.
+    """Return the message type with which nodes other than the bridge publish a topic.
+
+    Returns "" if there are no such nodes or the type is unknown.
 
     Args:
         view: Graph of the network.

@@ -28,7 +28,7 @@ class AdapterError(NepError):
 
 
 class AdapterStreams(Protocol):
-    """Standard output (`reads`) and standard input (`writes`) of an adapter."""
+    """Standard output (`output`) and standard input (`input`) of an adapter."""
 
     output: IO[bytes]
     input: IO[bytes]
@@ -109,7 +109,7 @@ class Adapter:
         self._reader.start()
 
     def _read(self) -> None:
-        with suppress(OSError, ValueError):  # closed by `end`
+        with suppress(OSError, ValueError):  # closed by `stop`
             while line := self.lines.output.readline(_MAX_LINE_BYTES):
                 self._incoming.append(line)
         self._incoming.append(None)
@@ -122,7 +122,7 @@ class Adapter:
             members: Further fields of the request.
 
         Returns:
-            Number of the request, to be passed to `reply`.
+            Id of the request, to be passed to `reply`.
 
         Raises:
             AdapterError: The adapter's standard input is closed.

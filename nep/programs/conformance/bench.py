@@ -61,7 +61,10 @@ class Bench:
     # ---- time
 
     def pump(self) -> None:
-        """Process all pending input of the master, the peers and the adapter."""
+        """Process all pending input of the master, the peers and the adapter.
+
+        Also connects the tester's subscribers whose delay (`connect_delay_s`) has passed.
+        """
         self.master.pump()
         for peer in self._peers():
             peer.pump()
@@ -105,7 +108,8 @@ class Bench:
         Args:
             is_met: Condition, evaluated after each pump.
             event: Name of the expected event, for the error message.
-            timeout_s: Time limit in seconds, multiplied by the scale.
+            timeout_s: Time limit in seconds, multiplied by the scale; at least 2 s if the scale is less
+                than 1.
 
         Raises:
             BrokenRuleError: The time limit has passed.
@@ -162,23 +166,29 @@ class Bench:
         return f"/check/{next(self._numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a publisher in the adapter and return its id. Raises `AdapterError`.
+        """Open a publisher in the adapter and return its id.
 
         Args:
             topic: Name of the topic.
             msg_type: Message type.
             members: Further fields of the request.
+
+        Raises:
+            AdapterError: The adapter reported an error, exited, or did not reply with an id.
         """
         reply = self.call("publisher", topic=topic, type=msg_type, **members)
         return self._add_opened("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a subscriber in the adapter and return its id. Raises `AdapterError`.
+        """Open a subscriber in the adapter and return its id.
 
         Args:
             topic: Name of the topic.
             msg_type: Message type.
             members: Further fields of the request.
+
+        Raises:
+            AdapterError: The adapter reported an error, exited, or did not reply with an id.
         """
         reply = self.call("subscriber", topic=topic, type=msg_type, **members)
         return self._add_opened("close_subscriber", "sub", reply)
@@ -207,7 +217,7 @@ class Bench:
         return [each for each in self.adapter.events if each.get("sub") == sub]
 
     def counts(self, sub: int) -> tuple[int, int]:
-        """Return the numbers of received and lost messages of a subscriber of the adapter."""
+        """Return the received and lost counts of a subscriber of the adapter; -1 if not reported."""
         reply = self.call("counts", sub=sub)
         return int(reply.get("received", -1)), int(reply.get("lost", -1))
 
@@ -249,7 +259,7 @@ class Bench:
 
     @property
     def node_id(self) -> str:
-        """Id of the adapter's node."""
+        """Id of the adapter's node. Raises `BrokenRuleError` if no request has contained its record."""
         for request in reversed(self.master.received):
             node = request.fields.get("node")
             if isinstance(node, dict):
@@ -261,7 +271,7 @@ class Bench:
 
         Args:
             after: Number of received requests to skip.
-            timeout_s: Time limit in seconds, multiplied by the scale.
+            timeout_s: Time limit in seconds, scaled as in `require`.
 
         Raises:
             BrokenRuleError: The renewal didn't arrive in time.

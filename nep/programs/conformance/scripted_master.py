@@ -1,7 +1,7 @@
 """Simulated master that records all requests and can modify its replies.
 
-Its state is a `nep.masters.graph.Graph`, like that of the real master, but without a clock: a lease doesn't
-expire until a rule calls `ScriptedMaster.drop`.
+Its state is a `nep.masters.graph.Graph`, like that of the real master, but without a clock: a lease
+doesn't expire until a rule calls `ScriptedMaster.expire_lease`.
 """
 
 from __future__ import annotations

@@ -152,9 +152,10 @@ def _replying_address(address: str) -> str:
 
 
 def start_blocker(address: str | None = None) -> Finding | None:
-    """Return the finding that prevents starting a master at the address, or None.
+    """Return the finding about what prevents a master from starting, or None if nothing does.
 
-    An address that is not loopback is an obstacle, because masters are started at loopback addresses only.
+    An address that is not loopback is an obstacle, because masters are started at loopback addresses
+    only.
     """
     resolved_address = master_address(address)
     facts = Facts(time.time(), resolved_address, sys.platform, {}, "", loopback_problem=loopback_problem())

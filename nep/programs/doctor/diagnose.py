@@ -30,10 +30,11 @@ def diagnose(
 
     Args:
         address: Address of the master (default: NEP_MASTER or the default address).
-        topic: Topic whose messages don't arrive; "" for none. Its findings come first among the findings
-            of the same severity, and replace general findings with the same id.
+        topic: Topic whose messages don't arrive; "" for none. Its findings come first among the
+            findings of the same severity, and replace general findings with the same id.
         folders: Further folders that must be writable, as (purpose, path).
-        on_progress: Called after each step with the findings so far.
+        on_progress: Called after each step with the findings so far, the number of completed checks and
+            the number of all checks.
     """
     findings_by_check: dict[str, tuple[Finding, ...]] = {}
     facts: Facts | None = None

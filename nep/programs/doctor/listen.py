@@ -28,9 +28,10 @@ _REMEDIES = ("restart", "reset", "start")
 
 
 def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
-    """Subscribe to a topic for up to 1.5 s and return the facts about it; None if no master replies.
+    """Subscribe to a topic for up to 1.5 s and return the facts about it.
 
-    If the name is invalid, the facts contain only the reason (`name_problem`).
+    Returns None if no master replies or the subscription fails. If the name is invalid, the facts contain
+    only the reason (`name_problem`).
     """
     master = master_address(address)
     try:

@@ -263,7 +263,7 @@ def original_programs(facts: Facts) -> Iterator[Finding]:
 
 
 def master_alerts(facts: Facts) -> Iterator[Finding]:
-    """Report the alerts of the master. Alerts about ports are omitted, because `ports` checks them."""
+    """Report the alerts of the master, except those about ports, which `port_findings` checks."""
     if facts.view is None:
         return
     for alert in facts.view.alerts:

@@ -48,7 +48,7 @@ _SocketT = TypeVar("_SocketT", Publisher, Subscriber)
 
 
 class GatewayAttachment:
-    """Attachment of a master that lets programs of the original NEP join (`Attachment`).
+    """Attachment of a master that lets programs of the original NEP join. Implements `Attachment`.
 
     Args:
         file: File that stores the ports of programs (default: `default_file`).
@@ -128,6 +128,9 @@ class NativeNetwork:
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
         """Publish data of an original program. The first call opens the publisher.
+
+        If the publisher can't be opened, the data is dropped, an alert is reported, and a call after
+        one second tries again.
 
         Args:
             topic: Name of the topic.
@@ -252,6 +255,8 @@ class NativeNetwork:
 
     def report(self, id: str, message: str, hint: str = "") -> None:
         """Report a problem as an alert. Repeated reports of the same problem have no effect.
+
+        A new alert is dropped if there are 200 already.
 
         Args:
             id: Id of the alert, for `resolve`.

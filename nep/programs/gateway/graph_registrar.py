@@ -131,7 +131,7 @@ class GraphRegistrar:
             program.node_id,
             shortened(
                 escaped(program.name), _MAX_NAME_LENGTH
-            ),  # escaped: an original program can't be made to choose a valid name
+            ),  # escaped: names of original programs aren't validated
             socket.gethostname(),
             program.pid,
             _LANGUAGES.get(language, escaped(language)),

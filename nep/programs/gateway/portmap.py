@@ -146,7 +146,7 @@ class PortMap:
         }
 
     def save(self) -> None:
-        """Write the file atomically; no effect without a file. Raises `OSError`."""
+        """Write the file atomically; no effect without a file. Raises `OSError` if writing fails."""
         if self._file is None:
             return
         document = {

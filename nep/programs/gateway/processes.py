@@ -18,7 +18,10 @@ class Processes(Protocol):
     """Interface to the processes of this computer, which tests replace."""
 
     def started(self, pid: int) -> float | None:
-        """Return the start time of a process (s since 1970), or None if it doesn't exist."""
+        """Return the start time of a process (s since 1970).
+
+        Returns None if the process doesn't exist, and 0 if access is denied.
+        """
 
     def language(self, pid: int) -> str | None:
         """Return the programming language of a process according to its interpreter, or None if unknown."""
@@ -27,7 +30,7 @@ class Processes(Protocol):
         """Return True if a process has an established connection over a port, None if access is denied.
 
         Args:
-            pid: Process id.
+            pid: Process id. If there is no such process, the result is False.
             port: Port number.
             binds: True if the process itself binds the port.
         """

@@ -99,7 +99,7 @@ class ProgramTable:
                     self._was_joined.add(registration)
 
     def expect(self, registration: Registration) -> None:
-        """Wait for a program to connect, because it has sent a new request.
+        """Treat a program as not connected yet, because it has sent a new request.
 
         Earlier connections of the program to the line are ignored.
         """
@@ -157,7 +157,7 @@ class ProgramTable:
         return members
 
     def members(self) -> list[Member]:
-        """Return the entries for the broadcast of the original NEP."""
+        """Return the entries for the broadcast of the original NEP, without lines that have no port."""
         members: list[Member] = []
         for registration in self._port_map.registrations:
             line = registration.line

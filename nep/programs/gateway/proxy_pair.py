@@ -89,8 +89,8 @@ def is_free(port: int) -> bool:
 class ProxyPair:
     """XSUB socket for original publishers, and XPUB socket for original subscribers, of one line.
 
-    Used in the gateway's thread only. `unserved` contains the incompatible versions of programs by role.
-    The constructor raises `zmq.ZMQError` if a port is in use.
+    Used in the gateway's thread only. `unsupported_versions` contains the incompatible versions of
+    programs by role. The constructor raises `zmq.ZMQError` if a port is in use.
 
     Args:
         context: ZeroMQ context.

@@ -110,7 +110,7 @@ class Relay:
         return self._pairs.get(line)
 
     def open(self, line: TopicLine, base: int) -> ProxyPair:
-        """Open the sockets of a line. Raises `zmq.ZMQError` if a port is in use.
+        """Open the sockets of a line and return them. Raises `zmq.ZMQError` if a port is in use.
 
         Args:
             line: Line to open.

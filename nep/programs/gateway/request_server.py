@@ -102,7 +102,9 @@ class RequestServer:
             yield counter, port
 
     def reply(self, counter: zmq.Socket[bytes], port: int) -> None:
-        """Reply to a pending request. Never raises because of the request's content.
+        """Reply to a pending request, if there is one. Never raises because of the request's content.
+
+        A message without the envelope of a REQ socket gets no reply.
 
         Args:
             counter: Request socket.

@@ -80,11 +80,14 @@ class Request:
 
 
 def parse_request(data: bytes, asked_port: int) -> Request:
-    """Parse a request. Raises `RequestError`.
+    """Parse a request.
 
     Args:
         data: Request as JSON.
         asked_port: Port to which the request was sent.
+
+    Raises:
+        RequestError: The request is too large, isn't a JSON object, or has a missing or invalid field.
     """
     if len(data) > MAX_REQUEST_BYTES:
         raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")

@@ -120,14 +120,15 @@ class MovingTopics:
 def parse_controls(description: object, fallback_name: str = "") -> RobotControls | None:
     """Parse the name and the controlling topics in a robot's description.
 
-    The rest of the description is not validated, so that an invalid description still protects its robot.
+    The rest of the description is not validated, so that an invalid description still protects its
+    robot.
 
     Args:
         description: Decoded message of the type ``robot/description``.
-        fallback_name: Name for a description without a title.
+        fallback_name: Name for a description without a valid title.
 
     Returns:
-        The controls, or None if the description names no topics.
+        The controls, or None if the description isn't a map, or has no name or no valid topic.
     """
     if not isinstance(description, Mapping):
         return None

@@ -51,10 +51,10 @@ def is_local_host(host: str) -> bool:
 
 
 def checked_origin(origin: str) -> str:
-    """Validate an origin and return it in the form that browsers send. Raises `NepError`.
+    """Return an origin in the form that browsers send. Raises `NepError` if the origin is invalid.
 
-    "null" is the origin of pages opened as files, and of every sandboxed frame. "file://" is the origin of
-    desktop programs such as Lichtblick.
+    "null" is the origin of pages opened as files, and of every sandboxed frame. "file://" is the origin
+    of desktop programs such as Lichtblick.
     """
     if origin in {"null", "file://"}:
         return origin

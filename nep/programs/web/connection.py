@@ -141,7 +141,10 @@ class PageConnection:
             self._connection.transport.abort()
 
     async def _receive(self) -> bytes:
-        """Return the next message from the page. Raises `ConnectionClosed`."""
+        """Return the next message from the page. Raises `ConnectionClosed` when the connection is closed.
+
+        Messages that arrive while the page is being disconnected are ignored.
+        """
         while True:
             data = bytes(await self._connection.recv(decode=False))
             if not self.is_closing:

@@ -68,6 +68,7 @@ class ConnectedPage:
             Referer), else the host of its origin, else `name`.
         topics: Topics that the page publishes or subscribes to.
         dropped_count: Number of messages dropped because the page was too slow.
+        device: Kind of device: "phone", "tablet", or "" for a computer or an unknown device.
     """
 
     id: int

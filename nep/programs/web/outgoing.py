@@ -98,7 +98,15 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
 
 
 def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
-    """Encode any other operation, such as the reply of a service. Raises `EncodeError`."""
+    """Encode an operation that isn't a topic's message, such as the response of a service.
+
+    Args:
+        operation: Fields of the operation.
+        form: Encoding that the page requests.
+
+    Raises:
+        NepError: A field can't be encoded in this form.
+    """
     if form.compression in {"cbor", "cbor-raw"}:
         return [Frame(_encode_cbor(operation), is_text=False)]
     return _text_frames(encode_json(operation), form)
@@ -133,7 +141,7 @@ def _json_payload(message: Message) -> bytes | None:
 
 
 def encode_json(value: object) -> bytes:
-    """Encode a value as JSON, with bytes in base64. Raises `EncodeError`."""
+    """Encode a value as JSON, with bytes in base64. Raises `EncodeError` if that is impossible."""
     try:
         return orjson.dumps(value, _encode_default, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
     except (TypeError, RecursionError) as error:

@@ -130,7 +130,7 @@ class Feed:
             del self._latched[next(iter(self._latched))]
 
     def drop_oldest(self) -> None:
-        """Drop the oldest message and update the counts."""
+        """Drop the oldest message. With a throttle time it counts as throttled, else as dropped."""
         self.size_bytes -= self._messages.popleft().size_bytes
         if self._throttle_s:
             self.throttled_count += 1
@@ -193,7 +193,7 @@ class SendQueue:
         self._is_filled = asyncio.Event()
 
     def put(self, frames: list[Frame]) -> None:
-        """Append messages that can't be dropped."""
+        """Append messages that can't be dropped. Does nothing after an overflow."""
         if self._is_overfull:
             return
         self._frames.extend(frames)
@@ -231,7 +231,7 @@ class SendQueue:
             self._active.remove(feed)
 
     async def pop(self) -> Frame | QueuedMessage:
-        """Wait for the next item to be sent, and return it."""
+        """Wait for the next item to be sent, and return it. Frames added by `put` come first."""
         while True:
             if self._frames:
                 frame = self._frames.popleft()

@@ -256,8 +256,8 @@ class WebServer:
 
         Raises:
             AddressInUseError: The port is in use.
-            NepError: The libraries are not installed, this computer doesn't have an address, or a token is
-                required.
+            NepError: The libraries are not installed, an address in `WebSettings.listen` isn't an
+                address of this computer, or a token is required.
         """
         check_installed()
         check_token(self.settings)
@@ -473,7 +473,10 @@ class WebServer:
     def _subprotocol(
         self, _connection: ServerConnection, offered: Sequence[Subprotocol]
     ) -> Subprotocol | None:
-        """Return Foxglove's subprotocol if the client offers it, else None (rosbridge has no subprotocol)."""
+        """Return Foxglove's subprotocol if it is enabled and the client offers it, else None.
+
+        rosbridge has no subprotocol.
+        """
         if self.settings.foxglove is None:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
@@ -585,9 +588,9 @@ def check_token(settings: WebSettings) -> None:
 
 
 def check_own_address(host: str) -> None:
-    """Raise `NepError` if this computer doesn't have an address.
+    """Raise `NepError` if `host` isn't an address of this computer.
 
-    asyncio of Python 3.13 silently ignores such an address if another one can be bound.
+    asyncio of Python 3.13 silently skips such an address if another one can be bound.
     """
     try:
         with socket.socket() as probe:

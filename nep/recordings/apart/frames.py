@@ -42,7 +42,7 @@ def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
 
 
 def pack_messages(messages: Iterable[RawMessage]) -> bytes:
-    """Encode messages as consecutive MCAP records, which `messages_in` decodes."""
+    """Encode messages as consecutive MCAP records, which `records_in` decodes."""
     pieces: list[bytes | memoryview] = []
     for raw in messages:
         size = raw.data.nbytes
@@ -56,7 +56,10 @@ def corruption_to_plain(damage: Iterable[CorruptRange]) -> list[dict[str, object
 
 
 def corruption_from_plain(value: object) -> tuple[CorruptRange, ...]:
-    """Convert plain values of a frame to the damage of a file. Raises `TypeError` for invalid data."""
+    """Convert plain values of a frame to the damage of a file; no damage if `value` isn't a list.
+
+    Raises `TypeError` for invalid items.
+    """
     return tuple(CorruptRange(**each) for each in value) if isinstance(value, list) else ()
 
 

@@ -64,11 +64,11 @@ class ReaderProcess:
 
         Args:
             path: File to open.
-            cache_bytes: Maximum size of the decompressed chunks that the process caches.
-            progress: Called with bytes done and in total while the file is scanned. An exception kills the
-                process and propagates.
-            budget: Maximum work for the file, including opening, as (bytes, seconds); None limits only
-                opening.
+            cache_bytes: Maximum size of the decompressed chunks that the process caches for this file.
+            progress: Called with bytes done and in total while the file is scanned. An exception kills
+                the process and propagates.
+            budget: Maximum work for the file, including opening, as (bytes, seconds), where the seconds
+                may be None for no limit; None limits only opening.
 
         Raises:
             RecordingError: The file can't be opened, or the process can't be started.

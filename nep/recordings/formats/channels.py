@@ -80,6 +80,8 @@ class Encoding(NamedTuple):
         sequence: Sequence number in the record.
         publish_ns: Publish time in the record (ns since 1970).
         is_decodable: True if the message can be decoded.
+        is_self_contained: True if the record contains all properties, because its publisher has no
+            channel.
     """
 
     form: str
@@ -336,7 +338,7 @@ class ChannelDecoder:
                 seq, stamp = _int_or_none(extra.get("seq", seq)), _int_or_none(extra.get("stamp_ns", stamp))
                 if "publisher" in extra:
                     publisher, kind = _int_or_none(extra["publisher"]), self._kind_of(extra)
-        # `arrived` accepts a missing publisher
+        # `received_message` accepts a missing publisher
         return received_message(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
 
     def _kind_of(self, extra: Mapping[str, Any]) -> MessageKind:

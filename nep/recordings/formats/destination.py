@@ -51,7 +51,7 @@ class Destination(Protocol):
         """True if the recording should continue in another file."""
 
     def next_file(self) -> None:
-        """Finish the current file and open the next one. Raises the exceptions of `finish`.
+        """Finish the current file and open the next one. Raises `OSError` or `RecordingError`.
 
         The counts and metadata of the current file have already been written.
         """

@@ -103,7 +103,7 @@ class AttachedFile:
 
 
 class RecordCounter:
-    """Limit on the number of records other than chunks and messages.
+    """Limit on the number of records other than messages, chunks and their indexes.
 
     Args:
         path: Path of the file, for error messages.
@@ -123,7 +123,7 @@ class RecordCounter:
 
 
 class Definitions:
-    """Channels by number, collected from the schema and channel records of a file."""
+    """Channels by id, collected from the schema and channel records of a file."""
 
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
@@ -140,14 +140,14 @@ class Definitions:
         return bool(self._without_schema)
 
     def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
-        """Add a schema or channel record. Other, damaged and oversized records are ignored.
+        """Add a schema or channel record. Other, repeated, damaged and oversized records are ignored.
 
         Args:
             opcode: Opcode of the record.
             content: Content of the record.
 
         Returns:
-            Numbers of the channels that are now complete.
+            Ids of the channels that were added, or whose schema is now known.
         """
         max_size = _MAX_RECORD_SIZES.get(opcode, 0)
         if not 2 <= len(content) <= max_size:
@@ -186,8 +186,15 @@ class FileIndex:
     """Index of a recording file.
 
     Attributes:
+        definitions: Channels and schemas.
         chunks: Chunks, sorted by start.
+        metadata: Metadata records, as (name, values).
+        attachments: Attached files.
+        corruption: Unreadable places that were found while the index was read.
         is_complete: True if the file has a footer, so that it was closed properly.
+        profile: MCAP profile.
+        library: Program that wrote the file.
+        metadata_bytes: Total size of the metadata records, including skipped ones.
     """
 
     definitions: Definitions = field(default_factory=Definitions)

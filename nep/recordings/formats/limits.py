@@ -26,8 +26,8 @@ _OPEN_BUDGET_RATIO = 64
 def max_chunk_bytes(compressed_bytes: int) -> int:
     """Return the maximum decompressed size of a chunk, in bytes.
 
-    The maximum is 64 MiB or twice the compressed size: a single message of 200 MB is accepted, a kilobyte
-    that expands to gigabytes is not.
+    The maximum is 64 MiB or twice the compressed size, whichever is larger, and never above 1 GiB: a
+    single message of 200 MB is accepted, a kilobyte that expands to gigabytes is not.
 
     Args:
         compressed_bytes: Size of the chunk in the file.

@@ -45,12 +45,12 @@ MAX_CHANNELS = 65_535
 
 
 class ChannelTable:
-    """Assignment of numbers to channels and schemas.
+    """Assignment of ids to channels and schemas.
 
     Files that share a table can copy each other's chunks.
 
     Args:
-        definitions: Channels that already have a number, by number.
+        definitions: Channels that already have an id, by id.
     """
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
@@ -63,7 +63,7 @@ class ChannelTable:
             self._add(number, definition)
 
     def number(self, definition: ChannelDefinition) -> int | None:
-        """Return the number of a channel, assigning one if needed; None if there are too many channels."""
+        """Return the id of a channel, assigning one if needed; None if there are too many channels."""
         number = self._numbers.get(definition)
         if number is None:
             if self._next > MAX_CHANNELS:
@@ -73,12 +73,12 @@ class ChannelTable:
         return number
 
     def add_numbered(self, number: int, definition: ChannelDefinition) -> None:
-        """Add a channel with a given number, unless the number is already assigned."""
+        """Add a channel with a given id, unless the id is already assigned."""
         if number not in self.definitions:
             self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
-        """Return True if a channel already has a number."""
+        """Return True if a channel already has an id."""
         return definition in self._numbers
 
     def _add(self, number: int, definition: ChannelDefinition) -> None:
@@ -91,7 +91,7 @@ class ChannelTable:
         self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
-        """Return the schema record (None without a schema) and the channel record of a channel."""
+        """Return the schema record (None without a schema) and the channel record of a channel id."""
         definition = self.definitions[number]
         key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
         schema_number = self._schemas.get(key, 0)
@@ -148,11 +148,15 @@ class FileWriter:
 
         Args:
             path: File to write.
-            table: Table of channel numbers; None for a new one.
+            table: Table of channel ids; None for a new one.
             compression: "zstd", "lz4", or "" for none.
             is_new: Raise `FileExistsError` if the file exists; False to overwrite it.
             keeps_chunks: Keep the list `chunks` in memory, for copying chunks.
             profile: MCAP profile of the messages, such as "ros2".
+
+        Raises:
+            OSError: The file can't be written.
+            RecordingsUnavailableError: Packages for recordings are not installed.
         """
         check_packages()
         self.path = path
@@ -310,7 +314,7 @@ class FileWriter:
         """Write the channels, and their schemas, that are not in the file yet.
 
         Args:
-            channels: Channel numbers, as the keys of a mapping.
+            channels: Mapping whose keys are channel ids; the values are ignored.
         """
         new = [number for number in channels if number not in self._written_channels]
         if not new:

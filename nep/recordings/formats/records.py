@@ -175,7 +175,17 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
 
 
 class ChunkHead(NamedTuple):
-    """Parsed header of a chunk record; `data_offset` is the offset of the data in the record."""
+    """Parsed header of a chunk record.
+
+    Attributes:
+        start_ns: Time of the first message (ns since 1970).
+        end_ns: Time of the last message (ns since 1970).
+        uncompressed_bytes: Size of the decompressed data.
+        crc: CRC-32 of the decompressed data; 0 if unknown.
+        compression: "zstd", "lz4", or "" for none.
+        data_offset: Offset of the data in the record.
+        data_bytes: Size of the data in the record.
+    """
 
     start_ns: int
     end_ns: int
@@ -218,10 +228,10 @@ def pack_chunk(
 
     Args:
         data: Compressed data.
-        compression: Name of the compression.
+        compression: "zstd", "lz4", or "" for none.
         uncompressed_bytes: Size of the decompressed data.
         crc: CRC-32 of the decompressed data.
-        times: Log times of the first and last message.
+        times: Log times of the first and last message in ns since 1970.
     """
     letters = compression.encode("ascii")
     rest = _CHUNK.pack(*times, uncompressed_bytes, crc, len(letters)) + letters + _SIZE.pack(len(data))
@@ -255,7 +265,7 @@ def message_count(index: bytes | memoryview) -> int:
 
 
 def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntry]]:
-    """Parse a message index record; return the channel number and the entries. Raises `ValueError`."""
+    """Parse a message index record; return the channel id and the entries. Raises `ValueError`."""
     try:
         channel, size = _ENTRIES.unpack_from(content)
         entries_view = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
@@ -300,7 +310,7 @@ class ChunkInfo:
 
     @property
     def channels(self) -> list[int]:
-        """Numbers of the channels with messages in the chunk."""
+        """Ids of the channels with messages in the chunk."""
         return [channel for channel, _offset in _OFFSET.iter_unpack(self.packed_offsets)]
 
     @property
@@ -342,7 +352,7 @@ _second = itemgetter(1)
 
 
 def pack_offsets(offsets: Mapping[int, int]) -> bytes:
-    """Encode the offsets of message indexes by channel, for `ChunkInfo.packed_offsets`."""
+    """Encode one number per channel: index offsets (`packed_offsets`) or counts (`packed_counts`)."""
     return b"".join([_OFFSET.pack(*each) for each in offsets.items()])
 
 

@@ -30,7 +30,7 @@ def _known_types() -> Mapping[str, type]:
 
 
 def schema_of(msg_type: str) -> bytes:
-    """Return the encoded JSON Schema of a message type, given the name of the type."""
+    """Return the encoded JSON Schema of the message type with this name; `ANY_OBJECT` if unknown."""
     declared = _known_types().get(msg_type)
     return ANY_OBJECT if declared is None else json_schema(declared)
 

@@ -42,15 +42,15 @@ def walk_records(
 ) -> Iterator[RecordLocation]:
     """Iterate over the records of a file up to `size`, or to the first invalid bytes.
 
-    The file is read in windows that grow while records are short, so that millions of empty records take a
-    second, and only the headers of large chunks are read.
+    The file is read in windows that grow while records are short, so that millions of empty records
+    take a second, and only the headers of large chunks are read.
 
     Args:
         file: Open file.
-        size: Size of the file.
+        size: Offset at which to stop, such as the size of the file.
         budget: Limit of the work.
         offset: Offset of the first record.
-        begin_bytes: Number of content bytes to return in `Place.prefix`.
+        begin_bytes: Number of content bytes to return in `RecordLocation.prefix`.
 
     Raises:
         RecordingTooLargeError: The budget is exceeded.

@@ -263,7 +263,7 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look,
         assert len(said) > 5
         data = ("ROS 1", "/camera", "/blackboard", "/arm", "arm", "studio", "std_msgs/String", "String")
         assert [text for text in said if untranslated(text, *data)] == []
-        assert [untranslated(made.networks.words.text(), "ROS 1")] == [[]]  # type: ignore[attr-defined]
+        assert [untranslated(made.networks.text_label.text(), "ROS 1")] == [[]]  # type: ignore[attr-defined]
     faults = [fault for fault in clipped(made) if f"at {9 - OUT_OF_SIGHT}," not in fault]  # not the title
     assert faults == []
     made.dispose()

@@ -178,7 +178,7 @@ def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
     question = session.fleet.permission.question
     assert question is not None
     assert heard.receive(0.0) is None
-    session.fleet.permission.answer(let=True)
+    session.fleet.permission.answer(is_allowed=True)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
 
 

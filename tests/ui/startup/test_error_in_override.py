@@ -119,7 +119,7 @@ def test_exception_in_a_method_that_is_no_qt_override_propagates(qapp) -> None:
 def test_every_qt_override_is_guarded() -> None:
     """A camelCase name is a Qt override: it must be guarded or known to need no guard."""
     # Not called by Qt: called by pyqtgraph while painting, or only declared in a protocol of Qt methods.
-    ours = {"setText", "installEventFilter", "insertWidget", "pictureOfCarried", "columnWidth"}
+    ours = {"setText", "installEventFilter", "insertWidget", "columnWidth"}
     ours |= {"tickSpacing", "tickStrings"}
     found: set[str] = set()
     for path in Path(app.ui.__file__).parent.rglob("*.py"):

@@ -73,7 +73,7 @@ def test_studio_with_an_unreachable_display_exits_with_a_message(tmp_path: Path)
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert (
-        "no window can open; see that the screen is there and lets you in (DISPLAY is ':64999')"
+        "no window can open; check that the display exists and accepts connections (DISPLAY is ':64999')"
         in done.stderr
     )
     assert "einstall" not in done.stderr

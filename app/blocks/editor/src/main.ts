@@ -33,8 +33,8 @@ import {TryResult, registerTries} from './tries';
 import {t, setTranslations} from './words';
 
 interface Bridge {
-  told: {connect(slot: (name: string, payload: string) => void): void};
-  beginning(): Promise<string>;
+  command_sent: {connect(slot: (name: string, payload: string) => void): void};
+  initial_settings(): Promise<string>;
   ready(): void;
   changed(key: string, generation: number, json: string): void;
   history(canUndo: boolean, canRedo: boolean): void;
@@ -44,19 +44,19 @@ interface Bridge {
   failed(message: string): void;
   opened(): void;
   on_block(has: boolean): void;
-  offers(sensors: string): void;
+  show_sensors(sensors: string): void;
   copy(text: string): void;
   copied(): Promise<string>;
   command(name: string): void;
-  watches(variables: string): void;
-  wants(request: string): void;
-  tries(stack: string): void;
+  watch_variables(variables: string): void;
+  press_canvas_button(button: string): void;
+  try_stack(stack: string): void;
   pin(keeps: boolean): void;
   deleted(count: number): void;
-  carried(x: number, y: number, out: boolean, home: string): void;
-  pictureOfCarried(data: string, ratio: number): void;
+  drag_outside(x: number, y: number, isOutside: boolean, tab: string): void;
+  drag_picture(data: string, ratio: number): void;
   dropped(x: number, y: number): void;
-  brought(count: number, how: string, from: string): void;
+  transferred(count: number, mode: string, sourceTab: string): void;
   backpack(json: string): void;
 }
 
@@ -76,12 +76,12 @@ class Editor {
   private readonly empty: EmptyCanvas;
 
   constructor(private readonly bridge: Bridge, pinned: boolean | null, private theme: {tokens: Tokens; dark: boolean}) {
-    this.empty = new EmptyCanvas(() => this.activeTab.workspace, this.pointer, (command) => bridge.wants(command));
+    this.empty = new EmptyCanvas(() => this.activeTab.workspace, this.pointer, (button) => bridge.press_canvas_button(button));
     this.carrying = new CrossTabDrag({
-      carried: (x, y, out, home) => bridge.carried(x, y, out, home),
-      pictured: (data, ratio) => bridge.pictureOfCarried(data, ratio),
+      carried: (x, y, isOutside, tab) => bridge.drag_outside(x, y, isOutside, tab),
+      pictured: (data, ratio) => bridge.drag_picture(data, ratio),
       dropped: (x, y) => bridge.dropped(x, y),
-      brought: (count, how, from) => bridge.brought(count, how, from),
+      brought: (count, mode, sourceTab) => bridge.transferred(count, mode, sourceTab),
     }, () => this.activeTab);
     const ofShown = (tab: Tab, notify: () => void) => {
       if (tab === this.tabs?.activeTab) notify();
@@ -112,7 +112,7 @@ class Editor {
     // A hidden page has no animation frames, and Blockly fires events only after a frame.
     document.addEventListener('visibilitychange', () => document.hidden && this.activeTab.program.flush());
     this.createZoomButtons();
-    registerTries((request) => bridge.tries(JSON.stringify(request)));
+    registerTries((request) => bridge.try_stack(JSON.stringify(request)));
     registerHelpMenu((block) => this.help.show(block));
     this.clipboard = new Clipboard({write: (text) => bridge.copy(text), read: () => bridge.copied()});
     registerClipboardShortcuts(this.clipboard);
@@ -229,13 +229,13 @@ class Editor {
   /** Requests the values of the watched variables from the window. */
   private notifyWatched(): void {
     const watched = JSON.stringify(this.activeTab.watched.ids);
-    if (watched !== this.watched) this.bridge.watches(this.watched = watched);
+    if (watched !== this.watched) this.bridge.watch_variables(this.watched = watched);
   }
 
   /** Requests the values of the sensors shown in the toolbox from the window. */
   private notifyOfferedSensors(): void {
     const offered = JSON.stringify(this.activeTab.offered);
-    if (offered !== this.offered) this.bridge.offers(this.offered = offered);
+    if (offered !== this.offered) this.bridge.show_sensors(this.offered = offered);
   }
 
   /** Runs `draw` with the light theme. */
@@ -340,19 +340,19 @@ async function loadLocale(requested: string): Promise<string> {
 }
 
 async function start(bridge: Bridge): Promise<void> {
-  const beginning = JSON.parse(await bridge.beginning()) as InitialState;
-  useTokens(beginning.theme.tokens, beginning.theme.dark);
-  setCssVariables(beginning.theme.dark);
-  document.documentElement.classList.toggle('reduced', beginning.reduced);
-  setTranslations(beginning.words ?? {});
-  const language = await loadLocale(beginning.language);
+  const initial = JSON.parse(await bridge.initial_settings()) as InitialState;
+  useTokens(initial.theme.tokens, initial.theme.dark);
+  setCssVariables(initial.theme.dark);
+  document.documentElement.classList.toggle('reduced', initial.reduced);
+  setTranslations(initial.words ?? {});
+  const language = await loadLocale(initial.language);
   setBlocklyMessages(language);
   configureMenu();
   applyShortcutKeys();
   // Load the fonts first, because Blockly caches the width of text.
   const fonts = ['600 15px Inter', '500 14px Inter', ...(language === 'ja' ? ['600 15px "M PLUS 1p"'] : [])];
   await Promise.allSettled(fonts.map((font) => document.fonts.load(font)));
-  const editor = new Editor(bridge, beginning.pinned, beginning.theme);
+  const editor = new Editor(bridge, initial.pinned, initial.theme);
   trackInputModality();
   const inbox = new Inbox((name, payload) => {
     try {
@@ -361,7 +361,7 @@ async function start(bridge: Bridge): Promise<void> {
       bridge.failed(`${name}: ${error instanceof Error ? error.message : String(error)}`);
     }
   });
-  bridge.told.connect((name, payload) => inbox.dispatch(name, payload));
+  bridge.command_sent.connect((name, payload) => inbox.dispatch(name, payload));
   window.addEventListener('error', (event) => bridge.failed(event.message));
   window.addEventListener('unhandledrejection', (event) => bridge.failed(String(event.reason)));
   bridge.ready();

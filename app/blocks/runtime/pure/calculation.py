@@ -61,27 +61,27 @@ def tangent(degrees: object) -> int | float:
 
 
 def arc_sine(value: object) -> int | float:
-    """Return the angle in degrees whose sine is a number."""
+    """Return the angle in degrees whose sine is `value`. Raises BehaviourError outside of -1 to 1."""
     return _rounded_result(math.degrees(_apply(math.asin, value, lazy("“asin”"))))
 
 
 def arc_cosine(value: object) -> int | float:
-    """Return the angle in degrees whose cosine is a number."""
+    """Return the angle in degrees whose cosine is `value`. Raises BehaviourError outside of -1 to 1."""
     return _rounded_result(math.degrees(_apply(math.acos, value, lazy("“acos”"))))
 
 
 def arc_tangent(value: object) -> int | float:
-    """Return the angle in degrees whose tangent is a number."""
+    """Return the angle in degrees whose tangent is `value`."""
     return _rounded_result(math.degrees(math.atan(number(value, lazy("“atan”")))))
 
 
 def natural_logarithm(value: object) -> int | float:
-    """Return the logarithm of a number to the base e."""
+    """Return the logarithm of a number to the base e. Raises BehaviourError if it is not positive."""
     return _apply(math.log, value, lazy("“ln”"))
 
 
 def logarithm(value: object) -> int | float:
-    """Return the logarithm of a number to the base 10."""
+    """Return the logarithm of a number to the base 10. Raises BehaviourError if it is not positive."""
     return _apply(math.log10, value, lazy("“log”"))
 
 
@@ -173,7 +173,13 @@ def is_divisible(value: object, by: object) -> bool:
 
 
 def counting(first: object, last: object, step: object) -> Iterator[int | float]:
-    """Yield the numbers from `first` to `last`, ascending or descending; the sign of `step` is ignored."""
+    """Return an iterator over the numbers from `first` to `last`, ascending or descending.
+
+    The sign of `step` is ignored.
+
+    Raises:
+        BehaviourError: The step is 0.
+    """
     label = lazy("“count”")
     begin, end, step_size = (number(each, label) for each in (first, last, step))
     if step_size == 0:

@@ -32,6 +32,9 @@ def letter(value: object, selector: object) -> str:
     Args:
         value: Text.
         selector: Number of the character, "first", "last" or "random".
+
+    Raises:
+        BehaviourError: The text is empty, or it has no character with this number.
     """
     all_of_it = grapheme_clusters(text(value))
     if not all_of_it:
@@ -62,7 +65,7 @@ def part_of_text(value: object, first: object, last: object) -> str:
 
 
 def position_in_text(value: object, piece: object) -> int:
-    """Return the number of the character at which a text first occurs in another text; 0 if missing."""
+    """Return the number of the character at which `piece` first occurs in a text; 0 if missing or empty."""
     full_text, substring = text(value), text(piece)
     index = full_text.find(substring) if substring else -1
     return 0 if index < 0 else len(grapheme_clusters(full_text[:index])) + 1
@@ -114,7 +117,11 @@ def backwards(value: object) -> str:
 
 
 def replaced(value: object, old: object, new: object) -> str:
-    """Return a text with all occurrences of a substring replaced."""
+    """Return a text with all occurrences of `old` replaced; the text itself if `old` is empty.
+
+    Raises:
+        BehaviourError: The result is too long.
+    """
     full_text, before, after = text(value), text(old), text(new)
     if not before:
         return full_text
@@ -131,7 +138,11 @@ def has_number(value: object) -> bool:
 
 
 def number_in(value: object) -> int | float:
-    """Return the first number in a text; a number is returned unchanged."""
+    """Return the first number in a text; a number is returned unchanged.
+
+    Raises:
+        BehaviourError: The text contains no number, or the value is None.
+    """
     if isinstance(value, (int, float)) or value is None:
         return number(value, lazy("“number in”"))
     parsed = _parse_number(value)

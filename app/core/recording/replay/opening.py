@@ -28,12 +28,16 @@ class OpenedRecording:
 
 
 def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
-    """Open a recording for replay. Raises `RecordingError` if no message can be read.
+    """Open a recording for replay.
 
     Args:
         path: File of the recording.
-        progress: Called with the progress of scanning a file without an index.
+        progress: Called with the progress of scanning a file without an index, 0 to 1.
         opener: Opens the file; by default, in this process.
+
+    Raises:
+        RecordingError: The file can't be read, contains no messages, or has more than `MAX_TOPICS`
+            topics.
     """
 
     def report_progress(done: int, total: int) -> None:

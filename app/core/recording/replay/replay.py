@@ -194,13 +194,16 @@ class Replay:
         )
 
     def step(self, *, forward: bool) -> None:
-        """Pause, and move the playhead to the next or previous message of the chosen topic."""
+        """Pause, and move the playhead to the next or previous message of the chosen topic.
+
+        Has no effect if no topic is chosen.
+        """
         topic = self.chosen
         if topic in self.recorded_topics:
             self.source.queue_change("step", lambda playback: playback.step(topic, forward=forward))
 
     def select_topic(self, topic: str) -> None:
-        """Choose the topic whose messages `step` steps through."""
+        """Choose the topic whose messages `step` steps through. Topics that aren't recorded are ignored."""
         if topic in self.recorded_topics:
             self.chosen = topic
 
@@ -226,7 +229,7 @@ class Replay:
         self.source.queue_change("loop", lambda playback: playback.clear_loop())
 
     def toggle_loop(self) -> None:
-        """Stop looping, or start to loop the chosen range or the whole recording."""
+        """Stop looping, or start to loop the whole recording."""
         player = self.player
         if player is not None and player.is_looping:
             self.end_loop()

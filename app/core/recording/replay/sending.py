@@ -57,6 +57,8 @@ class SentTopic:
     """Topic of a recording that is being published.
 
     Attributes:
+        turn: Number of the arming under which the topic is published.
+        is_latched: True if the topic is latched in the recording.
         publishers: Open publishers, by message type.
         is_ready: True if messages can be sent.
         count: Number of sent messages.
@@ -127,11 +129,11 @@ class ReplayOutbox:
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
-        """Publish messages that were just played.
+        """Publish messages that were just played, if their topics are active.
 
         Args:
             messages: Messages in order of time.
-            late_s: Delay of each message in seconds.
+            late_s: Delay of each message in seconds. Messages later than `MAX_DELAY_S` are dropped.
         """
         with self._lock:
             active = dict(self._active)
@@ -347,7 +349,10 @@ class ReplaySending:
         self._mark_changed()
 
     def stop(self) -> None:
-        """Stop publishing all topics when the recording is closed."""
+        """Stop publishing all topics, and disarm if any topic was published or pending.
+
+        Called when the recording is closed.
+        """
         if self.outbox.active_topics or self._pending_routes:
             self._acting.disarm()
         self._stop_all()

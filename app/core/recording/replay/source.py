@@ -68,6 +68,7 @@ class ReplayStatus:
         progress: Progress of opening the file, 0 to 1.
         message: Reason for a failure, or "".
         player: Playback status; None before the file is open.
+        corruption: Damaged ranges of the file that were found up to now.
     """
 
     stage: ReplayStage
@@ -121,7 +122,7 @@ class ReplaySource:
         clock: Callable[[], float] = time.monotonic,
         opener: RecordingOpener | None = None,
     ) -> None:
-        # Tests call `open` and `turn` instead of `start`. `opener` is closed at the end.
+        # Tests call `open` and `process` instead of `start`. `opener` is closed at the end.
         self.path = path
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.opened: OpenedRecording | None = None
@@ -172,13 +173,13 @@ class ReplaySource:
             self._changed.notify_all()
 
     def watch(self, topic: str) -> None:
-        """Watch a topic."""
+        """Deliver the messages of the topic with this name in the recording."""
         with self._changed:
             self._watched.add(topic)
         self.queue_change("choose", self._update_selection)
 
     def unwatch(self, topic: str) -> None:
-        """Stop watching a topic."""
+        """Stop delivering the messages of a topic."""
         with self._changed:
             self._watched.discard(topic)
         self.queue_change("choose", self._update_selection)
@@ -233,7 +234,7 @@ class ReplaySource:
         return not self._thread.is_alive()
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Stop the thread and close the file. Idempotent."""
+        """Stop the thread, which closes the file; wait at most ``timeout_s`` seconds for it. Idempotent."""
         self.request_stop()
         if self._thread.is_alive():
             self._thread.join(timeout_s)

@@ -27,6 +27,7 @@ class RecordedSpan:
         has_ended: True if the run or alarm ended within the recording.
         result: Result of a run, one of `RESULTS`; "" while unknown.
         details: Details of the result.
+        is_error: True for an alarm with the severity "error".
         topic: Topic of the alarm, or "".
     """
 

@@ -1,4 +1,4 @@
-"""Motion gate: check of all messages that may move robots, from alarms, the shelf, replays and clicks.
+"""Motion gate: check of all messages that may move robots (alarms, saved messages, replays, clicks).
 
 The main thread asks the user (`MotionGate.request_permission`). Any thread checks immediately before each
 message (`MotionGate.rejection_reason`), so that a robot that connects in the meantime is not moved.

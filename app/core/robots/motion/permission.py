@@ -116,6 +116,8 @@ class MotionPermission:
     ) -> bool:
         """Return True if the robots may move now; otherwise ask the user and return False.
 
+        A question that is still open is replaced.
+
         Args:
             requested: Robots and the actions that they should execute.
             go_on: Called if the user allows the motion.
@@ -143,7 +145,7 @@ class MotionPermission:
         """Apply the user's answer to the question.
 
         Args:
-            let: True to allow the motion and call ``go_on``.
+            is_allowed: True to allow the motion and call `PermissionQuestion.on_allow`.
             always: True to save the permission.
 
         Raises:
@@ -171,7 +173,11 @@ class MotionPermission:
             self.revision += 1
 
     def revoke_all(self) -> None:
-        """Revoke all permissions."""
+        """Revoke all permissions, including saved ones.
+
+        Raises:
+            SettingsError: The settings can't be written. Saved permissions remain valid.
+        """
         self._allowed.clear()
         self.strangers = frozenset()
         self.revision += 1

@@ -201,8 +201,8 @@ class MovedRobots:
 
         Args:
             name: Name of the robot.
-            id: Id of the invocation.
-            program: Program that replied.
+            id: Id of the invocation; with "", nothing is ended.
+            program: Program that replied; None ends the motion of every program.
         """
 
         def remains(motion: UnconfirmedMotion) -> bool:

@@ -27,7 +27,10 @@ _DEFAULT_SAFE_STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconn
 def targets_of(
     links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
-    """Return the targets of a Stop. Replies of disconnected robots that are not moving are not awaited.
+    """Return the targets of a Stop.
+
+    Replies of disconnected robots that are not moving are not awaited; those that never replied are
+    omitted.
 
     Args:
         links: Listed robots.

@@ -164,7 +164,7 @@ class StopReport:
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
     def with_late_reply(self, late: RobotStop) -> StopReport:
-        """Return the report with a late reply applied."""
+        """Return the report with a late reply applied; unchanged if it doesn't include the program."""
         lines = ((robot.name, robot.program) for robot in self.robots)
         if (late.name, late.program) not in lines:
             return self
@@ -186,7 +186,12 @@ def unreached_result(name: str, reason: str = "") -> RobotStop:
 
 @dataclass(frozen=True, slots=True)
 class StopCompleted:
-    """Event: a Stop is complete, because all robots have replied or timed out."""
+    """Event: a Stop is complete, because all robots have replied or timed out.
+
+    Attributes:
+        number: Number of the Stop.
+        report: Result of the Stop.
+    """
 
     number: int
     report: StopReport
@@ -194,7 +199,12 @@ class StopCompleted:
 
 @dataclass(frozen=True, slots=True)
 class RobotReplied:
-    """Event: a robot has replied to a Stop while other replies are pending."""
+    """Event: a robot has replied to a Stop while other replies are pending.
+
+    Attributes:
+        number: Number of the Stop.
+        robot: Result for the robot.
+    """
 
     number: int
     robot: RobotStop

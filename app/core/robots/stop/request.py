@@ -23,12 +23,16 @@ class StopRequest:
     """State of the Stop of one robot.
 
     Attributes:
+        on_late: Called with each reply after the timeout, or None.
+        ends: Key of a program whose further commands the robot rejects, or None.
+        error: Reason why the Stop could not be sent, or "".
         replies: Reply of each program that serves the robot, by node; None while pending. Empty until
             the programs are known.
         unknown_replies: Undecoded replies of publishers that the graph does not list yet.
         foreign_replies: Undecoded replies of programs that do not serve the robot.
         delivered_topics: Topics on which the command was sent while the robot was connected.
         delivered_s: Time of the first of these messages (monotonic seconds).
+        is_over: True after the report; later replies are late.
     """
 
     line: StopLine
@@ -123,7 +127,10 @@ class StopRequest:
         return True
 
     def impostors(self) -> list[str]:
-        """Return the nodes that replied to this Stop although they do not serve the robot."""
+        """Return the nodes that replied to this Stop although they do not serve the robot.
+
+        Clears the `foreign_replies`.
+        """
         return [
             node
             for node, pending in self.foreign_replies.items()

@@ -149,7 +149,7 @@ class RobotStopper:
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of the robots to which a connection is open."""
+        """Names of the robots whose replies are awaited and to which all connections are open."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.target.is_expected and line.is_complete]
             return tuple(line.name for line in lines)
@@ -198,7 +198,7 @@ class RobotStopper:
         Robots that don't support ``ends`` (RIZE) need another Stop after the program has ended.
 
         Args:
-            names: Names of the robots; None for all robots.
+            names: Names of the robots; None for all robots whose replies are awaited.
             ends: Key of a program (`app.robots.identity`) whose further commands the robots reject.
         """
         for line in self._select_lines(names):
@@ -216,15 +216,15 @@ class RobotStopper:
         """Stop robots and wait until each has replied or timed out.
 
         Args:
-            names: Names of the robots; None for all. Robots that can't be reached are included in the
-                report.
-            timeout_s: Maximum time to wait. Default: the time that the descriptions require, at least
-                one second.
+            names: Names of the robots; None for all whose replies are awaited. Robots that can't be
+                reached are included in the report.
+            timeout_s: Maximum time to wait in seconds. Default: the time that the descriptions require,
+                at least one second.
             on_answer: Called in this thread for each reply, and at the end for each robot without a
                 reply.
             ends: Key of a program whose further commands the robots reject (see `send_stop`).
-            on_late: Called in another thread (of the node or of `update_graph`) when a robot replies after
-                the timeout, or confirms the Stop after that.
+            on_late: Called in another thread (of the node or of `update_graph`) when a robot replies
+                after the timeout, or confirms the Stop after that.
             is_for_all: True to send the Stop to robots whose reply is not awaited as well.
 
         Returns:

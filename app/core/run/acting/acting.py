@@ -108,7 +108,7 @@ class SessionActing:
         self.question: ArmQuestion | None = None
         """Open question about arming a robot's topic."""
         self.last: dict[str, SendResult] = {}
-        """Result of the last sending of each message on the shelf, by message id."""
+        """Result of the last sending of each saved message, by message id."""
         self.armed_s = ARMED_S
         self.revision = 0
         self._clock_s = clock_s
@@ -170,7 +170,7 @@ class SessionActing:
             is_sure: True to skip the question.
 
         Returns:
-            Reason why this isn't possible, or "".
+            Reason why this isn't possible; "" if the target is allowed or the user is being asked.
         """
         if not is_sure and self.needs_confirmation(target):
             names = tuple(name for name in self._moved_robots(target) if name != target.name)
@@ -191,14 +191,18 @@ class SessionActing:
             self.allow(target, on_allowed, is_sure=True)
 
     def answer(self, *, let: bool) -> None:
-        """Apply the user's answer to `question`."""
+        """Apply the user's answer to `question`, and remove the question.
+
+        Args:
+            let: True to allow the motion.
+        """
         question, self.question = self.question, None
         self.revision += 1
         if question is not None and let:
             question.on_allow()
 
     def forbid(self, target: Target) -> None:
-        """Deny sending to a target."""
+        """Deny sending to a target, and stop its repeated messages."""
         self.arming.forbid(target)
         for repeated in self.outbox.repeated_messages:
             if repeated.order.target == target:
@@ -241,7 +245,7 @@ class SessionActing:
     # ---- messages
 
     def new_message(self, topic: str, msg_type: str, text: str) -> SavedMessage | None:
-        """Add a message to the shelf and return it; return None if the shelf is full."""
+        """Add a saved message and return it; return None if there are `MAX_MESSAGES`."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
         message = SavedMessage(new_message_id(), name, topic, msg_type or "json", text)
         return message if self.shelf.set_message(message) else None
@@ -269,7 +273,7 @@ class SessionActing:
         robots, the user is asked first.
 
         Args:
-            message: Message of the shelf.
+            message: Saved message.
             rate_hz: Messages per second; 0 to send once.
 
         Returns:
@@ -467,7 +471,7 @@ class SessionActing:
         self._session.console.add(level, "studio", message)
 
     def check(self) -> None:
-        """Save the shelf if it has changed. Called once a second."""
+        """Write the saved messages to the file if they have changed. Called once a second."""
         self._write()
         try:
             if self._worker.pop_result(FILE_NAME):
@@ -479,7 +483,7 @@ class SessionActing:
             self._session.alerts.raise_alert("messages:kept", "warn", title, detail, count=0)
 
     def close(self) -> None:
-        """Stop all sending and save the shelf."""
+        """Stop all sending and write the saved messages to the file."""
         self.disarm()
         self.outbox.close()
         self.calls.close()
@@ -522,7 +526,8 @@ def _do_nothing() -> None: ...
 def result_text(result: SendResult) -> str:
     """Format the result of sending, such as "received by 2" or "412 sent, 3 late messages skipped".
 
-    A failure is the reason, after the number of messages that were sent before it.
+    For a failure, the text is the reason, preceded by the number of messages sent before it if there
+    were any.
     """
     if result.kind == "sent":
         return subscribers_text(result.subscriber_count)

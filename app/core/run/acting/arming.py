@@ -49,7 +49,7 @@ class Arming:
 
     @property
     def remaining_s(self) -> float:
-        """Remaining time in seconds."""
+        """Remaining time in seconds; 0 if sending is off."""
         return max(0.0, self._until_s - self._clock()) if self._is_on else 0.0
 
     @property
@@ -65,7 +65,7 @@ class Arming:
         """Switch sending on, or extend the time.
 
         Args:
-            seconds: Time from now, limited to `MIN_S` to `MAX_S`.
+            seconds: Time from now in seconds, limited to `MIN_S` to `MAX_S`.
         """
         with self._lock:
             if not self.is_on:

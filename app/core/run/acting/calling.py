@@ -41,7 +41,7 @@ class CallRecord:
         error: Reason for a failure, or "".
         reply: Value of the reply.
         text: Reply as JSON; shortened if `is_cut` is True.
-        is_retained: False if `answer` and `text` were discarded in favour of newer calls.
+        is_retained: False if `reply` and `text` were discarded in favour of newer calls.
     """
 
     number: int
@@ -108,7 +108,7 @@ class ServiceCalls:
 
     @property
     def records(self) -> Sequence[CallRecord]:
-        """Past calls, oldest first."""
+        """Calls, oldest first. The last one may be in flight."""
         return self._records
 
     @property
@@ -123,13 +123,16 @@ class ServiceCalls:
         return self._clock() - self._in_flight.requested_s if self._in_flight is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
-        """Call a service. Raises `NepError` while another call is in flight.
+        """Call a service and return the record of the call.
 
         Args:
             service: Name of the service.
             request: Request as a value.
             words: Request as shown to the user.
-            timeout_s: Timeout in seconds.
+            timeout_s: Timeout in seconds, limited to `MIN_S` to `MAX_S`.
+
+        Raises:
+            NepError: Another call is in flight.
         """
         if self.in_flight is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.in_flight.service))

@@ -112,7 +112,11 @@ def parse_typed_value(text: str) -> object:
 
 
 def format_json(value: object) -> str:
-    """Format a value as indented JSON. Values that JSON doesn't support become strings."""
+    """Format a value as indented JSON.
+
+    Of the values that JSON doesn't support, bytes become hexadecimal text, other iterables become
+    arrays, and all others become strings.
+    """
     return json.dumps(value, indent=2, ensure_ascii=False, default=_to_json_value)
 
 

@@ -55,7 +55,7 @@ class SentRecord:
 
 
 class SentLog:
-    """Newest `MAX_ENTRIES` entries, oldest first, and the total number of entries.
+    """Newest `MAX_ENTRIES` entries, oldest first, and the number of messages and calls sent so far.
 
     Not thread-safe; use it from the main thread.
     """
@@ -102,7 +102,7 @@ class SentLog:
             self._records.append(replace(record, number=self._last))
 
     def clear(self) -> None:
-        """Remove all entries. The total number is not reset."""
+        """Remove all entries. `total` is not reset."""
         self._records.clear()
         self.revision += 1
 

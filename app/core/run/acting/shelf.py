@@ -1,4 +1,4 @@
-"""Shelf: messages that the user saved for repeated use, stored in a file next to the settings."""
+"""`SavedMessages`: messages that the user saved for repeated use, stored in a file next to the settings."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Shelf:
         return next((each for each in self._messages if each.id == id), None)
 
     def set_message(self, message: SavedMessage) -> bool:
-        """Add a message, or replace the message with the same id; return False if the shelf is full."""
+        """Add a message, or replace the message with the same id; return False if it is full."""
         index = self._index(message.id)
         if index is None:
             if len(self._messages) >= MAX_MESSAGES:
@@ -110,7 +110,10 @@ class Shelf:
         return True
 
     def copy(self, id: str) -> SavedMessage | None:
-        """Insert and return a copy of a message after it; None if there is no such message or no room."""
+        """Insert a copy of a message after it, and return the copy.
+
+        Returns None if there is no such message, or no room for another one.
+        """
         index = self._index(id)
         if index is None or len(self._messages) >= MAX_MESSAGES:
             return None
@@ -140,7 +143,10 @@ class Shelf:
         return removed
 
     def restore(self) -> SavedMessage | None:
-        """Restore the last removed message at its previous position and return it; None if there is none."""
+        """Restore the last removed message at its previous position and return it.
+
+        Returns None if there is none, or no room for it.
+        """
         if self._removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
         (message, index), self._removed = self._removed, None
@@ -149,7 +155,7 @@ class Shelf:
         return message
 
     def set_request(self, service: str, request: str) -> None:
-        """Store the JSON text of a request as the last request of a service."""
+        """Store the JSON text of a request as the last request of a service. Too long texts are ignored."""
         if self._requests.get(service) != request and len(request) <= MAX_LENGTH:
             self._requests.pop(service, None)
             self._requests[service] = request
@@ -165,7 +171,7 @@ class Shelf:
 
 
 def encode_shelf(shelf: Shelf) -> bytes:
-    """Return a shelf in the file format."""
+    """Return saved messages in the file format."""
     value = {
         "format": FORMAT_VERSION,
         "messages": [
@@ -189,11 +195,11 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
     """Parse the content of a file.
 
     Returns:
-        Shelf, and number of unreadable messages.
+        Saved messages, and number of unreadable messages.
 
     Raises:
-        NewerShelfError: A newer version of Studio wrote the file.
-        NepError: The file isn't a shelf.
+        NewerSavedMessagesError: A newer version of Studio wrote the file.
+        NepError: The file isn't a file of saved messages.
     """
     try:
         value = json.loads(data.decode("utf-8-sig"))

@@ -347,9 +347,10 @@ def with_action(rule: AlarmRule, index: int, action: AlarmAction | None) -> Alar
 
 
 def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
-    """Return a copy of the rule with another kind of condition.
+    """Return a copy of the rule with another kind of condition; the rule itself if the kind is unchanged.
 
-    Name, field path, limit and duration are copied if they apply to the new kind too; otherwise they get
+    The name and the field path are copied if they apply to the new kind too. The limit and the
+    duration are copied only from one condition on a field's value to another; otherwise they get
     default values.
     """
     condition = rule.condition

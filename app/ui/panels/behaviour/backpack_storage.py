@@ -78,7 +78,7 @@ class BackpackController:
             self._remove(self._backpack.empty, emptied=True)
 
     def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, has_notes: bool) -> None:
-        # `left` is True if the selection contained notes, which the backpack doesn't store.
+        # `has_notes` is True if the selection contained notes, which the backpack doesn't store.
         added: list[BackpackStack] = []
         if blocks and self._apply_change(lambda: added.extend(self._backpack.add(blocks))):
             template = ngettext(

@@ -109,7 +109,10 @@ class Editor(Protocol):
 
 
 def make_blockly_editor(parent: QWidget) -> Editor:
-    """Create the block editor; called when the panel is first shown."""
+    """Create the block editor; called when the panel is first shown.
+
+    Raises `ImportError` if a system library that Qt WebEngine needs is missing.
+    """
     # Importing Qt WebEngine takes about 200 ms.
     from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
 

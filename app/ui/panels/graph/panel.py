@@ -499,7 +499,12 @@ class GraphPanel(PanelWidget):
         self.context.files.save_as(_("Export the graph"), suggestion, (kind,), self.save)
 
     def save(self, path: Path, kind: FileKind) -> None:
-        """Write the graph to a file and report the result in a toast."""
+        """Write the graph to a file and report the result in a toast; does nothing if the graph is empty.
+
+        Args:
+            path: File to write.
+            kind: `SVG_KIND` for an image, `DOT_KIND` for Graphviz.
+        """
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return

@@ -136,7 +136,7 @@ class GroupItem:
 
 
 class GraphScene:
-    """Geometry of a graph. Only `update_stats` changes it, to update rates and counts.
+    """Geometry of a graph. Positions are fixed; rates, counts and the filter change texts and colours.
 
     Args:
         theme: Theme with the fonts.

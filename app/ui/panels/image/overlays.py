@@ -66,6 +66,8 @@ class Overlays:
     def annotations_for(self, width: int, height: int) -> tuple[AnnotationShape, ...]:
         """Return the annotations to draw over an image. Each message is decoded only once.
 
+        Messages that are larger than `LARGE_BYTES` or can't be decoded have no annotations.
+
         Args:
             width: Width of the image in px.
             height: Height of the image in px.

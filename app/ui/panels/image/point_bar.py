@@ -240,7 +240,7 @@ class PointBar(QWidget):
         return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
 
     def restore(self, saved: object) -> None:
-        """Restore a state returned by `saved`. Invalid entries are ignored, and nothing is armed."""
+        """Restore a state returned by `to_json`. Invalid entries are ignored, and nothing is armed."""
         if not isinstance(saved, Mapping):
             return
         topic, kind = saved.get("topic"), saved.get("type")

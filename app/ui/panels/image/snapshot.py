@@ -66,7 +66,7 @@ class SnapshotJob(QObject):
         self._start(lambda: QImage.fromData(encode_png(message)))
 
     def wait(self) -> None:
-        """Wait up to 2 s for the thread and discard its result; the next job can start then."""
+        """Wait up to 2 s for the thread and discard its result; called before the image stream is closed."""
         self._timer.stop()
         thread, self._thread = self._thread, None
         self._results = queue.SimpleQueue()  # the thread may outlive the wait and report to the old queue

@@ -38,7 +38,7 @@ class _RangeEdit(NumberEdit):
 
 
 class LookBar(QWidget):
-    """Bar with display settings of an image; emits `changed` with the new `PictureLook`.
+    """Bar with display settings of an image; emits `changed` with the new `PictureStyle`.
 
     Args:
         picture: Returns the image shown, or None.

@@ -197,11 +197,11 @@ class InspectorBody(QWidget):
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def show_large(self, size_bytes: int, explanation: str, read: Callable[[], object] | None = None) -> None:
-        """Show that the message is large instead of its values.
+        """Show the size of a large message instead of its values.
 
         Args:
-            size_bytes: Size of the message.
-            explanation: Explanation.
+            size_bytes: Size of the message in bytes.
+            explanation: Sentence below the size, such as the reason why the values aren't shown.
             read: Decodes the message when the user clicks the button; None for no button.
         """
         self.large.set_texts(_("Large message ({size})").format(size=size_text(size_bytes)), explanation)

@@ -41,7 +41,7 @@ def find_in_text(index: JsonIndex, needle: str, max_matches: int = MAX_MATCHES) 
 
 
 class FindField(SearchField):
-    """Find field: Return selects the next match, Shift+Return the previous one; Esc clears the field.
+    """Find field: Return or F3 selects the next match, with Shift the previous one; Esc clears the field.
 
     Down gives the tree the focus.
     """
@@ -99,6 +99,7 @@ class FindBar(QWidget):
 
     Signals:
         match_selected: Path of the selected match.
+        query_changed: The text if it begins with ``$``, else "".
     """
 
     match_selected = Signal(object)

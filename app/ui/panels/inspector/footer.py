@@ -30,15 +30,15 @@ def message_info(
 ) -> str:
     """Format the properties of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
 
-    Unknown properties are omitted. The latency of messages from other computers is corrected by the clock
-    offset and shown with its uncertainty (``3.2 ms ± 0.4 ms``).
+    Unknown properties are omitted. The latency of messages from other computers is corrected by the
+    clock offset and shown with its uncertainty (``3.2 ms ± 0.4 ms``).
 
     Args:
         message: Message with the properties measured on arrival.
-        since_ns: Start of the subscription in ns since 1970. A latched message that was sent before this
-            time shows its age instead of a latency.
-        network: Foreign network of the topic, or None. The text mentions which properties this network does
-            not report.
+        since_ns: Start of the subscription in ns since 1970. A latched message that was sent before
+            this time shows its age instead of a latency.
+        network: Kind of the topic's network; None for Studio's own network. The text mentions if
+            this network doesn't report sequence numbers or latency.
         recorded: True to show the time of day instead of the latency.
     """
     parts = [size_text(message.size_bytes)]

@@ -23,7 +23,7 @@ class HistoryStrip(QWidget):
     """Strip that collects the messages of a topic and lets the user select one of them.
 
     Attributes:
-        kept: Collected messages.
+        history: Collected messages.
         at: Number of the selected message; None while the newest one is selected.
 
     Signals:
@@ -94,15 +94,18 @@ class HistoryStrip(QWidget):
         return self.kept.at(self.at) if self.at is not None else None
 
     def before(self) -> Message | None:
-        """Return the message before the selected one, or None if it is not available."""
+        """Return the message before the selected one.
+
+        None if the newest message is selected or the message has been evicted.
+        """
         return self.kept.at(self.at - 1) if self.at is not None else None
 
     def step(self, by: int) -> None:
         """Select another message.
 
         Args:
-            by: Number of messages to move by; negative for earlier messages. A step beyond the end selects
-                the newest message, also when later messages arrive.
+            by: Number of messages to move by; negative for earlier messages. A step beyond the last
+                message selects the newest message and follows later ones.
         """
         if not len(self.kept):
             return
@@ -113,7 +116,7 @@ class HistoryStrip(QWidget):
         """Select a message by its number.
 
         Args:
-            number: Number of the message; None always selects the newest message.
+            number: Number of the message; None selects the newest message and follows later ones.
         """
         if number != self.at:
             self.at = number

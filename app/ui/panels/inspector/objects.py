@@ -107,7 +107,8 @@ class ObjectsView(QWidget):
         """Select the list to show in this message and in later ones.
 
         Args:
-            steps: Path of the list. If there is no list at this path, the nearest list above it is shown.
+            steps: Path of the list. If there is no list of objects at this path, the nearest one
+                above it is shown, else the first one in the message.
         """
         self._requested_steps = steps
 

@@ -105,7 +105,7 @@ class QueryStrip(QWidget):
         """Show or hide the strip. It is visible only if it has a text.
 
         Args:
-            tree: True if the page can show the results of a query.
+            tree: True if the current page can show the results of a query.
         """
         self._on_tree = tree
         show_when(self, tree and bool(self.words.text()))

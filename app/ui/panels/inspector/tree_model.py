@@ -37,9 +37,9 @@ class TreeNode:
         depth: Number of ancestors below the root; -1 for the root.
         children: Child nodes; None until they are loaded.
         changed_s: Monotonic time in s of the last change of the value; None if it has not changed.
-        base: Value in the base message; `MISSING` if it was added, `OFF` without a base message.
+        base: Value in the base message; `MISSING` if it was added, `NO_BASE` without a base message.
         mark: Kind of difference between `value` and `base`.
-        total: Number of children, 0 until they are loaded.
+        total: Number of children in a comparison; 0 until they are loaded, and without a base message.
     """
 
     key: str | int
@@ -162,7 +162,10 @@ class TreeModel(QAbstractItemModel):
         return QModelIndex() if node is self._root else self.createIndex(node.row, 0, node)
 
     def value(self) -> object:
-        """Return the whole message."""
+        """Return the whole message.
+
+        A message that is not an object or list is returned in an object with the key ``value``.
+        """
         return self._root.value
 
     def clear(self) -> None:
@@ -183,7 +186,7 @@ class TreeModel(QAbstractItemModel):
             value: Decoded message. A message that is not an object or list becomes one row called
                 ``value``.
             now: Monotonic time in s, stored as the change time of changed values.
-            base: Message to compare with, or `OFF`.
+            base: Message to compare with, or `NO_BASE`.
             changes_only: True to omit nodes that are equal in both messages.
         """
         first = not self._root.children
@@ -287,9 +290,10 @@ class TreeModel(QAbstractItemModel):
         self.layoutChanged.emit()
 
     def reveal(self, path: Sequence[str | int]) -> QModelIndex:
-        """Return the index of the value at a path, or an invalid index if there is no such value.
+        """Return the index of the value at a path.
 
-        The parents of the value are loaded if necessary.
+        The parents of the value are loaded if necessary. The index is invalid if there is no such
+        value, or if the value is omitted because it is unchanged.
         """
         node = self._root
         for key in path:

@@ -37,14 +37,14 @@ def keys_of(value: object, count: int) -> list[str | int]:
 
 
 def values_of(value: object, count: int) -> list[object]:
-    """Return the first `count` values of a container."""
+    """Return the first `count` values of an object or list; empty for all other values."""
     if isinstance(value, Mapping):
         return list(islice(value.values(), count))
     return list(islice(value, count)) if is_container(value) else []  # type: ignore[call-overload]
 
 
 def size_of(value: object) -> int:
-    """Return the number of children of a container."""
+    """Return the number of children of an object or list; 0 for all other values."""
     return len(value) if is_container(value) else 0  # type: ignore[arg-type]
 
 
@@ -133,7 +133,10 @@ def payload_or_default(message: Message, otherwise: object) -> object:
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
-    """Return encoding, shape and size of an image without decoding its pixels."""
+    """Return encoding, shape and size of an image; its pixels are decoded only if it reports no shape.
+
+    Raises `NepError` if the pixels can't be decoded.
+    """
     shape = message.extension.get("shape")
     if shape is None:
         shape = list(getattr(message.payload, "shape", ()))

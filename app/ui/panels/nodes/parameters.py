@@ -32,7 +32,7 @@ LINE, CHOICE = range(2)
 
 
 def allowed_values_text(parameter: ReportedParameter) -> str:
-    """Describe the allowed values of a parameter, such as "0 to 2", "walk, run or crawl" or "read only".
+    """Describe the allowed values of a parameter, such as "0 to 2", "walk, run or crawl" or "read-only".
 
     Return "" if every value is allowed.
     """

@@ -102,7 +102,7 @@ def rows_of(
 
 
 def limits_text(node: NodeEntry) -> str:
-    """Describe the limitations of an original program or foreign network, or the purpose of a bridge.
+    """Describe the limitations of an original program or of another network, or the purpose of a bridge.
 
     Return "" for all other native nodes, and for networks that report statistics.
     """
@@ -192,7 +192,7 @@ def generation_cell(row: NodeRow) -> Cell:
 
 
 def cpu_cell(row: NodeRow) -> Cell:
-    """Return the cell with the CPU load of a node, the time since it left, or "not reported"."""
+    """Return the cell with a node's CPU load, the time since it left, or "not reported"; empty for topics."""
     kind = find_kind(row.node.network)
     if row.topic or row.node.gone_s is not None or kind is None or kind.reports_stats:
         return _node_cell(_cpu_text)(row)

@@ -131,6 +131,8 @@ def readable_levels(
 ) -> list[tuple[float, float]]:
     """Return the finest tick level whose labels do not overlap, in a list.
 
+    If the labels of all levels would overlap, the list contains the coarsest level.
+
     Args:
         levels: Tick levels of pyqtgraph (spacing and offset), coarsest first.
         span: Length of the range.

@@ -83,7 +83,7 @@ class Stroke:
     """Table cell with a sample of a curve's style.
 
     Attributes:
-        look: Style of the curve.
+        style: Style of the curve.
         is_state: True for a curve of states, whose sample is a box instead of a line with a mark.
         is_hidden: True for a hidden curve, whose sample is faded.
     """

@@ -125,7 +125,7 @@ class PlotPicture:
             top += row
 
     def encode_png(self) -> bytes:
-        """Return the image as PNG in double resolution."""
+        """Return the image as PNG in double resolution. Raises `OSError` if there is not enough memory."""
         image = QImage(self.size * PNG_SCALE, QImage.Format.Format_RGB32)
         if image.isNull():
             raise OSError(errno.ENOMEM, _("not enough memory"))

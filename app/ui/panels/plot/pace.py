@@ -58,6 +58,8 @@ class DrawThrottle:
     def interval_ticks(self, pixel_s: float) -> int:
         """Return the interval until the next drawing, in ticks at 30 Hz.
 
+        The interval is limited to the range `DRAW_INTERVAL_TICKS`.
+
         Args:
             pixel_s: Time in s in which the data moves by one pixel, which is the minimum interval.
         """

@@ -22,7 +22,7 @@ class PlotCurve:
 
     Attributes:
         curve: Curve with its data.
-        look: Style.
+        style: Style.
         right: True for the right axis, False for the left one.
         is_hidden: True if the user has hidden the curve.
     """

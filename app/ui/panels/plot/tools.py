@@ -72,13 +72,13 @@ class FieldCatalog:
         return candidates[:MAX_TOPICS]
 
     def names(self) -> list[str]:
-        """Return the keys of all topics."""
+        """Return the keys of all topics that exist."""
         return [
             topic.key for topic in (*self._session.topics.existing_topics(), *self._session.networks.topics)
         ]
 
     def fields(self) -> Iterable[tuple[str, PlottableField]]:
-        """Yield the fields that can be plotted, each with the expression that plots it."""
+        """Yield the fields that can be plotted, each as the expression that plots it and the field."""
         count = 0
         for key in self._watches:
             topic = self._session.topic(key)
@@ -241,8 +241,8 @@ class AddCurveField(SearchField):
 
     def _lines(self, typed: str) -> tuple[list[Line], int]:
         fields = [
-            Entry(f"topic:{text}", text, ICONS[matches.kind], _value_note(matches))
-            for text, matches in self._offered_fields.items()
+            Entry(f"topic:{text}", text, ICONS[field.kind], _value_note(field))
+            for text, field in self._offered_fields.items()
         ]
         if typed:
             matches, count = Finder(fields).find(typed, MAX_SHOWN)

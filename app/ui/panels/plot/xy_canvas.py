@@ -141,7 +141,10 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         return QPointF(self.view.mapViewToScene(QPointF(x, y)))
 
     def distance(self) -> float | None:
-        """Return the distance of cursors A and B on the first path in units of the axes, or None."""
+        """Return the distance of cursors A and B on the first path in units of the axes.
+
+        None if there are no cursors or no path, or if a curve has no value at a cursor.
+        """
         if len(self.cursors) < 2 or not self._paths:
             return None
         points = [self._point_at(self._paths[0], time_s) for time_s in self.cursors.values()]

@@ -297,7 +297,7 @@ class MessageForm(QWidget):
         self.edit.replace(0, len(self.edit.text()), text)
 
     def format_json(self) -> None:
-        """Format the JSON text. Has no effect while it contains placeholders."""
+        """Format the JSON text, or show why this fails: an error, or a placeholder without a value."""
         try:
             self.replace_text(format_json(self.read.fill({})))
         except NepError as error:

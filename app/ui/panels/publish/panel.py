@@ -208,7 +208,13 @@ class PublishPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def open_for(self, key: str) -> None:
-        """Select a saved message for the topic, or create one from the topic's last message."""
+        """Select the newest saved message for a topic, or create one from the topic's last message.
+
+        A toast reports that no more messages can be saved.
+
+        Args:
+            key: Key of the topic; "" creates an empty message.
+        """
         _network, topic = split_key(key)
         saved = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
@@ -228,10 +234,10 @@ class PublishPanel(PanelWidget):
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def insert_template(self) -> None:
-        """Insert the topic's next message into the form.
+        """Insert the topic's last message into the form, or its next one if none was received yet.
 
-        If the topic has no publisher, or if this is called while waiting for the message, insert the fields
-        of the message type instead.
+        If the topic has no publisher, or if this is called while waiting for the message, insert the
+        fields of the message type instead.
         """
         message = self.message
         if message is None:

@@ -131,7 +131,10 @@ class RecordingMark:
 
 
 def crop_to_thumbnail(image: QImage) -> QImage:
-    """Crop an image to the aspect ratio of thumbnails, at twice their size for high-DPI screens."""
+    """Crop an image to the aspect ratio of thumbnails, and scale it to twice their size.
+
+    The size is doubled for high-DPI screens. An empty image is returned unchanged.
+    """
     width, height = image.width(), image.height()
     if not width or not height:
         return image

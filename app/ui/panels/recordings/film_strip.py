@@ -72,7 +72,7 @@ class FilmStrip(QWidget):
     """Film strip of one recording.
 
     Attributes:
-        look: Contents of the film strip, or None.
+        preview: Contents of the film strip, or None.
         begin_ns: Start of the selected part, in ns since 1970.
         end_ns: End of the selected part, in ns since 1970.
 

@@ -145,11 +145,11 @@ def shortest_choice(
 
     Args:
         topics: All topics of the recording.
-        names: Names of the selected topics.
+        names: Names of the selected topics, at least one.
 
     Returns:
-        Names of the included topics, and names of the excluded topics. One of them is empty; if both are
-        empty, all topics are selected.
+        Names of the included topics, and names of the excluded topics. One of them is empty; if both
+        are empty, all topics are selected.
     """
     included = tuple(topic.name for topic in topics if topic.name in names)
     unwanted = tuple(topic.name for topic in topics if topic.name not in names)

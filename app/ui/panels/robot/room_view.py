@@ -137,7 +137,7 @@ class RoomView(QWidget):
             self.update()
 
     def set_caption(self, text: str) -> None:
-        """Show the text that a robot has heard as a caption below the drawing; "" removes the caption."""
+        """Show speech as a caption at the bottom of the drawing; "" removes the caption."""
         if text != self.heard:
             self.heard = text
             self.update()

@@ -34,9 +34,11 @@ MAX_TRIES = 5
 def fields_text(fields: Sequence[DataField], values: Mapping[str, object]) -> str:
     """Format the values of fields, such as "0.3 m to go, moved 0.5 m".
 
+    Missing values are omitted, and ratios such as ``progress``, which are shown by the progress bar.
+
     Args:
         fields: Descriptions of the fields.
-        values: Values by field name; missing values are omitted.
+        values: Values by field name.
     """
     parts = []
     for field in fields:
@@ -249,6 +251,8 @@ class TryList(QWidget):
         self.rows = []
         for invocation in reversed(ended):
             row = TryRow(self._theme, self._action, invocation)
-            row.clicked.connect(lambda _on=False, made=invocation: self.selected.emit(dict(made.input)))
+            row.clicked.connect(
+                lambda _on=False, invocation=invocation: self.selected.emit(dict(invocation.input))
+            )
             self._column.addWidget(row)
             self.rows.append(row)

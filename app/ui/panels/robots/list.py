@@ -171,8 +171,10 @@ class RobotList(QWidget):
     def show_fleet(self, fleet: Fleet) -> list[str]:
         """Show the robots of this session, then the robots of earlier sessions.
 
+        Disconnected robots that are neither virtual nor known, such as removed ones, are omitted.
+
         Returns:
-            The names of the robots of this session.
+            The names of the listed robots of this session.
         """
         self._known_robots = {robot.name: robot for robot in fleet.known.robots}
         links = [

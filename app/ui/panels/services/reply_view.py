@@ -37,7 +37,7 @@ class ReplyRow:
 
     Attributes:
         path: Path of the value in the reply.
-        depth: Number of ancestors of the value.
+        depth: Nesting depth of the value; 0 for a field of the reply itself.
         name: Key or index of the value.
         text: Formatted value, such as "{2}" for an object with two fields.
     """
@@ -51,7 +51,8 @@ class ReplyRow:
 def reply_rows(reply: object) -> list[ReplyRow]:
     """Convert a reply to rows, with children below their parents.
 
-    At most `MAX_ROWS` rows are returned, followed by a note if the reply has more.
+    At most `MAX_ROWS` rows are returned, followed by a note if the reply has more. Values that are
+    nested more than `MAX_DEPTH` levels deep are omitted.
     """
     rows: list[ReplyRow] = []
     for row in (

@@ -73,7 +73,7 @@ class RequestForm(QWidget):
         self._kinds, self._request = {}, {}
 
     def show_request(self, request: object) -> None:
-        """Show a request. Only requests that are objects have fields."""
+        """Show the first `MAX_FIELDS` fields of a request. Only requests that are objects have fields."""
         values = dict(request) if isinstance(request, Mapping) else {}
         if values == self._request and self._kinds and not self.problems:
             return

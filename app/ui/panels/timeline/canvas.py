@@ -143,7 +143,7 @@ class TimelineCanvas(QAbstractScrollArea):
             self.set_scale(TimeScale.full(self.scale.first_ns, self.scale.last_ns))
 
     def refresh_lanes(self) -> None:
-        """Repaint the lanes after requesting their message counts."""
+        """Repaint the lanes, and request the message counts of the visible time range."""
         self._lanes = None
         self.request_counts()
         self.viewport().update()

@@ -93,10 +93,13 @@ class SendRow(NamedTuple):
 
 
 class SendChooser(QWidget):
-    """Table for choosing the topics to send and their names on the live network; shown in place of the lanes.
+    """Table for choosing the topics to send and their names on the live network.
+
+    The table is shown in place of the lanes.
 
     Signals:
         exited: The page should be closed.
+        arming_failed: Reason why sending can't be armed.
     """
 
     exited = Signal()

@@ -96,6 +96,9 @@ class Actions:
         """Return the reason why a command is unavailable, or "" if it is available.
 
         The reason is a short phrase without a full stop.
+
+        Raises:
+            UnknownCommandError: The name is unknown.
         """
         self[name]
         return self._disabled_reasons[name]()

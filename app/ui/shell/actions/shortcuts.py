@@ -139,7 +139,7 @@ class Shortcuts(QObject):
         *,
         platform: str = sys.platform,
     ) -> None:
-        # `complain` is called with a sentence if the shortcuts can't be saved; `platform` is a
+        # `report_error` is called with a message if the shortcuts can't be saved; `platform` is a
         # `sys.platform`.
         super().__init__()
         self._settings, self._complain, self._platform = settings, complain, platform
@@ -167,7 +167,10 @@ class Shortcuts(QObject):
         return tuple(normal(key) for key in command.default_keys(self._platform))
 
     def keys_of(self, name: str) -> tuple[str, ...]:
-        """Return the current shortcuts of a command; menus show the first one."""
+        """Return the current shortcuts of a command; menus show the first one.
+
+        The first shortcut of Stop is always F12.
+        """
         keys = self._custom_keys.get(name, self.default_keys(name))
         if name == STOP_COMMAND:
             assigned = {
@@ -225,7 +228,10 @@ class Shortcuts(QObject):
         self._save()
 
     def swap(self, name: str, key: str) -> None:
-        """Assign a shortcut to a command, and the command's first shortcut to the one that had it."""
+        """Assign a shortcut to a command, and the command's first shortcut to the one that had it.
+
+        Both commands lose their other shortcuts. F12 stays assigned to Stop.
+        """
         owner, before = self.command_for(key), self.first(name)
         self._custom_keys[name] = (normal(key),)
         if owner and owner != name:

@@ -184,7 +184,10 @@ class PaletteField(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_icon_only(self, icon_only: bool) -> None:
-        """Hide the shortcut if `icon_only`, so that the button can be narrower."""
+        """Hide the shortcut if `icon_only`, so that the button can be narrower; else show it.
+
+        The text isn't hidden, but shortened as far as necessary.
+        """
         if icon_only != self._is_icon_only:
             self._is_icon_only = icon_only
             self.updateGeometry()

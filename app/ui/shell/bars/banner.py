@@ -295,7 +295,7 @@ class AlertBanner(QWidget):
 
     @property
     def alert(self) -> AlertLike | None:
-        """Alert that is shown, or None if there is none."""
+        """Alert that is shown, or that was shown before the current offer; None if there is none."""
         return self._alert
 
     @property
@@ -312,6 +312,8 @@ class AlertBanner(QWidget):
     ) -> None:
         """Show an offer with two buttons; alerts are shown again after the user's choice.
 
+        If the user closes the banner, neither callback is called.
+
         Args:
             title: Offer, as a question.
             detail: Explanation.
@@ -323,7 +325,7 @@ class AlertBanner(QWidget):
         self.show()
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
-        """Set the active alerts that are not dismissed, most severe first."""
+        """Set the active alerts that are not dismissed, most severe first; a current offer stays visible."""
         self._alerts = alerts
         if self._offer is not None:
             return
@@ -373,7 +375,7 @@ class AlertBanner(QWidget):
         self.on_more()
 
     def move_to(self, area: QRect) -> None:
-        """Move the banner to an area of its parent.
+        """Move the banner to an area of its parent, or hide it if the area is too narrow.
 
         Called on every tick, because the bars change their layout. A banner that appears under the
         mouse pointer ignores clicks for `CLICK_GUARD_S`.

@@ -83,7 +83,7 @@ class ChoiceButton(PaintedButton):
 class ChoiceGrid(QWidget):
     """Grid of buttons for the choices of a question.
 
-    There are as many columns as fit with each text on one line. `chosen` is emitted with the text of
+    There are as many columns as fit with each text on one line. `selected` is emitted with the text of
     the activated button.
     """
 

@@ -35,8 +35,8 @@ MAX_ANSWER_LENGTH = 10_000
 class QuestionCard(FloatingCard):
     """Card with a question, and a text field or choices for the answer.
 
-    Enter submits the answer; Esc closes the card without an answer. The card is disabled while the
-    behaviour is paused.
+    Enter submits the answer; Esc submits an empty answer. The card is disabled while the behaviour is
+    paused.
     """
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:

@@ -35,7 +35,8 @@ def _worst_status(severities: Iterable[str]) -> tuple[str, str]:
 class StatusFormatter:
     """Formatter of the session's state for the status bar.
 
-    Each method returns a `StatusEntry` (icon, text, status), which is empty if there is nothing to show.
+    Each method returns a `StatusEntry` (icon, text, status), which is empty if there is nothing to
+    show; only `replayed_recording` returns several.
 
     Attributes:
         window_ms: Duration in ms of the last refresh of the window.
@@ -129,14 +130,14 @@ class StatusFormatter:
         return access_status(self._session.remote_access)
 
     def remote_access_plain(self) -> StatusEntry:
-        """Return the fact of `remote_access`, but without an icon for the default setting."""
+        """Return the entry of `remote_access`, but without an icon for the default setting."""
         icon, text, status = self.remote_access()
         return ("" if status is None else icon), text, status
 
     def web_pages(self) -> StatusEntry:
         """Return the network of the web server and the number of connected pages.
 
-        The fact is empty while the server is off.
+        The entry is empty while the server is off.
         """
         web = self._session.web_pages
         if web.host != self._web_host:  # resolving the computer's addresses is slow
@@ -229,7 +230,7 @@ class StatusFormatter:
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
     def replayed_recording(self) -> tuple[StatusEntry, ...]:
-        """Return facts about the opened recording: name, time range, contents and losses."""
+        """Return entries about the opened recording: name, time range, contents and losses."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
             return ()
@@ -254,13 +255,13 @@ class StatusFormatter:
         )
 
     def live_network_note(self) -> StatusEntry:
-        """Return a `StatusEntry` that the live network keeps running while a recording is shown."""
+        """Return the note shown during a replay: the live network keeps running."""
         return "radio-tower", _("The live network keeps running"), None
 
     def displayed_messages(self) -> StatusEntry:
         """Return the number of messages of watched topics that were displayed.
 
-        The fact is empty if all messages were displayed.
+        The entry is empty if all messages were displayed.
         """
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
@@ -279,9 +280,9 @@ class StatusFormatter:
 
 
 class StatusBar(QWidget):
-    """Status bar, 26 px high, with facts on the left and right.
+    """Status bar, 26 px high, with entries on the left and right.
 
-    `pressed` is emitted with the command of a clicked fact; only some facts have one.
+    `pressed` is emitted with the command of a clicked entry; only some entries have one.
     """
 
     pressed = Signal(str)
@@ -297,7 +298,7 @@ class StatusBar(QWidget):
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
         self.commands: Mapping[str, str] = {}
-        """Command that is run on a click, by the text of the fact."""
+        """Command that is run on a click, by the text of the entry."""
         self._left: list[tuple[StatusItem, Separator]] = []
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
@@ -317,11 +318,11 @@ class StatusBar(QWidget):
             items.append((item, line))
 
     def show_entries(self, left: Sequence[StatusEntry], right: Sequence[StatusEntry]) -> None:
-        """Show the given facts; empty ones are left out.
+        """Show the given entries; empty ones are left out.
 
         Args:
-            left: Facts on the left, from left to right.
-            right: Facts on the right, from left to right.
+            left: Entries on the left, from left to right.
+            right: Entries on the right, from left to right.
         """
         for entries, items, at_right in ((left, self._left, False), (right, self._right, True)):
             visible_entries = [entry for entry in entries if entry[1]]

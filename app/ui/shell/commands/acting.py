@@ -33,7 +33,8 @@ class ActingCommands:
             key: Key of the topic, or "" for a message without a topic.
 
         Returns:
-            False if the topic is in another network, to which Studio can't publish.
+            False if the panel can't be opened, or if the topic is in another network, to which Studio
+            can't publish.
         """
         if split_key(key)[0]:
             self._shell.show_toast(_("You can only publish to topics of Studio's own network"))
@@ -41,7 +42,7 @@ class ActingCommands:
         return self._open("publish", key)
 
     def call(self, service: str) -> bool:
-        """Show the request form of a service in the Services panel, or all services for "".
+        """Open the Services panel and select a service, unless `service` is "".
 
         Returns:
             False if the panel can't be opened.

@@ -305,7 +305,10 @@ class BehaviourCommands:
         return self._apply_to_document(key, save)
 
     def show_folder(self, key: str) -> bool:
-        """Open the folder of a behaviour's file in the file manager; return False if there is no such tab."""
+        """Open the folder of a behaviour's file in the file manager; return False if there is no such tab.
+
+        Nothing is opened for a behaviour that was never saved.
+        """
 
         def show(document: Document) -> None:
             if document.path is None:

@@ -34,7 +34,7 @@ class PaletteEntries:
         disabled_reason: Callable[[str], str],
         shortcuts: Shortcuts,
     ) -> None:
-        # `why_not` returns the reason why a command is unavailable, or "".
+        # `disabled_reason` returns the reason why a command is unavailable, or "".
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
         self._palette_commands = [command for command in commands if command.in_palette]
         self._disabled_reason = disabled_reason

@@ -37,7 +37,10 @@ class ReplayCommands:
         self._dialogs.open_recording(str(start_folder), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a recording and show the timeline; an error is shown as an alert."""
+        """Open a recording and show the timeline.
+
+        A toast reports that the file doesn't exist; other errors are shown as an alert.
+        """
         if not path.is_file():
             self._shell.show_toast(_("{file} no longer exists").format(file=path.name))
             return

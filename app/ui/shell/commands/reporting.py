@@ -51,7 +51,10 @@ class ReportCommands:
         self._sheet: report_sheet.ReportSheet | None = None
 
     def report(self) -> None:
-        """Open the sheet for a problem report, after the newest edit of the block editor was applied."""
+        """Open the sheet for a problem report, after the newest edit of the block editor was applied.
+
+        The doctor is started unless its last result is at most `DOCTOR_MAX_AGE_S` old.
+        """
         self._session.alerts.resolve(ALERT_ID)
         doctor = self._session.doctor
         if doctor.finished_s is None or self._clock() - doctor.finished_s > DOCTOR_MAX_AGE_S:

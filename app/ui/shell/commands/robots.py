@@ -108,7 +108,7 @@ class RobotCommands:
             dock.panel.toggle_full_screen()
 
     def connect(self, name: str) -> None:
-        """Restart a missing virtual robot, or show the Robots panel if the missing robot is real."""
+        """Restart a missing virtual robot; show the Robots panel for a real robot or an unknown model."""
         kind = self._description(name).get("rb:robot")
         model = _virtual_model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
@@ -117,9 +117,9 @@ class RobotCommands:
             self._shell.open_panel("robots")
 
     def start_virtual_model(self, missing: str) -> bool:
-        """Start a virtual robot in place of a missing one; return False if it has no virtual model.
+        """Start a virtual robot in place of a missing one; return False if its model has no virtual robot.
 
-        The toast has an Undo button.
+        Shows a toast with an Undo button.
         """
         model = _virtual_model(self._description(missing).get("rb:robot"))
         if model is None:
@@ -140,9 +140,12 @@ class RobotCommands:
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
     def replace_robot(self, swap: RobotReplacement) -> bool:
-        """Replace a missing robot in the behaviour; return False if the new one is not connected.
+        """Replace a missing robot in the behaviour; return False if the new one is unknown.
 
-        The toast has an Undo button.
+        Shows a toast with an Undo button.
+
+        Args:
+            swap: Names of the missing robot and of its replacement.
         """
         link = self._session.fleet.link(swap.replacement)
         if link is None:

@@ -68,7 +68,7 @@ class Shell(Protocol):
 
     @property
     def left(self) -> str:
-        """Name of the layout that was shown before the start page, or ""."""
+        """Name of the layout to return to from the start page, or "" if there is none."""
 
     def show_start(self) -> None:
         """Show the start page."""

@@ -190,6 +190,8 @@ class ViewCommands:
     def new_alarm(self, about: AlarmCondition | None = None) -> None:
         """Create an alarm and open it for editing.
 
+        An alarm on a number stays off until the user has confirmed the limit.
+
         Args:
             about: Condition of the alarm; None lets the user choose one.
         """
@@ -206,12 +208,12 @@ class ViewCommands:
         dock.panel.edit(rule.id, "limit" if needs_limit else "")
 
     def new_value_alarm(self, about: tuple[str, str]) -> None:
-        """Create an alarm on a field of a topic.
+        """Create an alarm on a field of a topic: on a limit for a number, else on any change.
 
         For a number, the alarm stays off until the user has confirmed the limit.
 
         Args:
-            about: Topic and field path.
+            about: Topic and field path; "" is the path of the whole payload.
         """
         topic, path = about
         topic_state = self._session.topics.get(topic)

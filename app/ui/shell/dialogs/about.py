@@ -41,7 +41,7 @@ class AboutSheet(Overlay):
     top = 96
 
     def __init__(self, theme: Theme, window: QWidget, notify: Callable[[str], object]) -> None:
-        # `say` confirms that the versions were copied.
+        # `notify` confirms that the versions were copied.
         super().__init__(theme, window, TITLE)
         self._notify = notify
         column = QVBoxLayout(self)

@@ -246,7 +246,7 @@ class CommandPalette(Overlay):
         self._run(entry)
 
     def rebind(self) -> None:
-        """Close the palette and ask for a new shortcut for the selected command."""
+        """Close the palette and ask for a new shortcut, if the selected entry is a command."""
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
             self.dismiss()

@@ -165,7 +165,7 @@ class FileSheet(Overlay):
     def __init__(
         self, theme: Theme, window: QWidget, locations: Callable[[], Sequence[FolderLocation]]
     ) -> None:
-        # `places` is called whenever the sheet opens.
+        # `locations` is called whenever the sheet opens.
         super().__init__(theme, window, _("Files"))
         self._scrim.pressed.disconnect(self.dismiss)  # a click outside must not discard a typed name
         self._locations = locations

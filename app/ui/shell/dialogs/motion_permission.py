@@ -49,7 +49,7 @@ class MotionPermissionCard(QWidget):
     def __init__(
         self, theme: Theme, window: QWidget, moving: MotionPermission, complain: Callable[[str], object]
     ) -> None:
-        # `complain` is called with a message if "always" can't be saved.
+        # `report_error` is called with a message if "always" can't be saved.
         super().__init__(window)
         self._theme, self._moving = theme, moving
         self._last_revision = moving.revision

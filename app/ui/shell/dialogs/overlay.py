@@ -137,7 +137,7 @@ class Overlay(QWidget):
     """Base class of sheets over a window.
 
     An open sheet has the focus. Esc or a click outside closes the sheet and restores the previous
-    focus. Subclasses implement `preferred_size` and `first`.
+    focus. Subclasses implement `preferred_size` and `initial_focus`.
     """
 
     closed = Signal()

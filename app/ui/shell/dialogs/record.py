@@ -103,7 +103,7 @@ class RecordSheet(Overlay):
         save_last: Callable[[], None],
         show_toast: ShowToast,
     ) -> None:
-        # `keep` saves the contents of the flight recorder.
+        # `save_last` saves the contents of the flight recorder.
         super().__init__(theme, window, _("Record"))
         self._session, self._recordings, self._show_toast = session, session.recordings, show_toast
         self._last_state: object = None

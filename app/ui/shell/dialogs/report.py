@@ -74,7 +74,7 @@ class ReportSheet(Overlay):
         notify: Callable[[str], object],
         clock: Callable[[], float],
     ) -> None:
-        # `say` announces a finished report if the sheet is closed; `clock` returns seconds since 1970.
+        # `notify` announces a finished report if the sheet is closed; `clock` returns seconds since 1970.
         super().__init__(theme, window, _("Report a problem"))
         self._dialogs, self._notify, self._clock = dialogs, notify, clock
         self._parts: ReportParts | None = None

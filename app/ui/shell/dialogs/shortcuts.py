@@ -36,7 +36,7 @@ HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove i
 class ShortcutSheet(Overlay):
     """Sheet with a table of shortcuts.
 
-    While a new shortcut is recorded, all keys except F12 and Esc are accepted.
+    While a new shortcut is recorded, the sheet receives all keys except F12, and Esc cancels.
     """
 
     top = 72
@@ -150,7 +150,7 @@ class ShortcutSheet(Overlay):
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
     def record(self) -> None:
-        """Start to record a new shortcut for the selected command."""
+        """Start to record a new shortcut for the selected command; a fixed shortcut can't be changed."""
         entry = self.rows.entry
         if entry is None:
             return

@@ -39,7 +39,7 @@ SAVE_FIRST_TEXT = lazy(
 def difference_text(diff: Difference) -> str:
     """Format the difference of a version from the current blocks.
 
-    The text is such as "14 blocks; since then 3 added, 1 removed".
+    The text is such as "14 blocks, 3 added, 1 removed since".
     """
     counts = (
         (diff.added, ngettext("{count} added", "{count} added", diff.added)),

@@ -151,13 +151,16 @@ class FailedPanel(PanelWidget):
 class Dock(QDockWidget):
     """Dock widget of a panel in a workbench.
 
+    `closed` is emitted with the dock's key, and `another_requested` with the key when the user opens
+    another panel of the same kind.
+
     Attributes:
         description: Description of the kind of panel.
         panel: Panel, or its placeholder if the panel couldn't be created.
         number: Number among the docks of the same kind, counted from 1.
         key: Unique name in the workbench.
         failed: True after an exception of the panel, which is then not refreshed any more.
-        front: True if the dock isn't covered by another tab.
+        front: True if the dock is open and isn't covered by another tab.
     """
 
     another_requested = Signal(str)
@@ -191,7 +194,7 @@ class Dock(QDockWidget):
         self.setWidget(body)
 
     def replace(self, panel: PanelWidget) -> None:
-        """Replace the placeholder by a panel."""
+        """Replace the placeholder with a panel."""
         old = (self.title, self.body)
         self._set_panel(panel)
         for widget in old:
@@ -210,9 +213,9 @@ class Dock(QDockWidget):
         return self.front and self.isVisible() and is_on_screen(self.window())
 
     def update_suspension(self, now: float) -> str | None:
-        """Suspend the panel if it has been hidden for `SUSPEND_DELAY_S`, or resume it.
+        """Resume the panel if it is displayed; suspend it after it has been hidden for `SUSPEND_DELAY_S`.
 
-        Called on every tick.
+        Called on every tick. Has no effect if the panel has failed.
 
         Args:
             now: Monotonic time in s.
@@ -228,7 +231,7 @@ class Dock(QDockWidget):
         return self._try(self.panel.suspend) if now - self._last_displayed_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
-        """Refresh the panel if it is visible.
+        """Refresh the panel if it is displayed and hasn't failed.
 
         Returns:
             The error message if the panel has just failed, else None.
@@ -264,7 +267,7 @@ class Dock(QDockWidget):
         return None
 
     def retry(self) -> None:
-        """Show a failed panel again and resume its refreshes. Has no effect on other panels."""
+        """Show a failed panel again and resume its refreshes. Has no effect if the panel hasn't failed."""
         if self.failed:
             self.failed = False
             self.body.show_panel()
@@ -294,7 +297,10 @@ class Dock(QDockWidget):
             _log.exception("restoring panel '%s' failed", self.description.name)
 
     def dispose(self) -> None:
-        """Release the resources of the panel before the window closes. An exception is logged."""
+        """Release the resources of the panel before the dock is deleted or the window closes.
+
+        An exception is logged and not raised.
+        """
         try:
             self.panel.dispose()
         except CAUGHT_ERRORS:
@@ -312,7 +318,10 @@ class Dock(QDockWidget):
             super().keyPressEvent(event)
 
     def menu(self) -> Menu:
-        """Return a new menu with the actions of the panel, and with Float and Close."""
+        """Return a new menu with the actions of the panel, and entries to float, dock or close it.
+
+        If the panel allows multiple instances, the menu has an entry to open another one.
+        """
         menu = Menu(self._theme, self)
         actions: list[QAction] = []
         try:
@@ -399,24 +408,22 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
 
 
 def is_on_screen(window: QWidget) -> bool:
-    """Return True if a window is on the screen.
+    """Return False if a window is minimised, on another desktop or fully covered.
 
-    Returns:
-        False if the window is minimised, on another desktop or, where the system reports it, fully
-        covered.
+    A covered window is detected only where the system reports it.
     """
     return not window.isMinimized() and window.windowHandle().isExposed()
 
 
 def dock_for_kinds(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
-    """Return the first dock whose panel can show one of the kinds of topics, or None.
+    """Return the first dock whose panel can show a topic, or None.
 
-    A panel that accepts one of the kinds takes precedence over one that accepts any type.
+    A panel that accepts one of the topic's kinds takes precedence over one that accepts any type.
 
     Args:
         docks: Docks by key.
         names: Keys of the docks to check, in order.
-        kinds: Message type and codec of a topic.
+        kinds: Message type and codec of the topic; empty if the topic is unknown.
     """
     candidates = [docks[name] for name in names]
     for accepted in (kinds, {ANY_TYPE}):

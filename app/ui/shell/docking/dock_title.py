@@ -226,8 +226,10 @@ class DockTitle(QWidget):
     def fit_tabs(self) -> None:
         """Shorten chips and tabs until the title bar fits into its width.
 
-        First the chips are reduced to icons, then the tabs of hidden panels, then the tab of the front
-        panel. Chips with a generic icon keep their text.
+        Chips are reduced to icons if this makes room for all full titles. Otherwise the tabs of hidden
+        panels are reduced, and the chips only if that isn't enough; the tab of the front panel is
+        reduced last. Chips with the status "off" keep their text, because their icon is generic.
+        Without tabs, all chips show their text.
         """
         chips = [chip for chip in self._other_widgets() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:

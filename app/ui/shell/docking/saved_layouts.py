@@ -33,7 +33,7 @@ class SavedLayouts:
     """
 
     def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:
-        # `complain` is called with a sentence about damaged entries.
+        # `report_error` is called with a message about damaged entries.
         self._state, self._complain = state, complain
         self._current: dict[str, str] = {}
 
@@ -59,7 +59,7 @@ class SavedLayouts:
         return name if layout is not None and layout.base == base else ""
 
     def rejection_reason(self, name: str, but: str = "") -> str:
-        """Return the reason why a name for a custom layout is invalid, as a sentence, or "".
+        """Return why a name for a custom layout is invalid, as a sentence; "" if it is valid.
 
         Args:
             name: Name to check.
@@ -171,7 +171,8 @@ class SavedLayouts:
             name: Name of the layout.
 
         Returns:
-            True if the deletion was saved, and a function that undoes the deletion.
+            True if the deletion was saved or there is no such layout, and a function that undoes the
+            deletion.
         """
         layout = self.named(name)
         if layout is None:

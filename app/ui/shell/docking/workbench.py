@@ -235,7 +235,11 @@ class Workbench(QMainWindow):
         return dock
 
     def open_latest(self, name: str) -> Dock | None:
-        """Show the most recently used open panel of a kind, or else the first one of the kind."""
+        """Show the most recently used open panel of a kind, or else the first one of the kind.
+
+        Returns:
+            The dock, or None if the panel isn't available.
+        """
         return self.open(next((key for key in self.recently_used() if parse_key(key)[0] == name), name))
 
     def open_another(self, key: str) -> Dock | None:
@@ -517,7 +521,7 @@ class Workbench(QMainWindow):
         if not self.restoreState(decode_state(saved.get("docks")), STATE_VERSION):
             self.reset_layout()
             return False
-        self._size_timer.stop()  # keep the saved sizes instead of those of `arrange`
+        self._size_timer.stop()  # keep the saved sizes instead of those of `_resize_docks`
         self._unfolded_state = decode_state(saved.get("wide"))
         self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
@@ -552,8 +556,10 @@ def _make_raiser(dock: Dock) -> Callable[[], object]:
 def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
     """Insert a new dock into a workbench.
 
-    The dock is placed below the row above its own, as a tab of its tab target, or as a tab of the last
-    panel.
+    A panel with a height in ``layout.bottom_heights`` is placed in the bottom area. A deferred panel is
+    placed below the row above its own, if that row is open and has no tabs. Any other panel becomes a
+    tab of the first panel of its kind (if its number is larger than 1), of its tab target, or of the
+    last panel. The first panel is placed in the main area.
     """
     name = dock.description.name
     docks_by_key = {

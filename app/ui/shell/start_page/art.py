@@ -51,7 +51,7 @@ def upper_corners(area: QRectF, radius: float) -> QPainterPath:
 
 
 class RobotArt(Art):
-    """Illustration of the virtual robot at rest, painted as in the Robot panel."""
+    """Illustration of the virtual robot, waving, painted as in the Robot panel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)

@@ -143,7 +143,7 @@ class OpenWorkList(QWidget):
         self.hide()
 
     def show_work(self, items: Sequence[OpenWork]) -> None:
-        """Set the open behaviours; unchanged rows are not recreated."""
+        """Set the open behaviours; the rows are recreated only if a behaviour or its state has changed."""
         if tuple(items) == self._shown_items:
             return
         self._shown_items = tuple(items)

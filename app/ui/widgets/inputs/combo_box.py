@@ -35,7 +35,7 @@ class ComboBox(QComboBox):
 
     @property
     def value(self) -> str:
-        """Value of the selected entry, or "" if there is none."""
+        """Value of the selected entry, or its label if it has no value; "" if no entry is selected."""
         data = self.currentData()
         return data if isinstance(data, str) else self.currentText()
 

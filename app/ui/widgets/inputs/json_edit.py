@@ -222,7 +222,7 @@ class JsonEdit(QWidget):
         return self.edit.toPlainText()
 
     def set_text(self, text: str) -> None:
-        """Set the text and clear the undo stack."""
+        """Set the text and clear the undo stack. Has no effect if the text is the same."""
         if text != self.text():
             self.edit.setPlainText(text)
 

@@ -12,7 +12,7 @@ from nep.i18n import _
 class PatternField(TokenField):
     """Token field for topic patterns.
 
-    `changed` is emitted on every change, and `settled` when no text is being typed.
+    `changed` is emitted on every change, and `editing_finished` when no text is being typed.
     """
 
     def patterns(self) -> tuple[tuple[str, ...], tuple[str, ...]]:

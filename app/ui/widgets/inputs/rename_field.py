@@ -21,7 +21,8 @@ class RenameField(QLineEdit):
         parent: Widget that contains the item.
         rect: Rectangle of the item.
         name: Current name.
-        callback: Called with the new name; returns False to reject it.
+        callback: Called with the new name on Enter and when the field loses the focus. If it returns
+            False after Enter, the field stays open.
         accessible_name: Accessible name of the field.
     """
 
@@ -36,7 +37,6 @@ class RenameField(QLineEdit):
         callback: Callable[[str], bool],
         accessible_name: str,
     ) -> None:
-        # `said` is the accessible name.
         super().__init__(name, parent)
         self._callback, self._is_closed = callback, False
         self.setAccessibleName(accessible_name)

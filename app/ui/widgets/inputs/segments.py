@@ -145,7 +145,7 @@ class Segments(QWidget):
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
     def set_icon_only(self, icon_only: bool) -> None:
-        """Show only icons if `icon_only`, else icons and texts."""
+        """Show only icons if `icon_only`, else icons and texts. Options without an icon keep their text."""
         for segment in self._segments.values():
             segment.set_icon_only(icon_only)
 

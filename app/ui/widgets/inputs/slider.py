@@ -21,7 +21,7 @@ PAGE_STEPS = 10
 class SliderTrack(QSlider):
     """Slider with a 4 px track and a 20 px handle; its values are numbers of steps.
 
-    Ignores the mouse wheel without focus.
+    `reset` is emitted on a double click. Ignores the mouse wheel without focus.
     """
 
     reset = Signal()

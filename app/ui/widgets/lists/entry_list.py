@@ -196,8 +196,8 @@ class EntryDelegate(QStyledItemDelegate):
 class EntryList(QListView):
     """List view with one selected entry.
 
-    `selection_moved` is emitted when the selection changes, and `row_activated` when the selected entry
-    is activated.
+    `selection_moved` is emitted when the selection changes, and `row_activated` when an entry is
+    clicked.
     """
 
     selection_moved = Signal()

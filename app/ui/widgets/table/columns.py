@@ -31,7 +31,7 @@ class ColumnChoice:
         )
 
     def show(self, name: str, shown: bool) -> None:
-        """Show a column if `shown`, else hide it. Has no effect on the first column."""
+        """Show a column if `shown`, else hide it. Ignores the first column and unknown names."""
         for column in self._columns[1:]:
             if column.name == name:
                 self._visibility_by_column.pop(name, None)
@@ -50,7 +50,8 @@ class ColumnChoice:
     def fitting_columns(self, widths: Sequence[int], room: int) -> set[int]:
         """Return the indexes of the columns to show in a given width.
 
-        Columns that the user has shown are included even if they don't fit.
+        Columns with the hide order 0, and those that the user has shown, are included even if they
+        don't fit.
 
         Args:
             widths: Widths of all columns in px.
@@ -74,7 +75,10 @@ class ColumnChoice:
         return menu
 
     def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
-        """Replace the entries of a menu by a checkable entry for each column except the first.
+        """Replace the entries of a menu by entries to show and hide columns.
+
+        There is a checkable entry for each available column except the first, and an entry that
+        restores the default columns.
 
         Args:
             menu: Menu.
@@ -107,7 +111,10 @@ class ColumnChoice:
         return dict(self._visibility_by_column)
 
     def restore(self, saved: object) -> None:
-        """Restore the visibility of columns from a saved state; invalid entries are ignored."""
+        """Restore the visibility of columns from a result of `saved_state`; invalid entries are ignored.
+
+        If `saved` isn't a mapping, all columns have their default visibility.
+        """
         self._visibility_by_column.clear()
         if isinstance(saved, Mapping):
             for name, visible in saved.items():

@@ -222,7 +222,11 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         return self.index(keys.index(key), 0) if key in keys else QModelIndex()
 
     def set_rows(self, rows: Sequence[Row]) -> None:
-        """Replace the rows; the selection is kept if the selected row still exists."""
+        """Replace the rows; the selection is kept if the selected row still exists.
+
+        If more than `MAX_RUNS` separate ranges of rows disappear, the model is reset and the selection
+        is lost.
+        """
         keys = [self._key(row) for row in rows]
         if keys == self._rows.keys:
             self._rows.rows = list(rows)

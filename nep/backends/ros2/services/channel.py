@@ -227,7 +227,10 @@ class ServiceChannel:
             raise
 
     def send_failure(self, call: CallId, reply: Reply) -> None:
-        """Send an error to nep programs. Raises the same errors as `send`."""
+        """Send an error to nep programs.
+
+        Raises `DDSException` if a reader is too slow or the channel is closed.
+        """
         data = _FAILURE_HEADER.pack(*call, reply.kind) + bytes(reply.data)
         cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
         self._writers[1].write(create_sample(self._failure_class, cdr))
@@ -330,7 +333,11 @@ class ServiceChannel:
         )
 
     def can_reply_to(self, client: DdsEndpoint) -> bool:
-        """Return True if a response reaches the client that owns this request writer. Used by servers."""
+        """Return True if a response reaches a client. Used by servers.
+
+        Args:
+            client: Request writer of the client.
+        """
         found_here = [
             each
             for each in self._matched_endpoints(self._writers[0])

@@ -69,7 +69,10 @@ class _BodyCodec:
 
 
 def find_service_type(types: MessageTypes, name: str) -> TypedService:
-    """Return a service type by its full name. Raises `NepError` if the type is unknown."""
+    """Return a service type by its full name.
+
+    Raises `NepError` if the type is unknown or its definition is invalid.
+    """
     texts = _COMMON_TYPES.get(name) or _find_definition(name)
     if texts is None:
         raise NepError(
@@ -119,7 +122,8 @@ def _find_definition(name: str) -> tuple[str, str] | None:
 def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
     """Return the ROS service type for the `msg_type` of a server or client.
 
-    "json" and "msgpack" select `nep_msgs/srv/Call`. Raises `NepError` for other types.
+    "json" and "msgpack" select `nep_msgs/srv/Call`. Raises `NepError` for an unknown ROS type, and for
+    all other types.
     """
     name = service_type_name(msg_type)
     if name is not None:

@@ -221,7 +221,7 @@ class SocketClient:
             self._remove_locked(call.number)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the names of services that have a server; empty without a master."""
+        """Return the names of services that have a server; empty without a master or if it doesn't reply."""
         if self._known_services is None:
             return ()
         try:

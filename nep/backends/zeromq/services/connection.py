@@ -88,7 +88,7 @@ class ServerConnection:
         self._socket.send(parts[1], zmq.DONTWAIT, copy=len(parts[1]) < _LARGE_BYTES)
 
     def receive(self) -> list[bytes] | None:
-        """Return the parts of the next reply, or None."""
+        """Return the parts of the next reply, or None if no reply is available."""
         try:
             return self._socket.recv_multipart(zmq.DONTWAIT)
         except zmq.Again:

@@ -86,7 +86,7 @@ class CallReader:
             )
 
     def recent_message(self) -> str:
-        """Return the reason of the newest malformed call. See `RejectionLog.recent_message`."""
+        """Return the reason and the number of malformed calls; "" if there was none in the last seconds."""
         return self._rejections.recent_message()
 
 

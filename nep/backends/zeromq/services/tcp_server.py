@@ -44,7 +44,10 @@ _ACCEPT_PAUSE_S = 0.5
 
 
 class TcpServer:
-    """Server on a listening TCP socket. The constructor raises `AddressInUseError` or `TooManyFilesError`.
+    """Server on a listening TCP socket.
+
+    The constructor raises `AddressInUseError` if the address can't be bound, and `TooManyFilesError` if
+    the process is out of file descriptors.
 
     Args:
         io: Thread that serves the sockets.
@@ -74,7 +77,10 @@ class TcpServer:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Accept connections. See `Pollable.serve`."""
+        """Accept connections. See `Pollable.serve`.
+
+        Connections beyond `_MAX_PEERS`, or without free file descriptors, are closed immediately.
+        """
         for _turn in range(_MAX_READS_PER_TURN):
             if self.is_closed:
                 return PollState()

@@ -109,7 +109,10 @@ class TcpStream:
     # ---- sending
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Queue a pair and send as much as the socket accepts immediately; `flush` sends the rest."""
+        """Queue a pair and send as much as the socket accepts immediately; `flush` sends the rest.
+
+        The pair is discarded if the connection is broken.
+        """
         if self.is_broken:
             return
         header, payload = parts
@@ -166,6 +169,11 @@ class TcpConnection:
     """TCP connection of a client. The constructor starts connecting. Counterpart of `ServerConnection`.
 
     Not thread-safe: guarded by the client's lock.
+
+    Args:
+        io: Thread that serves the socket.
+        address: Address of the server as `HOST:PORT`.
+        serve: Called in the I/O thread on events of the connection.
     """
 
     def __init__(self, io: IoThread, address: str, serve: Callable[[float], PollState]) -> None:

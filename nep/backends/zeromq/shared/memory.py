@@ -87,7 +87,7 @@ class _IceoryxNode:
 
 
 class _ProcessState:
-    # State of this process. `is_refused` is True if shared memory is unavailable.
+    # State of this process. `is_unavailable` is True if shared memory is unavailable.
     is_unavailable = False
     node_ref: weakref.ref[_IceoryxNode] | None = None
 
@@ -292,7 +292,11 @@ class SharedWriter:
         return True
 
     def loan(self, size: int) -> Loan | None:
-        """Return a free slot for `size` bytes, or None if readers hold all slots."""
+        """Return a free slot for `size` bytes.
+
+        Returns None if no slot is free, the slots are smaller than `size`, or the shared memory is
+        full.
+        """
         sample = self._loan_sample(size)
         if sample is None:
             return None
@@ -312,7 +316,8 @@ class SharedWriter:
         """Copy a payload into a slot and publish it to the readers.
 
         Returns:
-            The number of the payload, or None if no slot is free.
+            The number of the payload; None if no slot is free, the slots are too small, or the shared
+            memory is full.
         """
         sample = self._loan_sample(size)
         if sample is None:
@@ -394,10 +399,10 @@ class SharedReader:
         _readers[id(self)] = self
 
     def read(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
-        """Return a payload as a read-only buffer, or None if the payload was overwritten.
+        """Return a payload as a read-only buffer, or None if it was overwritten or isn't available.
 
         Args:
-            number: Id of the payload.
+            number: Number of the payload, see `SharedWriter.number`.
             may_copy: True to copy small payloads, which frees their slots.
         """
         while True:

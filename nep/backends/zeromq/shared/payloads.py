@@ -89,7 +89,11 @@ class SharedPayloads:
         return bool(self.readers)
 
     def borrow_memory(self, size: int) -> memoryview | None:
-        """Return writable memory for a payload of `size` bytes; None if no subscriber shares memory."""
+        """Return writable memory for a payload of `size` bytes.
+
+        Returns None if no subscriber shares memory, `size` is less than `MIN_SHARED_BYTES`, or no slot
+        is free.
+        """
         if not self.readers or size < MIN_SHARED_BYTES or not self._prepare_slots(size) or not self.readers:
             return None
         loan = self._writer.loan(size)
@@ -132,12 +136,15 @@ class SharedSources:
     def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
     ) -> bytes | memoryview | None:
-        """Return the payload that a message's part refers to, or None if the payload was overwritten.
+        """Return the payload that a message's part refers to.
 
         Args:
             publisher: Id of the publisher.
             part: Part of the message.
             may_copy: True to copy small payloads, which frees their slots.
+
+        Returns:
+            Read-only payload; None if it was overwritten or the publisher's memory isn't open.
 
         Raises:
             WireError: The part is malformed.

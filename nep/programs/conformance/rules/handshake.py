@@ -15,7 +15,7 @@ _MAX_WAIT_S = 3.0  # the wire allows 0.5 s; the margin is for busy computers
 
 
 def level_of(bench: Bench) -> int:
-    """Return the highest hello level that the adapter announces."""
+    """Return the highest hello level (1 to 3) that the adapter announces; 0 if it announces none."""
     announced = bench.features.get("features", ())
     return max((level for level in (1, 2, 3) if f"hello{level}" in announced), default=0)
 

@@ -53,7 +53,7 @@ def connect_publisher(
     """Create a publisher of the adapter, and a subscriber of the tester that is connected to it.
 
     Returns:
-        The topic, the number of the publisher, and the subscriber.
+        The topic, the adapter's id of the publisher, and the subscriber.
     """
     topic = bench.new_topic()
     pub = bench.new_pub(topic, msg_type)

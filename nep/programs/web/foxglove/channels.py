@@ -103,7 +103,7 @@ class Channels:
         return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
 
     def ros_type(self, topic: str, schema_name: str) -> str:
-        """Return the ROS type of a topic that was advertised to the client with a schema; else "".
+        """Return the ROS type of a topic that was advertised to the client with this schema, or "".
 
         Args:
             topic: Name of the topic.
@@ -116,7 +116,7 @@ class Channels:
     # ---- topics
 
     async def update(self, types_by_topic: Mapping[str, str]) -> None:
-        """Advertise new topics and unadvertise removed ones.
+        """Advertise new topics, unadvertise removed ones, and readvertise topics whose type has changed.
 
         Args:
             types_by_topic: Message types of all current topics, by topic.
@@ -201,7 +201,8 @@ class Channels:
     async def encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message for the client. Raises `NepError` if the message can't be decoded.
 
-        Returns no frames if the client must subscribe again because the channel has changed.
+        Returns no frames if the client has unsubscribed, or must subscribe again because the channel
+        has changed.
         """
         message = queued.message
         subscription = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)

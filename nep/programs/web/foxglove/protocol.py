@@ -66,7 +66,7 @@ class ServiceRequest(NamedTuple):
 
 
 def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
-    """Parse a message from a client. Raises `NepError`.
+    """Parse a message from a client. Raises `NepError` if the message is malformed.
 
     Returns:
         A `ClientMessage` or `ServiceRequest` for a binary message, the fields of a JSON message.

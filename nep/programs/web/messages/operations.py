@@ -248,7 +248,10 @@ Operation = (
 
 
 def parse(data: bytes) -> Operation:
-    """Parse the operation in a message from a page. Raises `OperationError`."""
+    """Parse the operation in a message from a page.
+
+    Raises `OperationError` if the message isn't JSON within the limits, or isn't a valid operation.
+    """
     fields = parse_json(data)
     if not isinstance(fields, dict):
         raise OperationError(_("an operation must be a JSON object with an 'op'"))
@@ -256,17 +259,20 @@ def parse(data: bytes) -> Operation:
 
 
 def parse_operation(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
-    """Convert the fields of a message to an operation. Raises `OperationError`.
+    """Convert the fields of a message to an operation.
 
     Args:
         fields: Fields of the message.
         size_bytes: Size of the message in bytes.
+
+    Raises:
+        OperationError: The operation is unknown, or a field is missing or invalid.
     """
     return _parse_fields(_Fields(fields, size_bytes))
 
 
 def parse_json(data: bytes) -> object:
-    """Parse JSON from a page within the limits of an operation. Raises `OperationError`."""
+    """Parse JSON from a page. Raises `OperationError` if it is invalid or exceeds the limits."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
             _("an operation is {count} bytes; at most {most} are allowed").format(
@@ -348,13 +354,14 @@ class _Fields:
     def number(self, name: str, default: int | None, minimum: int, maximum: int) -> int:
         """Return a number field as an integer. The field is required if there is no default.
 
-        Floats are accepted, because some programs send whole numbers as floats.
+        Floats are accepted, because some programs send whole numbers as floats; a fraction is
+        truncated.
 
         Args:
             name: Name of the field.
-            default: Value for a missing field.
-            minimum: Minimum.
-            maximum: Maximum.
+            default: Value for a missing field; None for a required field.
+            minimum: Smallest valid value.
+            maximum: Largest valid value.
         """
         value = self._fields.get(name)
         if value is None and default is not None:

@@ -175,7 +175,7 @@ def _with_ros1_times(value: object) -> object:
 
 
 def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
-    """Convert a message from a page to a payload.
+    """Convert a message from a page to a payload. Messages of JSON topics are returned unchanged.
 
     Args:
         msg: Message in its ROS shape.
@@ -183,7 +183,7 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
         msg_type: NEP message type of the topic.
 
     Raises:
-        PayloadError: A field doesn't match; the message names the field.
+        PayloadError: The message isn't a map, or a field doesn't match; the error names the field.
     """
     codec = codec_or_type(msg_type)
     if codec == "string":

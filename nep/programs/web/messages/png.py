@@ -36,9 +36,9 @@ def encode_png(text: bytes) -> str:
 
 
 def decode_png(data: str) -> bytes:
-    """Decode the text in the pixels of a PNG file.
+    """Decode the text in the pixels of a PNG file. Large files are rejected before decoding.
 
-    Raises `OperationError` for invalid data. Large files are rejected before decoding.
+    Raises `OperationError` for invalid data, or if the image codec is not installed.
     """
     try:
         file = parse_header(base64.b64decode(data, validate=True))

@@ -1,4 +1,4 @@
-"""`Page`: rosbridge connection with its own node, which is closed with the connection."""
+"""`RosbridgePage`: rosbridge connection with its own node, which is closed with the connection."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ class Page(PageConnection):
 async def authenticate(connection: ServerConnection, check: AuthVerifier) -> bool:
     """Return True if the client's first message is a valid ``auth`` operation.
 
-    Returns False if the message does not arrive within the time limit.
+    Returns False if the message does not arrive within the time limit, or the connection is closed.
     """
     try:
         data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)

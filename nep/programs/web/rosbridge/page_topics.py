@@ -72,7 +72,8 @@ class PageTopics:
     async def advertise(self, operation: Advertise) -> None:
         """Open a publisher for the page, or add the id to the existing one.
 
-        Raises `OperationError` if the type differs.
+        Raises `OperationError` if the topic has another type, the page may not move the robot, or the
+        page already publishes `MAX_TOPICS` topics.
         """
         publication = self._publications.get(operation.topic)
         if publication is None:

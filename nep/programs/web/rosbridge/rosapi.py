@@ -115,7 +115,10 @@ class RosApi:
         return {"type": self._types.get(_text(args, "topic"), "")}
 
     def topics_and_raw_types(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return all topics with their types and the definitions of the types."""
+        """Return all topics with their types and the definitions of the types.
+
+        A type without a definition gets the definition of ``nep/Json``.
+        """
         texts = [
             full_definition_text(each) or full_definition_text(JSON_TYPE) for each in self._types.values()
         ]
@@ -153,7 +156,7 @@ class RosApi:
         return [each.name for each in services if each.servers and is_visible(each.name)]
 
     def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the type of a service; "" if the service has no server."""
+        """Return the type of a service, also of rosapi's own services; "" if the service is unknown."""
         return {"type": self._service_type(_text(args, "service"))}
 
     def _service_type(self, service: str) -> str:
@@ -214,7 +217,11 @@ class RosApi:
     # ---- parameters
 
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the names of all parameters. Nodes that don't reply within the time limit are omitted."""
+        """Return the names of all parameters as ``NODE:PARAMETER``.
+
+        Nodes that don't reply within the time limit are omitted, as are all beyond the first 50 nodes
+        or 5 s.
+        """
         able = [
             node for node in self._view.nodes.values() if parameters_topic(node.id) in self._view.services
         ]
@@ -253,7 +260,10 @@ class RosApi:
         return {"exists": True}
 
     def set_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Set a parameter. For the node of a robot, the page needs permission to move the robot."""
+        """Set a parameter to a value given as JSON text.
+
+        For the node of a robot, the page needs permission to move the robot.
+        """
         node, name = _parse_parameter_name(args)
         try:
             value = orjson.loads(_text(args, "value"))

@@ -166,7 +166,7 @@ def test_states_have_lanes_and_booleans_show_only_true(panel) -> None:
 
 def test_curves_differ_in_more_than_their_colour(panel) -> None:
     show(panel, *(f"/odom.x{number}" for number in range(8)))
-    looks = [each.look for each in panel.shown]
+    looks = [each.style for each in panel.shown]
     assert len({(each.colour, each.pattern) for each in looks}) == 8
     assert len({each.pattern for each in looks[:4]}) == 4
     pens = [CurveLook(0, pattern).pen(panel.theme) for pattern in range(4)]
@@ -384,7 +384,7 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     words, undo = window.toast_buttons[-1]
     assert (window.toasts[-1], words) == ("Removed /odom.turn", "Undo")
     undo()
-    assert [(each.name, each.right, each.look.colour) for each in panel.shown][1] == ("/odom.turn", True, 3)
+    assert [(each.name, each.right, each.style.colour) for each in panel.shown][1] == ("/odom.turn", True, 3)
 
 
 def test_plot_shortcuts_work_while_the_table_has_focus(panel) -> None:

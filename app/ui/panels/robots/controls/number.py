@@ -130,9 +130,10 @@ def _make_dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidge
 
 
 class OpenNumberEdit(NumberEdit):
-    """Number field for a parameter without a range; it may be empty.
+    """Number field for a parameter that lacks a minimum or maximum; it may be empty.
 
-    Arrow keys change the number by one step, Page Up and Page Down by ten steps.
+    Arrow keys change the number by one step, Page Up and Page Down by ten steps. The
+    result is limited to the existing limit.
     """
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:

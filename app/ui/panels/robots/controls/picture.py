@@ -175,7 +175,7 @@ class PictureChoice(QWidget):
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
-        """Show a value: an encoded image (``data:`` URL), an address, or None for no image."""
+        """Show a value: an encoded image (``data:`` URL), an address, a file path, or None for no image."""
         self.close_stream()
         self._clear_image()
         text = "" if value is None else str(value)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def since_text(listed_page: ListedPage) -> str:
-    """Format since when a page is connected or disconnected, such as "since 8:32" or "gone 4 s"."""
+    """Format since when a page is connected or disconnected, such as "since 8:32" or "gone for 4 s"."""
     if listed_page.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(listed_page.gone_s))
     connected = dt.datetime.fromtimestamp(listed_page.page.since_s).astimezone()

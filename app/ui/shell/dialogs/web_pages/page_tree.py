@@ -158,7 +158,10 @@ class PageTree(QTreeView):
             self.disconnect_requested.emit(listed_page.page.id)
 
     def copy_current(self) -> None:
-        """Emit `copy_requested` with the name of the current topic or the origin of the current page."""
+        """Emit `copy_requested` with the name of the current topic, or the origin of the current page.
+
+        The address replaces the origin of a page without one.
+        """
         topic, listed_page = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
             self.copy_requested.emit(topic.topic)

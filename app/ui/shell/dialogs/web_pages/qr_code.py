@@ -29,6 +29,9 @@ def encode_modules(text: str) -> tuple[bytes, ...]:
     """Encode a text as a QR code and return the rows of its modules.
 
     Each byte is a module, 1 for dark and 0 for light. The quiet zone isn't included.
+
+    Raises:
+        ImportError: segno isn't installed.
     """
     return tuple(bytes(row) for row in segno.make_qr(text, error="m").matrix)
 
@@ -50,7 +53,7 @@ class QrCode(QWidget):
         return self._text
 
     def show_code(self, text: str, address: str) -> None:
-        """Show the QR code of a text.
+        """Show the QR code of a text, or a message if segno isn't installed.
 
         Args:
             text: Text to encode, which may contain the token.
