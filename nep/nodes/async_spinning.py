@@ -76,10 +76,10 @@ async def _await_result(returned: object) -> None:
 class _LoopWaiter:
     """Waiter of a node that spins in an event loop. Messages, calls and `wake` end the wait."""
 
-    def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, watcher: LoopWait) -> None:
+    def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waiter: LoopWait) -> None:
         self._work = work
         self._loop = loop
-        self._loop_wait = watcher
+        self._loop_wait = waiter
         self._ready = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
         self._queues: list[CallQueue] = []
@@ -101,13 +101,15 @@ class _LoopWaiter:
                 if not queue.enter_wait(self.wake):
                     return
                 self._queues.append(queue)
-        late = None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._ready.set)
+        timeout_handle = (
+            None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._ready.set)
+        )
         try:
             await self._ready.wait()
         finally:
             self._ready.clear()
-            if late is not None:
-                late.cancel()
+            if timeout_handle is not None:
+                timeout_handle.cancel()
 
     def _ready_callback(self, subscriber: SubscriberTransport) -> Callable[[], None]:
         def call() -> None:

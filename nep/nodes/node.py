@@ -442,19 +442,19 @@ class Node(ServiceNode):
         node_id = node_with_parameters(self.graph(), node)
         return RemoteParameters(self.new_client(parameters_topic(node_id), timeout_s=timeout_s))
 
-    def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
-        """Open the latched topic `place` for this node's parameters, and the service `place` if supported.
+    def open_parameters(self, name: str, callback: Callable[[object], object]) -> Publisher:
+        """Open the latched topic `name` for this node's parameters, and the service `name` if supported.
 
         Internal; used by `Parameters`.
 
         Args:
-            place: Name of the topic and the service.
-            answer: Callback of the service.
+            name: Name of the topic and the service.
+            callback: Callback of the service.
         """
-        publisher = self.new_pub(place, MSG_TYPE, latched=True)
+        publisher = self.new_pub(name, MSG_TYPE, latched=True)
         if hasattr(self._open_transport(), "create_server"):
             try:
-                self.new_server(place, answer, threads=1)
+                self.new_server(name, callback, threads=1)
             except BaseException:
                 publisher.close(0.0)
                 raise

@@ -216,7 +216,12 @@ class OfferAcceptance(NamedTuple):
 
 
 def hello_part(
-    subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False, batches: bool = False
+    subscriber: int,
+    topic: str,
+    *,
+    one_part: bool = False,
+    acknowledges_echoes: bool = False,
+    batches: bool = False,
 ) -> bytes:
     """Return the hello filter of a subscriber, which is also the first part of messages addressed to it.
 
@@ -230,7 +235,13 @@ def hello_part(
         batches: True if the subscriber also reads batches.
     """
     begin = (
-        HELLO_BATCHES if batches else HELLO_ACKNOWLEDGES if tells else HELLO_ONE_PART if one_part else HELLO
+        HELLO_BATCHES
+        if batches
+        else HELLO_ACKNOWLEDGES
+        if acknowledges_echoes
+        else HELLO_ONE_PART
+        if one_part
+        else HELLO
     )
     return begin + f"{subscriber:016x}/{topic}".encode()
 

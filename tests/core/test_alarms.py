@@ -87,7 +87,7 @@ def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, mast
         tick_until(session, lambda: permission.question is not None)
         assert permission.question.title == "Allow Rover to move?"
         assert f"An alarm wants to send a message on {TOPIC}" in permission.question.message
-        permission.answer(let=False)
+        permission.answer(is_allowed=False)
         tick_until(session, lambda: session.alarms.history.records[0].action_results)
         assert (
             session.alarms.history.records[0].action_results[0].text
@@ -97,7 +97,7 @@ def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, mast
         publisher.publish({"range": 0.1})
         tick_until(session, lambda: permission.question is not None)
         assert (told, moved) == ([], [])
-        permission.answer(let=True)
+        permission.answer(is_allowed=True)
         tick_until(session, lambda: told == [{"op": "invoke"}])
         assert moved == [(("Rover",), "alarm")]
 

@@ -79,7 +79,7 @@ def filters(data: bytes) -> None:
             hello.subscriber,
             hello.topic,
             one_part=hello.reads_one_part,
-            tells=hello.acknowledges,
+            acknowledges_echoes=hello.acknowledges,
             batches=hello.reads_batches,
         )
         assert made.lower() == data.lower()

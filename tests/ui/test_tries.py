@@ -44,7 +44,7 @@ def test_permission_is_requested_once_before_a_tried_block_moves_a_real_robot(se
     assert tried(session, LIGHT) == "", "what does not move needs no answer"
     assert tried(session, TURN) == "Allow Rover to move?"
     assert not session.runs.active
-    session.fleet.permission.answer(let=True)
+    session.fleet.permission.answer(is_allowed=True)
     ends(session)  # the answer started the pending try
     assert tried(session, TURN) == ""
 
@@ -54,7 +54,7 @@ def test_denied_permission_prevents_motion_and_is_requested_again_at_the_next_tr
 ) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, TURN) == "Allow Rover to move?"
-    session.fleet.permission.answer(let=False)
+    session.fleet.permission.answer(is_allowed=False)
     assert not session.runs.active
     assert tried(session, TURN) == "Allow Rover to move?"
 

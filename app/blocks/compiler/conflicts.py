@@ -84,17 +84,17 @@ class ConflictFinder:
         if len(scripts) < 2:
             return
         uses_by_script = [self._find_action_uses(script[1:])[0] for script in scripts]
-        for first_index, other in itertools.combinations(range(len(scripts)), 2):
+        for first_index, second_index in itertools.combinations(range(len(scripts)), 2):
             reported: set[tuple[str, str]] = set()
-            for first, second in itertools.product(uses_by_script[first_index], uses_by_script[other]):
-                for part in _shared_resources(first, second):
-                    if (first.robot, part) not in reported:
-                        reported.add((first.robot, part))
+            for first, second in itertools.product(uses_by_script[first_index], uses_by_script[second_index]):
+                for resource in _shared_resources(first, second):
+                    if (first.robot, resource) not in reported:
+                        reported.add((first.robot, resource))
                         yield Conflict(
                             first,
                             second,
-                            part,
-                            self._possible_reordering(scripts[first_index], scripts[other]),
+                            resource,
+                            self._possible_reordering(scripts[first_index], scripts[second_index]),
                         )
 
     def _find_action_uses(
@@ -160,7 +160,7 @@ def _shared_resources(first: ActionUse, second: ActionUse) -> Sequence[str]:
         for winner, loser in ((first, second), (second, first))
     ):
         return ()  # the robot runs them one after the other
-    return [part for part in first.action.uses if part in second.action.uses]
+    return [resource for resource in first.action.uses if resource in second.action.uses]
 
 
 def _run_simultaneously(first: ActionUse, second: ActionUse) -> bool:

@@ -16,9 +16,11 @@ SETTING_KEY = "tabs"
 class SavedTabs:
     """Storage of the open tabs in the settings, restored at the next start."""
 
-    def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
+    def __init__(
+        self, settings: Settings, documents: Documents, report_error: Callable[[str], object]
+    ) -> None:
         # `report_error` is called with a message if the tabs can't be saved.
-        self._settings, self._documents, self._complain = settings, documents, complain
+        self._settings, self._documents, self._complain = settings, documents, report_error
         self.active = False
         """True if the tabs of this window are saved; False in a second window."""
         self._last_session: dict[str, object] = {}

@@ -187,15 +187,15 @@ class NodeGraph:
         return next((line for line in self.lines if topic in line.topics), None)
 
 
-def node_graph(graph_input: GraphInput, choices: GraphOptions) -> NodeGraph:
+def node_graph(graph_input: GraphInput, options: GraphOptions) -> NodeGraph:
     """Create the drawing from the state of the networks and the options of the user.
 
     The run time is proportional to the number of nodes and topics.
     """
-    boxes = _boxes(graph_input, choices)
-    groups = _groups(graph_input, choices, boxes)
+    boxes = _boxes(graph_input, options)
+    groups = _groups(graph_input, options, boxes)
     closed = {group.key for group in groups if group.is_collapsed}
-    drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, choices)]
+    drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, options)]
     drawn += [_collapsed_box(group) for group in groups if group.is_collapsed]
     visible_keys = {node.key for node in drawn}
     box_by_entry = {
@@ -203,10 +203,10 @@ def node_graph(graph_input: GraphInput, choices: GraphOptions) -> NodeGraph:
         for entry, node in boxes.items()
         if node.group in closed or node.key in visible_keys
     }
-    lines = [*_topic_lines(graph_input, choices, box_by_entry)]
+    lines = [*_topic_lines(graph_input, options, box_by_entry)]
     services: list[GraphLine] = []
-    if choices.shows_services:
-        services = [*_service_lines(graph_input, choices, box_by_entry)]
+    if options.shows_services:
+        services = [*_service_lines(graph_input, options, box_by_entry)]
     return NodeGraph(
         tuple(drawn),
         tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
@@ -214,19 +214,19 @@ def node_graph(graph_input: GraphInput, choices: GraphOptions) -> NodeGraph:
         sum(entry.gone_s is None for entry in graph_input.nodes),
         sum(len(line.topics) for line in lines),
         sum(len(line.topics) for line in services),
-        sum(_is_hidden(node, choices) for node in boxes.values()),
+        sum(_is_hidden(node, options) for node in boxes.values()),
         sum(node.kind == "page" and not node.is_gone for node in boxes.values()),
     )
 
 
-def _is_hidden(node: DrawnNode, choices: GraphOptions) -> bool:
-    return node.is_quiet and choices.hides_quiet and node.group not in choices.groups_with_visible_quiet_nodes
+def _is_hidden(node: DrawnNode, options: GraphOptions) -> bool:
+    return node.is_quiet and options.hides_quiet and node.group not in options.groups_with_visible_quiet_nodes
 
 
 # -- nodes and their groups ----------------------------------------------------------------------------------
 
 
-def _boxes(graph_input: GraphInput, choices: GraphOptions) -> dict[str, DrawnNode]:
+def _boxes(graph_input: GraphInput, options: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
     pictures = {topic.key for topic in graph_input.topics if topic.codec == "image"}
     drawn: dict[str, DrawnNode] = {}
@@ -238,14 +238,14 @@ def _boxes(graph_input: GraphInput, choices: GraphOptions) -> dict[str, DrawnNod
         drawn[entry.key] = DrawnNode(
             key if key_counts[key] == 1 else f"{key}|{key_counts[key]}",
             _name_of(entry) if page is None else page.title,
-            _group_of(entry, graph_input, choices.group_by),
+            _group_of(entry, graph_input, options.group_by),
             _kind_of(entry, graph_input),
             entry,
             entry.key,
             _bridged_network(entry),
             any(key_of(entry.network, topic) in pictures for topic in entry.published_topics),
             entry.gone_s is not None,
-            entry.key in choices.quiet_nodes and entry.gone_s is None,
+            entry.key in options.quiet_nodes and entry.gone_s is None,
             page=page,
         )
     return dict(sorted(drawn.items(), key=lambda item: item[1].key))
@@ -303,7 +303,7 @@ def _belongs_to(entry: NodeEntry, robot: str) -> bool:
 
 
 def _groups(
-    graph_input: GraphInput, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
+    graph_input: GraphInput, options: GraphOptions, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
     members: dict[str, list[DrawnNode]] = {}
@@ -315,10 +315,10 @@ def _groups(
         if not key:
             continue
         nodes = members[key]
-        hidden = sum(_is_hidden(node, choices) for node in nodes)
+        hidden = sum(_is_hidden(node, options) for node in nodes)
         counts = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
         address = min(counts, key=lambda each: (-counts[each], each)) if counts and key != WEB_GROUP else ""
-        closed = choices.is_collapsed(key) or hidden == len(nodes)
+        closed = options.is_collapsed(key) or hidden == len(nodes)
         groups.append(
             GraphGroup(
                 key, _host_of(key), address, _icon_of(key, nodes, graph_input), len(nodes), hidden, closed
@@ -384,19 +384,19 @@ def _collapsed_box(group: GraphGroup) -> DrawnNode:
 _LineEnds = tuple[tuple[str, ...], tuple[str, ...]]
 
 
-def is_drawn(topic: str, choices: GraphOptions) -> bool:
+def is_drawn(topic: str, options: GraphOptions) -> bool:
     """Return True if the topic or service is drawn. Internal ones are drawn only if the options say so."""
-    return choices.shows_internal or not topic.startswith(INTERNAL_PREFIX)
+    return options.shows_internal or not topic.startswith(INTERNAL_PREFIX)
 
 
 def _topic_lines(
-    graph_input: GraphInput, choices: GraphOptions, box_by_entry: Mapping[str, str]
+    graph_input: GraphInput, options: GraphOptions, box_by_entry: Mapping[str, str]
 ) -> Iterator[GraphLine]:
     patterns = _patterns(graph_input)
     bundles: dict[_LineEnds, list[str]] = {}
     for topic in graph_input.topics:
         info = topic.info
-        if info is None or topic.gone_s is not None or not is_drawn(topic.name, choices):
+        if info is None or topic.gone_s is not None or not is_drawn(topic.name, options):
             continue
         hearers = [key_of(topic.network, each.node_id) for each in info.subscribers]
         hearers += [
@@ -410,11 +410,11 @@ def _topic_lines(
 
 
 def _service_lines(
-    graph_input: GraphInput, choices: GraphOptions, box_by_entry: Mapping[str, str]
+    graph_input: GraphInput, options: GraphOptions, box_by_entry: Mapping[str, str]
 ) -> Iterator[GraphLine]:
     bundles: dict[_LineEnds, list[str]] = {}
     for name, info in graph_input.services.items():
-        if is_drawn(name, choices):
+        if is_drawn(name, options):
             clients = (each.node_id for each in info.clients)
             servers = (each.node_id for each in info.servers)
             _add_to_bundle(bundles, _ends(clients, servers, box_by_entry), name)

@@ -124,9 +124,9 @@ class ImageStream:
         """
         self._images.set_size(self, size)
 
-    def set_look(self, look: PictureLook) -> None:
+    def set_look(self, style: PictureLook) -> None:
         """Set the display style, and decode the current image again, even while it is frozen."""
-        self._images.set_look(self, look)
+        self._images.set_look(self, style)
 
     def set_frozen(self, frozen: bool) -> None:
         """Freeze the current image, or show the newest image again.
@@ -276,12 +276,12 @@ class Images:
                 stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def set_look(self, stream: ImageStream, look: PictureLook) -> None:
+    def set_look(self, stream: ImageStream, style: PictureLook) -> None:
         """Set a stream's style; see `ImageStream.set_style`."""
         with self.lock:
-            if stream.look == look:
+            if stream.look == style:
                 return
-            stream.look = look
+            stream.look = style
             picture = stream.picture
             if picture is not None and picture.message is not None and stream.pending is None:
                 stream.pending = (picture.message, picture.received_s)
@@ -321,11 +321,11 @@ class Images:
         """Decode the newest pending image of each stream. Called in the decoding thread."""
         with self.lock:
             pending_work, times = self._take_pending(), self._times
-        for streams, message, arrived_s, size, look in pending_work:
+        for streams, message, arrived_s, size, style in pending_work:
             try:
-                picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, look), None
+                picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, style), None
                 if picture is None:
-                    picture, error = decode(message, arrived_s, size, look)
+                    picture, error = decode(message, arrived_s, size, style)
             except Exception as problem:  # noqa: BLE001  one message must not end the decoding thread
                 picture, error = (
                     None,

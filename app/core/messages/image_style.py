@@ -58,12 +58,12 @@ def parse_look(saved: object) -> PictureLook:
     saved_numbers = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
     brightness, contrast, low, high = saved_numbers.values()
     colours = saved.get("colours")
-    look = PictureLook(
+    style = PictureLook(
         min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
         min(max(contrast, MIN_CONTRAST), MAX_CONTRAST) if contrast is not None else 1.0,
         colours if isinstance(colours, str) and colours in COLOUR_MAPS else "",
     )
-    return replace(look, low=low, high=high) if low is None or high is None or low < high else look
+    return replace(style, low=low, high=high) if low is None or high is None or low < high else style
 
 
 def _number(value: object) -> float | None:
@@ -91,21 +91,21 @@ class ColourScale:
     colours: NDArray[np.uint8]
 
 
-def apply_tones(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def apply_tones(style: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return 8-bit values with the brightness and the contrast of a display style applied."""
-    if (look.brightness, look.contrast) == (0.0, 1.0):
+    if (style.brightness, style.contrast) == (0.0, 1.0):
         return picture
     import cv2  # noqa: PLC0415  slow import
     import numpy as np  # noqa: PLC0415
 
-    return np.asarray(cv2.LUT(picture, _tones(look)), np.uint8)
+    return np.asarray(cv2.LUT(picture, _tones(style)), np.uint8)
 
 
-def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
+def apply_colour_map(style: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
     """Apply the colour map to an image with one channel.
 
     Args:
-        look: Display style.
+        style: Display style.
         numbers: Array (rows, columns).
 
     Returns:
@@ -116,9 +116,9 @@ def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[
     import numpy as np  # noqa: PLC0415
 
     is_finite = np.isfinite(numbers)
-    low, high = _value_range(look, numbers[is_finite], is_bytes=numbers.dtype == np.uint8)
-    colours = _colours(look.colours or ("grey" if numbers.dtype == np.uint8 else DEFAULT_COLOUR_MAP))[
-        _tones(look)
+    low, high = _value_range(style, numbers[is_finite], is_bytes=numbers.dtype == np.uint8)
+    colours = _colours(style.colours or ("grey" if numbers.dtype == np.uint8 else DEFAULT_COLOUR_MAP))[
+        _tones(style)
     ]
     scaled_image = cv2.cvtColor(scaled(numbers, is_finite, low, high), cv2.COLOR_GRAY2BGR)
     bgra = cv2.cvtColor(cv2.LUT(scaled_image, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
@@ -127,7 +127,7 @@ def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[
     return np.asarray(bgra, np.uint8), ColourScale(low, high, colours)
 
 
-def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
+def _value_range(style: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
     # In ascending order.
     default_range = (
         (0.0, 255.0)
@@ -136,9 +136,9 @@ def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> 
         if values.size
         else (0.0, 0.0)
     )
-    low = look.low if look.low is not None else default_range[0]
-    high = look.high if look.high is not None else default_range[1]
-    return (low, high) if low <= high else (low, low) if look.low is not None else (high, high)
+    low = style.low if style.low is not None else default_range[0]
+    high = style.high if style.high is not None else default_range[1]
+    return (low, high) if low <= high else (low, low) if style.low is not None else (high, high)
 
 
 def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
@@ -166,11 +166,11 @@ def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: f
     return result
 
 
-def _tones(look: PictureLook) -> NDArray[np.uint8]:
+def _tones(style: PictureLook) -> NDArray[np.uint8]:
     # Lookup table of the 256 values.
     import numpy as np  # noqa: PLC0415
 
-    steps = (np.arange(256.0) - 127.5) * look.contrast + 127.5 + look.brightness * 255
+    steps = (np.arange(256.0) - 127.5) * style.contrast + 127.5 + style.brightness * 255
     return np.clip(steps + 0.5, 0, 255).astype(np.uint8)
 
 

@@ -81,7 +81,7 @@ class Picture:
 
 
 def decode(
-    message: Message, received_s: float, fit: Size | None = None, look: PictureLook = PLAIN
+    message: Message, received_s: float, fit: Size | None = None, style: PictureLook = PLAIN
 ) -> tuple[Picture | None, str | None]:
     """Decode a message to an image.
 
@@ -90,7 +90,7 @@ def decode(
         received_s: Arrival time of the message (monotonic seconds).
         fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at
             a reduced size. None means full resolution.
-        look: Display style.
+        style: Display style.
 
     Returns:
         The image and None, or None and an error message.
@@ -99,7 +99,7 @@ def decode(
 
     try:
         frame, size = _decode_frame(message, fit)
-        converted = _to_bgra(frame, look)
+        converted = _to_bgra(frame, style)
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
@@ -115,7 +115,7 @@ def decode(
     if (bgra.shape[1], bgra.shape[0]) != size:
         numbers = None
     image = Picture(
-        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, look, scale, is_grey
+        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, style, scale, is_grey
     )
     return image, None
 
@@ -125,7 +125,7 @@ def reuse_picture(
     message: Message,
     received_s: float,
     fit: Size | None,
-    look: PictureLook = PLAIN,
+    style: PictureLook = PLAIN,
 ) -> Picture | None:
     """Return the shown image for a new message without decoding, if both messages contain equal bytes.
 
@@ -136,7 +136,7 @@ def reuse_picture(
         displayed is None
         or displayed.message is None
         or displayed.message is message
-        or displayed.look != look
+        or displayed.look != style
     ):
         return None
     displayed_message, factor = displayed.message, _reduction_factor((displayed.width, displayed.height), fit)
@@ -232,7 +232,7 @@ def _reduction_factor(size: Size, fit: Size | None) -> int:
 
 
 def _to_bgra(
-    frame: NDArray[Any], look: PictureLook
+    frame: NDArray[Any], style: PictureLook
 ) -> tuple[Any, NDArray[Any] | None, ColourScale | None] | None:
     # In QImage's layout, the numbers of one channel, and the meaning of their colours; None if unsupported.
     import cv2  # noqa: PLC0415
@@ -243,15 +243,15 @@ def _to_bgra(
         return None
     if channels == 1:
         grey = frame.reshape(frame.shape[:2])
-        if frame.dtype == np.uint8 and (look.colours, look.low, look.high) == ("", None, None):
-            return cv2.cvtColor(apply_tones(look, grey), cv2.COLOR_GRAY2BGRA), grey, None
-        bgra, scale = apply_colour_map(look, grey)
+        if frame.dtype == np.uint8 and (style.colours, style.low, style.high) == ("", None, None):
+            return cv2.cvtColor(apply_tones(style, grey), cv2.COLOR_GRAY2BGRA), grey, None
+        bgra, scale = apply_colour_map(style, grey)
         return bgra, grey, scale
     if frame.dtype != np.uint8:
         frame = _to_eight_bits(frame)
     if channels == 2:  # such as a vector field: shown as blue and green
         frame = np.dstack([frame, np.zeros(frame.shape[:2], np.uint8)])
-    frame = apply_tones(look, frame)
+    frame = apply_tones(style, frame)
     if channels == 4:
         return np.ascontiguousarray(frame), None, None
     return cv2.cvtColor(np.ascontiguousarray(frame), cv2.COLOR_BGR2BGRA), None, None

@@ -101,21 +101,21 @@ class Doctor:
 
     def _run_checks(self) -> None:
         while True:  # repeats when another topic was set meanwhile
-            missed, self._so_far = self._missed, None
-            findings = self._find(missed)
-            if missed == self._missed:
+            expected_topic, self._so_far = self._missed, None
+            findings = self._find(expected_topic)
+            if expected_topic == self._missed:
                 break
-        self._findings, self._looked_s, self._checked_topic = findings, self._clock(), missed
+        self._findings, self._looked_s, self._checked_topic = findings, self._clock(), expected_topic
         self._so_far = None
         self.revision += 1
 
-    def _report(self, findings: tuple[doctor.Finding, ...], looked_at: int, total_checks: int) -> None:
-        self._so_far, self.looked_at, self.things = findings, looked_at, total_checks
+    def _report(self, findings: tuple[doctor.Finding, ...], check_count: int, total_checks: int) -> None:
+        self._so_far, self.looked_at, self.things = findings, check_count, total_checks
         self.revision += 1
 
-    def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
+    def _find(self, expected_topic: str) -> tuple[doctor.Finding, ...]:
         try:
-            return tuple(self._diagnose(missed, self._report))
+            return tuple(self._diagnose(expected_topic, self._report))
         except Exception as error:  # noqa: BLE001  reported as a finding
             message = _("The doctor couldn't finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error

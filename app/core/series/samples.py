@@ -414,14 +414,16 @@ class Samples:
         begins, ends = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
         if first == 0:
             begins[:1] = True
-        alone = np.flatnonzero(begins & ends[: len(begins)])
-        until = np.minimum(times[alone] + pixel_s, np.append(times[1:], np.inf)[alone])
+        isolated_indexes = np.flatnonzero(begins & ends[: len(begins)])
+        until = np.minimum(times[isolated_indexes] + pixel_s, np.append(times[1:], np.inf)[isolated_indexes])
         broken = np.flatnonzero(gaps)
         broken = broken[broken > 0]
-        indexes = np.concatenate([alone + 1, broken])
+        indexes = np.concatenate([isolated_indexes + 1, broken])
         return (
             np.insert(times, indexes, np.concatenate([until, times[broken]])),
-            np.insert(values, indexes, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
+            np.insert(
+                values, indexes, np.concatenate([values[isolated_indexes], np.full(len(broken), np.nan)])
+            ),
         )
 
     def _peak_line(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Polyline:
@@ -435,9 +437,13 @@ class Samples:
             pixels = _Pixels.join((cached, self._pixels(width, (cached.end, end), None, part[1])))
         else:
             previous_index, first_index = np.searchsorted(self.times, (width * first, width * begin))
-            alone = bool(previous_index == first_index)  # then the sample before the range is used instead
-            pixels = self._pixels(width, (first, end), max(0, int(previous_index) - alone), part[1])
-            first += alone
+            uses_previous_sample = bool(
+                previous_index == first_index
+            )  # then the sample before the range is used instead
+            pixels = self._pixels(
+                width, (first, end), max(0, int(previous_index) - uses_previous_sample), part[1]
+            )
+            first += uses_previous_sample
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
         cacheable = pixels.part(first, max(first, min(sure, end - 1)))
         self._render_cache = _PixelCache(width, self.rewritten, self.begun, cacheable)

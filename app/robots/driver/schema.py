@@ -218,8 +218,8 @@ def _annotation_schema(note: object, schema: Schema) -> Schema:
                 if isinstance(titled_choices, list)
                 else []
             )
-        names = values if isinstance(values, list) else []
-        return {"oneOf": [{"const": value, "title": note.labels.get(value, str(value))} for value in names]}
+        choices = values if isinstance(values, list) else []
+        return {"oneOf": [{"const": value, "title": note.labels.get(value, str(value))} for value in choices]}
     if isinstance(note, Title):
         return {"title": note.text}
     if isinstance(note, Suggested):

@@ -268,30 +268,30 @@ class Tasks:
             )
             self._send_reply(task.finish, TaskReply("failed", error=full))
             return
-        ended = []
+        to_replace = []
         if task.on_busy == "replace":
-            ended = [other for other in clashing if other.cancellable or other in self._queue]
-        waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
-        replaces = tuple(dict.fromkeys(other.action for other in ended))
+            to_replace = [other for other in clashing if other.cancellable or other in self._queue]
+        waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in to_replace))
+        replaces = tuple(dict.fromkeys(other.action for other in to_replace))
         self._send_reply(task.reply, TaskReply("accepted", waits_for=waits_for, replaces=replaces))
         replaced = TaskReply(
             "canceled", error=_("replaced by {action}").format(action=task.title or task.action)
         )
-        self._drop_queued([other for other in ended if other in self._queue], replaced)
-        for other in ended:
+        self._drop_queued([other for other in to_replace if other in self._queue], replaced)
+        for other in to_replace:
             self._end_task(other, replaced)
         self._queue.append(task)
         self._start_ready()
 
-    def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
+    def cancel(self, is_selected: Callable[[Task], bool]) -> str | None:
         """Cancel tasks; return None on success, else an error message.
 
         If no task matches, or if a running one can't be cancelled, nothing is cancelled.
 
         Args:
-            wanted: Returns True for a task to cancel.
+            is_selected: Returns True for a task to cancel.
         """
-        matching = [task for task in (*self._running, *self._queue) if wanted(task)]
+        matching = [task for task in (*self._running, *self._queue) if is_selected(task)]
         if not matching:
             return NO_SUCH_TASK_MESSAGE
         stubborn = [task for task in matching if task in self._running and not task.cancellable]

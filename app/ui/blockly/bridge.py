@@ -53,9 +53,9 @@ class BlocklyBridge(QObject):
     blocks_transferred = Signal(int, str, str)
     backpack_requested = Signal(str)  # backpack operation as JSON (`backpack.ts`)
 
-    def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
+    def __init__(self, initial_settings: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._begin = begin
+        self._begin = initial_settings
 
     def send_command(self, command: str, payload: object) -> None:
         """Send a command with a JSON payload to the page, which sends no reply."""
@@ -99,8 +99,8 @@ class BlocklyBridge(QObject):
         self.field_opened.emit()
 
     @Slot(bool)
-    def on_block(self, has: bool) -> None:
-        self.block_focused.emit(has)
+    def on_block(self, is_focused: bool) -> None:
+        self.block_focused.emit(is_focused)
 
     @Slot(str)
     def offers(self, sensors: str) -> None:
@@ -115,8 +115,8 @@ class BlocklyBridge(QObject):
         self.removed.emit(count)
 
     @Slot(int, int, bool, str)
-    def carried(self, x: int, y: int, out: bool, home: str) -> None:
-        self.blocks_dragged_outside.emit(x, y, out, home)
+    def carried(self, x: int, y: int, is_outside: bool, tab: str) -> None:
+        self.blocks_dragged_outside.emit(x, y, is_outside, tab)
 
     @Slot(str, float)
     def pictureOfCarried(self, data: str, ratio: float) -> None:
@@ -127,8 +127,8 @@ class BlocklyBridge(QObject):
         self.blocks_dropped_outside.emit(x, y)
 
     @Slot(int, str, str)
-    def brought(self, count: int, how: str, home: str) -> None:
-        self.blocks_transferred.emit(count, how, home)
+    def brought(self, count: int, mode: str, source_tab: str) -> None:
+        self.blocks_transferred.emit(count, mode, source_tab)
 
     @Slot(str)
     def backpack(self, what: str) -> None:

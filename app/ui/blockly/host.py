@@ -277,8 +277,8 @@ class BlocklyHost(QWidget):
         self._requested_field = ""
         self._keys.release()
 
-    def _on_block_focused(self, has: bool) -> None:
-        self._on_block = has
+    def _on_block_focused(self, is_focused: bool) -> None:
+        self._on_block = is_focused
 
     def _on_page_ready(self) -> None:
         self._up = True

@@ -179,9 +179,11 @@ class DoctorPanel(PanelWidget):
 
     def _waiting_blockers(self) -> Iterator[Blocker]:
         # Without the missing topic, which the other findings are about.
-        missed, now = self.session.doctor.expected_topic, time.monotonic()
+        expected_topic, now = self.session.doctor.expected_topic, time.monotonic()
         panels = self.context.panels() if self.session.replay is None else ()
-        waiting = {(panel, topic) for panel in panels if (topic := panel.awaited_topic()) and topic != missed}
+        waiting = {
+            (panel, topic) for panel in panels if (topic := panel.awaited_topic()) and topic != expected_topic
+        }
         self._wait_starts_s = {each: self._wait_starts_s.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
             if now - self._wait_starts_s[panel, topic] >= WAIT_REPORT_DELAY_S:
@@ -229,18 +231,22 @@ class DoctorPanel(PanelWidget):
             yield Blocker(message, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
 
     def _update_topics(self) -> None:
-        live, missed = self.session.live, self.session.doctor.expected_topic
-        state = (live.topics.revision, live.networks.revision, missed)
+        live, expected_topic = self.session.live, self.session.doctor.expected_topic
+        state = (live.topics.revision, live.networks.revision, expected_topic)
         if state == self._offered or self.missed.view().isVisible():
             return
         self._offered = state
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.missed.clear()
         self.missed.addItem(_("no specific topic"), "")
-        for name in sorted({*names[:MAX_TOPICS], missed} - {""}):
+        for name in sorted({*names[:MAX_TOPICS], expected_topic} - {""}):
             self.missed.addItem(topic_label(name), name)
-        self.missed.set_value(missed)
-        command = f"nep doctor {missed}" if missed and not split_key(missed)[0] else "nep doctor"
+        self.missed.set_value(expected_topic)
+        command = (
+            f"nep doctor {expected_topic}"
+            if expected_topic and not split_key(expected_topic)[0]
+            else "nep doctor"
+        )
         self.terminal.setText(_("In a terminal: {command}").format(command=command))
 
     def _update_progress(self, *, is_done: bool) -> None:
@@ -347,8 +353,10 @@ class DoctorPanel(PanelWidget):
 
     def copy_report(self) -> None:
         """Copy all findings to the clipboard as a report."""
-        missed = self.session.doctor.expected_topic
-        about = _("Missing: {topic}").format(topic=topic_label(missed)) + "\n" if missed else ""
+        expected_topic = self.session.doctor.expected_topic
+        about = (
+            _("Missing: {topic}").format(topic=topic_label(expected_topic)) + "\n" if expected_topic else ""
+        )
         QGuiApplication.clipboard().setText(about + report_text(self.shown))
         self.context.show_toast(_("Copied the report"))
 

@@ -244,7 +244,7 @@ class PictureView(QWidget):
         return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
 
     def area(self) -> QRectF:
-        """Return the rectangle of the rotated image, which may exceed the view; without an image, the view."""
+        """Return the rectangle of the rotated image, which may exceed the view; without image, the view."""
         if self._picture is None:
             return QRectF(self.rect())
         return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)

@@ -34,10 +34,10 @@ def initial_size(size: QSize, room: QSize) -> QSize:
 class WindowState:
     """Accessor for the settings of the window: position, layouts, theme, text size, motion and contrast."""
 
-    def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
+    def __init__(self, settings: Settings, report_error: Callable[[str], object]) -> None:
         # `report_error` is called with a message if settings can't be saved.
         self._settings = settings
-        self._complain = complain
+        self._complain = report_error
         self._reported_error = ""
 
     def apply_theme(self, theme: Theme) -> None:

@@ -114,10 +114,12 @@ class NanomsgPublisher(HandshakePublisher):
         """
         if not self._endpoint:
             owner = f"a publisher of '{self.spec.topic}'"
-            messages, hellos = (
+            message_listener, hello_listener = (
                 listen(each, f"{LOOPBACK}:0", owner) for each in (self._message_socket, self._hello_socket)
             )
-            self._endpoint = format_endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
+            self._endpoint = format_endpoint(
+                LOOPBACK, bound_port(message_listener), bound_port(hello_listener)
+            )
         return (self._endpoint,)
 
     def unbind_local(self) -> None:
@@ -213,7 +215,9 @@ class NanomsgPublisher(HandshakePublisher):
     def _discard_unconnected_hellos_locked(self) -> None:
         # Discards hellos whose connection was never established or is closed. Call with the lock held.
         connected = set(self._pipes.values())
-        self._hellos = {remote: each for remote, each in self._hellos.items() if remote in connected}
+        self._hellos = {
+            remote: subscriber for remote, subscriber in self._hellos.items() if remote in connected
+        }
 
     def _complete_handshake_locked(self, address: str) -> None:
         # Sends the history, then the echo, after which the subscriber counts losses. Call with the lock held.

@@ -129,9 +129,9 @@ class Matches:
         matches = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {
             gid
-            for gid, participant, tells in endpoints
+            for gid, participant, publishes_matches in endpoints
             if not any(
-                gid in matched and (not tells or self.is_confirmed(own_gid, gid, participant))
+                gid in matched and (not publishes_matches or self.is_confirmed(own_gid, gid, participant))
                 for own_gid, matched in matches
             )
         }

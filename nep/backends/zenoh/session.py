@@ -464,8 +464,8 @@ class ZenohSession:
         key: str,
         parts: Sequence[bytes | memoryview],
         timeout_s: float,
-        take: Callable[[Any], None],
-        over: Callable[[], None],
+        on_reply: Callable[[Any], None],
+        on_finished: Callable[[], None],
     ) -> None:
         """Send a call to a server, without waiting for the reply. Raises zenoh's `ZError`.
 
@@ -473,14 +473,14 @@ class ZenohSession:
             key: Key of the server.
             parts: Header and payload of the call.
             timeout_s: Seconds until zenoh finishes the query.
-            take: Called with each reply, in a zenoh thread.
-            over: Called when the query is finished.
+            on_reply: Called with each reply, in a zenoh thread.
+            on_finished: Called when the query is finished.
         """
         zenoh = load_zenoh()
         header, data = (each if isinstance(each, bytes) else bytes(each) for each in parts)
         self._zenoh.get(
             key,
-            create_handler(take, over),
+            create_handler(on_reply, on_finished),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,

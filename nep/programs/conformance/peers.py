@@ -208,7 +208,7 @@ class ScriptedSubscriber:
         self.socket.linger, self.socket.sndhwm, self.socket.rcvhwm = 0, 0, 0
         self.socket.subscribe(topic_part(topic))
         self.hello = hello_part(
-            self.record.id, topic, one_part=level == 1, tells=level == 2, batches=level == 3
+            self.record.id, topic, one_part=level == 1, acknowledges_echoes=level == 2, batches=level == 3
         )
         if level is not None:
             self.socket.subscribe(self.hello)

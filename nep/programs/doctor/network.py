@@ -92,13 +92,13 @@ def _hung_finding(facts: Facts, holder: ProcessFact) -> Finding:
 
 
 def _port_taken_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
-    number = facts.address.rpartition(":")[2]
-    other = _other_port(number)
+    port = facts.address.rpartition(":")[2]
+    other = _other_port(port)
     return Finding(
         "master:foreign",
         "error",
         _("{program} uses port {number} but isn't a master.").format(
-            number=number, program=_holder_text(holder)
+            number=port, program=_holder_text(holder)
         ),
         _(
             "Close that program, or start the master on port {other} and set "

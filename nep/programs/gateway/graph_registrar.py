@@ -161,7 +161,7 @@ class GraphRegistrar:
             for link in program.links:
                 if link.role == "publisher":
                     id_by_key.setdefault((link.topic, link.codec), _stable_id(program, link))
-        self._stat_keys = {carrier: key for key, carrier in id_by_key.items()}
+        self._stat_keys = {publisher_id: key for key, publisher_id in id_by_key.items()}
         self._counts = {key: counted for key, counted in self._counts.items() if key in id_by_key}
 
     def _publisher_count(self, record: PublisherRecord) -> PublisherCount:

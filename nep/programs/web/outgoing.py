@@ -66,23 +66,23 @@ class EncodingOptions(NamedTuple):
     as_pixels: bool = False
 
 
-def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[Frame]:
+def publish_frames(topic: str, message: Message, options: EncodingOptions) -> list[Frame]:
     """Encode a message of a topic for a subscriber.
 
     Args:
         topic: Name of the topic.
         message: Message to encode.
-        form: Encoding that the page requests.
+        options: Encoding that the page requests.
 
     Raises:
         NepError: The message can't be decoded, or can't be encoded in this form.
     """
-    if form.compression == "cbor-raw":
+    if options.compression == "cbor-raw":
         secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS_PER_S)
-        raw = {"secs": secs, "nsecs": nsecs, "bytes": ros_bytes(message, as_pixels=form.as_pixels)}
+        raw = {"secs": secs, "nsecs": nsecs, "bytes": ros_bytes(message, as_pixels=options.as_pixels)}
         return [Frame(cbor2.dumps({"op": "publish", "topic": topic, "msg": raw}), is_text=False)]
-    if form.compression == "cbor":
-        msg = to_ros(message, as_pixels=form.as_pixels)
+    if options.compression == "cbor":
+        msg = to_ros(message, as_pixels=options.as_pixels)
         definition = definition_of(bare_type(ros_type_of(message.msg_type)))
         if definition is not None and message.codec == "json" and isinstance(msg, Mapping):
             msg = _with_typed_arrays(msg, definition)
@@ -90,34 +90,34 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
     body = _json_payload(message) if message.codec == "json" else None
     if body is None:
         text = encode_json(
-            {"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)}
+            {"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=options.as_pixels)}
         )
     else:
         text = b'{"op":"publish","topic":%b,"msg":%b}' % (orjson.dumps(topic), body)
-    return _text_frames(text, form)
+    return _text_frames(text, options)
 
 
-def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
+def operation_frames(operation: Mapping[str, object], options: EncodingOptions) -> list[Frame]:
     """Encode an operation that isn't a topic's message, such as the response of a service.
 
     Args:
         operation: Fields of the operation.
-        form: Encoding that the page requests.
+        options: Encoding that the page requests.
 
     Raises:
         NepError: A field can't be encoded in this form.
     """
-    if form.compression in {"cbor", "cbor-raw"}:
+    if options.compression in {"cbor", "cbor-raw"}:
         return [Frame(_encode_cbor(operation), is_text=False)]
-    return _text_frames(encode_json(operation), form)
+    return _text_frames(encode_json(operation), options)
 
 
-def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
-    if form.compression == "png":
+def _text_frames(text: bytes, options: EncodingOptions) -> list[Frame]:
+    if options.compression == "png":
         text = encode_json({"op": "png", "data": encode_png(text)})
-    if form.fragment_size is None or len(text) <= form.fragment_size:
+    if options.fragment_size is None or len(text) <= options.fragment_size:
         return [Frame(text, is_text=True)]
-    pieces = cut(text.decode(), form.fragment_size)
+    pieces = cut(text.decode(), options.fragment_size)
     id_ = f"fragment:{next(_fragment_numbers)}"
     return [
         Frame(

@@ -325,12 +325,12 @@ def test_motion_commands_need_confirmation_even_under_another_name(session: Sess
     question = acting.question
     assert question is not None
     assert question.message.startswith("/harmless commands robots.")
-    acting.answer(let=False)
+    acting.answer(is_allowed=False)
     session.tick()
     question = acting.question
     assert question is not None
     assert question.topic == "/arm/command"
-    acting.answer(let=True)
+    acting.answer(is_allowed=True)
     assert [sent.route.name for sent in sending.outbox.active_topics] == ["/a", "/arm/command"]
     assert acting.question is None
     session.tick()

@@ -76,7 +76,7 @@ def test_message_that_moves_a_real_robot_waits_for_permission(rover) -> None:
     assert "Rover" in gate.rejection_reason(TOPIC)
     assert "Rover" in gate.rejection_reason("robot_action")
     assert gate.rejection_reason("/Rover/answer") == ""
-    permission.answer(let=True)
+    permission.answer(is_allowed=True)
     assert done == [1]
     assert gate.request_permission(TOPIC, pytest.fail)
     assert gate.rejection_reason(TOPIC) == ""
@@ -97,7 +97,7 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     assert not gate.request_permission(TOPIC, lambda: None)
     assert permission.question is not None
     assert permission.question.title == "Allow Rover to move?"
-    permission.answer(let=True)
+    permission.answer(is_allowed=True)
     assert gate.is_permitted(TOPIC)
     robots.come(rover)  # now described: it needs a permission of its own
     assert not gate.is_permitted(TOPIC)
@@ -120,14 +120,14 @@ def test_shelf_message_needs_permission_and_repetition_ends_when_a_real_robot_co
         tick_until(session, lambda: not acting.outbox.repeated_messages)
         if acting.question is None:  # the sender's thread saw the robot before the window did
             assert acting.send(ORDER) == ""
-        acting.answer(let=True)
+        acting.answer(is_allowed=True)
         assert acting.send(ORDER) == ""
         assert permission.question is not None
         session.tick()
         assert moved == []
         before = len(told)
         assert before <= 1  # a message in flight when the robot subscribed
-        permission.answer(let=True)
+        permission.answer(is_allowed=True)
         tick_until(session, lambda: len(told) == before + 1)
         assert moved == [(("Rover",), "shelf")]
         permission.revoke_all()
@@ -143,7 +143,7 @@ def test_another_program_of_the_same_name_needs_permission_again(session: Sessio
     permission, gate = session.fleet.permission, session.fleet.gate
     with real_robot(session, master.address):
         assert not gate.request_permission(TOPIC, lambda: None)
-        permission.answer(let=True)
+        permission.answer(is_allowed=True)
         assert gate.is_permitted(TOPIC)
     tick_until(session, lambda: not session.fleet.connected)
     link = session.fleet.link("Rover")

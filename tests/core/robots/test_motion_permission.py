@@ -49,8 +49,8 @@ def test_actions_without_risk_need_no_permission(rover) -> None:
 def test_granted_permission_continues_once_and_lasts_for_the_session(rover) -> None:
     moving, done = MotionPermission(), []
     moving.request_permission([(rover, ["move"])], lambda: done.append(1))
-    moving.answer(let=True)
-    moving.answer(let=True)  # a second click
+    moving.answer(is_allowed=True)
+    moving.answer(is_allowed=True)  # a second click
     assert done == [1]
     assert moving.request_permission([(rover, ["turn"])], pytest.fail)
     other = replace(rover, name="Other")
@@ -61,19 +61,19 @@ def test_granted_permission_continues_once_and_lasts_for_the_session(rover) -> N
 def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None:
     moving = MotionPermission()
     moving.request_permission([(rover, ["move"])], pytest.fail)
-    moving.answer(let=False, always=True)
+    moving.answer(is_allowed=False, always=True)
     assert moving.question is None
     assert not moving.request_permission([(rover, ["move"])], pytest.fail)
     moving.withdraw()
     assert moving.question is None
-    moving.answer(let=True)  # no question is open, so the answer is ignored
+    moving.answer(is_allowed=True)  # no question is open, so the answer is ignored
     assert not moving.is_allowed(rover)
 
 
 def test_permanent_permission_is_saved_for_this_robot_until_reset(rover, tmp_path) -> None:
     moving = MotionPermission(Settings(tmp_path))
     moving.request_permission([(rover, ["move"])], lambda: None)
-    moving.answer(let=True, always=True)
+    moving.answer(is_allowed=True, always=True)
     assert MotionPermission(Settings(tmp_path)).is_allowed(rover)
     assert not MotionPermission(Settings(tmp_path)).is_allowed(replace(rover, model="other"))
     moving.revoke_all()
@@ -85,7 +85,7 @@ def test_new_question_replaces_the_previous_one(rover) -> None:
     moving, done = MotionPermission(), []
     moving.request_permission([(rover, ["move"])], lambda: done.append("old"))
     moving.request_permission([(rover, ["turn"])], lambda: done.append("new"))
-    moving.answer(let=True)
+    moving.answer(is_allowed=True)
     assert done == ["new"]
 
 
@@ -126,5 +126,5 @@ def test_one_answer_permits_all_robots_of_the_question(rover) -> None:
     assert not moving.request_permission([(rover, ["move"]), (other, ["turn"])], lambda: None)
     assert moving.question is not None
     assert moving.question.title == "Allow Rover and Other to move?"
-    moving.answer(let=True)
+    moving.answer(is_allowed=True)
     assert moving.request_permission([(rover, ["move"]), (other, ["turn"])], pytest.fail)

@@ -122,7 +122,7 @@ def test_behaviour_that_publishes_on_a_robot_topic_needs_permission_and_is_stopp
         assert "“move”" in moving.question.message
         session.tick()
         assert "drive" not in heard
-        moving.answer(let=True)
+        moving.answer(is_allowed=True)
         tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
         assert "Turtle" in session.fleet.moved
         session.runs.stop()
@@ -155,7 +155,7 @@ def test_permission_continues_the_requested_run_without_asking_again(
         wheels = driver.body.wheels  # type: ignore[attr-defined]
         session.document.apply_edit(workspace(started(turn(180, "x"))))
         session.runs.run()
-        session.fleet.permission.answer(let=True)
+        session.fleet.permission.answer(is_allowed=True)
         tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
         tick_until(session, lambda: not wheels.still())
         session.runs.stop()
@@ -170,13 +170,13 @@ def test_trial_continues_after_permission(session: Session, node: nep.Node) -> N
         there(session, "Turtle")
         with pytest.raises(MayNotMoveError, match="Turtle can't move yet"):
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
-        session.fleet.permission.answer(let=False)
+        session.fleet.permission.answer(is_allowed=False)
         link = session.fleet.link("Turtle")
         assert link is not None
         assert not link.invocations
         with pytest.raises(MayNotMoveError):
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
-        session.fleet.permission.answer(let=True)
+        session.fleet.permission.answer(is_allowed=True)
         tick_until(session, lambda: link.invocations["move"].state == "succeeded", FOUND_S)
 
 

@@ -166,7 +166,7 @@ def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet)
     fleet.change_world("Turtle", {"touch": "head"})
     assert fleet.permission.question is not None
     assert world.changes == []
-    fleet.permission.answer(let=True)
+    fleet.permission.answer(is_allowed=True)
     assert world.changes == [{"touch": "head"}]
     fleet.connect(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
     fleet.change_world("Turtle", {"reset": True})
@@ -178,11 +178,11 @@ def test_permission_applies_to_this_program_and_permanent_permission_to_its_comp
 ) -> None:
     fleet.connect(turtle(virtual=False), "/Turtle/description", STRANGE)
     assert asks(fleet)
-    fleet.permission.answer(let=True)
+    fleet.permission.answer(is_allowed=True)
     assert not asks(fleet)
     fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # restarted
     assert asks(fleet)
-    fleet.permission.answer(let=True, always=True)
+    fleet.permission.answer(is_allowed=True, always=True)
     fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
     assert not asks(fleet)
     for other in (replace(STRANGE, host="evil"), replace(STRANGE, node="evil")):

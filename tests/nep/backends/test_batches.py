@@ -142,7 +142,11 @@ def test_subscribers_without_batch_support_receive_single_messages(
     node: nep.Node, stranger: Callable[..., zmq.Socket[bytes]], other: str
 ) -> None:
     pub, sub = node.new_pub("t"), node.new_sub("t")
-    old = wire.hello_part(next(IDS), "t", tells=True) if other == "an older nep" else wire.hello_part(7, "t")
+    old = (
+        wire.hello_part(next(IDS), "t", acknowledges_echoes=True)
+        if other == "an older nep"
+        else wire.hello_part(7, "t")
+    )
     socket = stranger("t", old)
     burst(pub, 300)
     assert {many for many, _seq in heard(socket, 300)} == {1}

@@ -86,7 +86,9 @@ def test_subscription_filter_is_parsed_and_encoded_or_rejected(vector: dict[str,
             said["topic"],
             said["level"],
         )
-        again = wire.hello_part(*hello[:2], one_part=level > 0, tells=level > 1, batches=level > 2)
+        again = wire.hello_part(
+            *hello[:2], one_part=level > 0, acknowledges_echoes=level > 1, batches=level > 2
+        )
         assert again == part
     elif kind == "read":
         assert read is not None

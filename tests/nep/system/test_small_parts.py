@@ -435,14 +435,16 @@ def test_number_of_unlisted_publishers_is_bounded() -> None:
 def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
     subscriptions = Subscriptions("t", 7)
     for number in range(MAX_SUBSCRIBERS + 1000):
-        greeted = subscriptions.handle_event(b"\1" + hello_part(number, "t", tells=True), 0)
+        greeted = subscriptions.handle_event(b"\1" + hello_part(number, "t", acknowledges_echoes=True), 0)
         assert (greeted is not None) == (number < MAX_SUBSCRIBERS)
     assert (
         len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
     )
     assert subscriptions.rejections.count == 1000
-    assert subscriptions.handle_event(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # same hello
-    assert subscriptions.handle_event(b"\0" + hello_part(5, "t", tells=True), 0) is None
+    assert (
+        subscriptions.handle_event(b"\1" + hello_part(5, "t", acknowledges_echoes=True), 0) is not None
+    )  # same hello
+    assert subscriptions.handle_event(b"\0" + hello_part(5, "t", acknowledges_echoes=True), 0) is None
     assert subscriptions.handle_event(b"\1" + hello_part(77_777, "t"), 0) is not None
     assert not subscriptions.all_acknowledge
     for number in range(50_000):  # other filters don't accumulate either

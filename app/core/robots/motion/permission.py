@@ -141,7 +141,7 @@ class MotionPermission:
         self.revision += 1
         return False
 
-    def answer(self, *, let: bool, always: bool = False) -> None:
+    def answer(self, *, is_allowed: bool, always: bool = False) -> None:
         """Apply the user's answer to the question.
 
         Args:
@@ -153,7 +153,7 @@ class MotionPermission:
         """
         question, self.question = self.question, None
         self.revision += 1
-        if question is None or not let:
+        if question is None or not is_allowed:
             return
         self._allowed.update(now for now, _key in self._question_keys)
         self.strangers |= set(question.unknown_robots)

@@ -281,8 +281,8 @@ class RobotStopper:
     def close(self) -> None:
         """Disconnect from all robots without stopping them."""
         self.set_robots(())
-        for maker in self._openers:
-            maker.join(timeout=5)
+        for thread in self._openers:
+            thread.join(timeout=5)
         with self._changed:
             self._requests.clear()
 

@@ -190,15 +190,15 @@ class SessionActing:
         if turn == self.arming.turn:
             self.allow(target, on_allowed, is_sure=True)
 
-    def answer(self, *, let: bool) -> None:
+    def answer(self, *, is_allowed: bool) -> None:
         """Apply the user's answer to `question`, and remove the question.
 
         Args:
-            let: True to allow the motion.
+            is_allowed: True to allow the motion.
         """
         question, self.question = self.question, None
         self.revision += 1
-        if question is not None and let:
+        if question is not None and is_allowed:
             question.on_allow()
 
     def forbid(self, target: Target) -> None:
@@ -508,9 +508,9 @@ class SessionActing:
 
     def _read(self, path: Path) -> Shelf:
         def parse(data: bytes) -> tuple[Shelf, str]:
-            shelf, unread = parse_shelf(data)
+            saved_messages, unread = parse_shelf(data)
             template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
-            return shelf, template.format(count=unread) if unread else ""
+            return saved_messages, template.format(count=unread) if unread else ""
 
         stored = read_stored(path, parse, NewerShelfError, MAX_BYTES)
         self._is_newer = stored.is_newer

@@ -170,7 +170,7 @@ class Shelf:
 # ---- file
 
 
-def encode_shelf(shelf: Shelf) -> bytes:
+def encode_shelf(saved_messages: Shelf) -> bytes:
     """Return saved messages in the file format."""
     value = {
         "format": FORMAT_VERSION,
@@ -184,9 +184,9 @@ def encode_shelf(shelf: Shelf) -> bytes:
                 "values": dict(each.values),
                 "rate_hz": each.rate_hz,
             }
-            for each in shelf.messages
+            for each in saved_messages.messages
         ],
-        "requests": dict(shelf.requests),
+        "requests": dict(saved_messages.requests),
     }
     return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
 

@@ -184,8 +184,8 @@ class GraphCard(QWidget):
 
     def first_focus_widget(self) -> QWidget:
         """Return the first widget of the tab order: a row, else *Inspect*, else the close button."""
-        rows = [row.button for table in self._tables for row in table.rows]
-        first = next((button for button in rows if button.isVisibleTo(self)), None)
+        buttons = [row.button for table in self._tables for row in table.rows]
+        first = next((button for button in buttons if button.isVisibleTo(self)), None)
         return first or (self.inspect if self.inspect.isVisibleTo(self) else self.close_button)
 
     def _inspect(self) -> None:

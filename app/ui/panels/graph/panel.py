@@ -220,22 +220,22 @@ class GraphPanel(PanelWidget):
         )
 
     def _update_quiet_nodes(self) -> None:
-        graph_state, now = self._graph_input(), time.monotonic()
-        self._quiet.update(graph_state, now)
-        self._calls.update(graph_state, now)
+        graph_input, now = self._graph_input(), time.monotonic()
+        self._quiet.update(graph_input, now)
+        self._calls.update(graph_input, now)
         self._hertz = self._calls.rates_hz()
         self._update_choices(quiet_nodes=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
-        graph_state = self._graph_input()
-        choices = self._choices
-        if len(graph_state.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
+        graph_input = self._graph_input()
+        options = self._choices
+        if len(graph_input.nodes) > MAX_EXPANDED_NODES and not (options.starts_collapsed or options.toggled):
             self._layout = None
             self._update_choices(starts_collapsed=True)
-        graph = node_graph(graph_state, self._choices)
-        self.pages.setCurrentIndex(0 if graph_state.nodes else 1)
-        self.export.setVisible(bool(graph_state.nodes))
-        if not graph_state.nodes:
+        graph = node_graph(graph_input, self._choices)
+        self.pages.setCurrentIndex(0 if graph_input.nodes else 1)
+        self.export.setVisible(bool(graph_input.nodes))
+        if not graph_input.nodes:
             self._update_choices(starts_collapsed=False)
             self._update_empty_state()
         self._update_counts(graph)
@@ -580,12 +580,12 @@ class GraphPanel(PanelWidget):
             self._reset_layout()
 
     def save_state(self) -> dict[str, object]:
-        choices = self._choices
+        options = self._choices
         return {
-            "group_by": choices.group_by,
-            "services": choices.shows_services,
-            "hides_quiet": choices.hides_quiet,
-            "own": choices.shows_internal,
+            "group_by": options.group_by,
+            "services": options.shows_services,
+            "hides_quiet": options.hides_quiet,
+            "own": options.shows_internal,
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:

@@ -53,11 +53,11 @@ class GraphTools(QWidget):
         """Return the words of the filter, in lower case."""
         return self.filter.text().casefold().split()
 
-    def show_choices(self, choices: GraphOptions) -> None:
+    def show_choices(self, options: GraphOptions) -> None:
         """Update the buttons to show the current choices."""
-        self.group.set_value(choices.group_by)
-        self.quiet.setChecked(choices.hides_quiet)
-        self.services.setChecked(choices.shows_services)
+        self.group.set_value(options.group_by)
+        self.quiet.setChecked(options.hides_quiet)
+        self.services.setChecked(options.shows_services)
 
     def show_quiet_count(self, hidden: int, hides: bool) -> None:
         """Show the number of hidden quiet nodes on the button.

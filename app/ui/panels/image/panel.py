@@ -85,11 +85,11 @@ class ImagePanel(PanelWidget):
         column.addWidget(self.look_bar)
         return self.shown
 
-    def _set_look(self, look: object) -> None:
-        if isinstance(look, PictureLook):
-            self._looks[self._topic] = look
+    def _set_look(self, style: object) -> None:
+        if isinstance(style, PictureLook):
+            self._looks[self._topic] = style
             if self._stream is not None:
-                self._stream.set_look(look)
+                self._stream.set_look(style)
 
     def _make_actions(self) -> None:
         own_callbacks = {
@@ -355,8 +355,8 @@ class ImagePanel(PanelWidget):
             self.show_topic(topic)
         self.view.place.restore(state.get("place"))
         self.actions_of.update_checks()
-        self._set_look(look := parse_look(state.get("look")))
-        self.look_bar.show_look(look)
+        self._set_look(style := parse_look(state.get("look")))
+        self.look_bar.show_look(style)
         self.tune.setChecked(state.get("tune") is True)
         self.points.restore(state.get("point"))
         self.actions_of["point"].setChecked(self.points.is_on)

@@ -90,24 +90,24 @@ class LookBar(QWidget):
         slider.reset.connect(lambda: slider.setValue(SLIDER_STEPS))
         return slider
 
-    def show_look(self, look: PictureLook) -> None:
+    def show_look(self, style: PictureLook) -> None:
         """Show other settings without emitting `changed`."""
-        self.look = look
+        self.look = style
         slider_values = (
-            (self.brightness, round(SLIDER_STEPS * (1 + look.brightness))),
-            (self.contrast, round(SLIDER_STEPS * (1 + log(look.contrast) / log(MAX_CONTRAST)))),
+            (self.brightness, round(SLIDER_STEPS * (1 + style.brightness))),
+            (self.contrast, round(SLIDER_STEPS * (1 + log(style.contrast) / log(MAX_CONTRAST)))),
         )
         for slider, value in slider_values:
             slider.blockSignals(True)
             slider.setValue(value)
             slider.blockSignals(False)
             slider.update()
-        self.colours.set_value(look.colours)
-        has_range = look.low is not None and look.high is not None
+        self.colours.set_value(style.colours)
+        has_range = style.low is not None and style.high is not None
         self.own_range.blockSignals(True)
         self.own_range.setChecked(has_range)
         self.own_range.blockSignals(False)
-        for field, end in ((self.low, look.low), (self.high, look.high)):
+        for field, end in ((self.low, style.low), (self.high, style.high)):
             field.setVisible(has_range)
             if end is not None:
                 field.show_number(end)
@@ -121,12 +121,12 @@ class LookBar(QWidget):
             for part in (self.colours, self.own_range, self.low, self.high):
                 part.setEnabled(of_numbers)
 
-    def _apply(self, look: PictureLook, *, show: bool = False) -> None:
+    def _apply(self, style: PictureLook, *, show: bool = False) -> None:
         if show:
-            self.show_look(look)
-        if look != self.look or show:
-            self.look = look
-            self.changed.emit(look)
+            self.show_look(style)
+        if style != self.look or show:
+            self.look = style
+            self.changed.emit(style)
 
     def _set_brightness(self, value: int) -> None:
         self._apply(replace(self.look, brightness=value / SLIDER_STEPS - 1))

@@ -107,16 +107,16 @@ class Stroke:
         painter.setOpacity(1.0)
 
 
-def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
+def paint_state(painter: QPainter, theme: Theme, box: QRectF, style: CurveLook) -> None:
     """Paint the box of a state.
 
     Args:
         painter: Painter to use.
         theme: Theme with the colours.
         box: Rectangle of the state.
-        look: Style of the curve.
+        style: Style of the curve.
     """
-    fill, edge = look.line_colour(theme), look.line_colour(theme)
+    fill, edge = style.line_colour(theme), style.line_colour(theme)
     fill.setAlphaF(LANE_FILL_ALPHA)
     edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)
     paint.box(painter, box, theme.radius("key"), fill, edge)

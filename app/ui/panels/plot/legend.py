@@ -84,10 +84,10 @@ class _CellFactory:
 
     @staticmethod
     def stroke(plot_curve: PlotCurve) -> Cell:
-        look = plot_curve.look
+        style = plot_curve.look
         return Cell(
-            mark=Stroke(look, plot_curve.curve.is_state, plot_curve.is_hidden),
-            accessible_text=_(COLOUR_NAMES[look.colour % len(COLOUR_NAMES)]),
+            mark=Stroke(style, plot_curve.curve.is_state, plot_curve.is_hidden),
+            accessible_text=_(COLOUR_NAMES[style.colour % len(COLOUR_NAMES)]),
         )
 
     def name(self, plot_curve: PlotCurve) -> Cell:

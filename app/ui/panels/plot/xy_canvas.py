@@ -26,12 +26,14 @@ ARROW_SIZE = 7.0
 Path = tuple[PlotCurve, PlotCurve, Floats, Floats, Floats]
 
 
-def path_of(x_curve: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> tuple[Floats, Floats, Floats]:
+def path_of(
+    x_curve: PlotCurve, y_curve: PlotCurve, begin_s: float, end_s: float
+) -> tuple[Floats, Floats, Floats]:
     """Return the points of one curve against another.
 
     Args:
         x_curve: Curve with the x coordinates; its times are used.
-        up: Curve with the y coordinates.
+        y_curve: Curve with the y coordinates.
         begin_s: Start of the time range in s.
         end_s: End of the time range in s.
 
@@ -44,7 +46,7 @@ def path_of(x_curve: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> 
     part = slice(first, end, step)
     times, xs = samples.times[part].copy(), np.clip(samples.values[part], -MAX_ABS_VALUE, MAX_ABS_VALUE)
     gaps = samples.gaps[part]
-    ys = np.clip(held_values(up.curve.samples, times), -MAX_ABS_VALUE, MAX_ABS_VALUE)
+    ys = np.clip(held_values(y_curve.curve.samples, times), -MAX_ABS_VALUE, MAX_ABS_VALUE)
     if step == 1:
         xs[gaps] = np.nan
     return times, xs, ys
@@ -100,13 +102,15 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             begin_s: Start of the time range in s.
             end_s: End of the time range in s.
         """
-        self._paths = [(x_curve, up, *path_of(x_curve, up, begin_s, end_s)) for x_curve, up in pairs]
+        self._paths = [
+            (x_curve, y_curve, *path_of(x_curve, y_curve, begin_s, end_s)) for x_curve, y_curve in pairs
+        ]
         count = 0
-        for _across, up, times, xs, ys in self._paths:
+        for _x_curve, y_curve, times, xs, ys in self._paths:
             for shade in range(SHADE_COUNT):
                 first = shade * len(times) // SHADE_COUNT
                 last = (shade + 1) * len(times) // SHADE_COUNT + 1
-                colour = up.look.line_colour(self.theme)
+                colour = y_curve.look.line_colour(self.theme)
                 colour.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADE_COUNT)
                 self._line(count).setData(xs[first:last], ys[first:last], pen=pg.mkPen(colour, width=1.75))
                 count += 1
@@ -154,8 +158,8 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
 
     @staticmethod
     def _point_at(path: Path, time_s: float) -> tuple[float, float] | None:
-        x_sample, up = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
-        return (x_sample[1], up[1]) if x_sample is not None and up is not None else None
+        x_sample, y_curve = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
+        return (x_sample[1], y_curve[1]) if x_sample is not None and y_curve is not None else None
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -179,7 +183,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
                 paint.text_line(painter, flag, name, font, self.theme.colour("tooltipText"), paint.CENTRE)
 
     def _paint_arrow(self, painter: QPainter, path: Path) -> None:
-        _across, up, _times, xs, ys = path
+        _across, y_curve, _times, xs, ys = path
         (finite,) = np.nonzero(_finite_mask(xs, ys))
         if len(finite) < 2:
             return
@@ -206,7 +210,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             )
         ]
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(up.look.line_colour(self.theme))
+        painter.setBrush(y_curve.look.line_colour(self.theme))
         painter.drawPolygon(QPolygonF(corners))
 
 

@@ -71,13 +71,13 @@ class PublishPanel(PanelWidget):
     def _connect(self) -> None:
         self.filter.textChanged.connect(lambda _text: self._rebuild())
         self.filter.exited.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        shelf, form = self.list, self.form
-        shelf.filter_requested.connect(self.focus_filter)
-        shelf.selected.connect(lambda _id: self._show_selected())
-        shelf.send_requested.connect(lambda _id: self.send())
-        shelf.copy_requested.connect(self.copy)
-        shelf.delete_requested.connect(self.delete)
-        shelf.menu_requested.connect(self._show_menu)
+        message_list, form = self.list, self.form
+        message_list.filter_requested.connect(self.focus_filter)
+        message_list.selected.connect(lambda _id: self._show_selected())
+        message_list.send_requested.connect(lambda _id: self.send())
+        message_list.copy_requested.connect(self.copy)
+        message_list.delete_requested.connect(self.delete)
+        message_list.menu_requested.connect(self._show_menu)
         form.changed.connect(self._message_edited)
         form.send_requested.connect(self.send)
         form.repeat_requested.connect(self.repeat)

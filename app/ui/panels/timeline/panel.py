@@ -123,12 +123,12 @@ class TimelinePanel(PanelWidget):
         if state == self._state and self.pages.currentIndex() == 0:
             return
         self._state = state
-        title, hint, offers = state
+        title, hint, has_open_action = state
         self.empty.set_texts(str(title), str(hint), "film")
         action = EmptyAction(
             _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", is_primary=True
         )
-        self.empty.set_actions([action] if offers else [])
+        self.empty.set_actions([action] if has_open_action else [])
         self.pages.setCurrentIndex(0)
         self.set_title(_("Timeline"), "")
         self.chip.set("")

@@ -134,7 +134,7 @@ class Shortcuts(QObject):
     def __init__(
         self,
         settings: Settings,
-        complain: Callable[[str], object],
+        report_error: Callable[[str], object],
         commands: Sequence[Command[Any]],
         *,
         platform: str = sys.platform,
@@ -142,7 +142,7 @@ class Shortcuts(QObject):
         # `report_error` is called with a message if the shortcuts can't be saved; `platform` is a
         # `sys.platform`.
         super().__init__()
-        self._settings, self._complain, self._platform = settings, complain, platform
+        self._settings, self._complain, self._platform = settings, report_error, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
         self._custom_keys = self._read()
 

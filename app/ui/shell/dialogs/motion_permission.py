@@ -47,14 +47,18 @@ class MotionPermissionCard(QWidget):
     """
 
     def __init__(
-        self, theme: Theme, window: QWidget, moving: MotionPermission, complain: Callable[[str], object]
+        self,
+        theme: Theme,
+        window: QWidget,
+        permission: MotionPermission,
+        report_error: Callable[[str], object],
     ) -> None:
         # `report_error` is called with a message if "always" can't be saved.
         super().__init__(window)
-        self._theme, self._moving = theme, moving
-        self._last_revision = moving.revision
+        self._theme, self._moving = theme, permission
+        self._last_revision = permission.revision
         self._before: QWidget | None = None
-        self._complain = complain
+        self._complain = report_error
         self._always_for = ""
         self.title = label("", "heading", wrap=True)
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
@@ -63,8 +67,8 @@ class MotionPermissionCard(QWidget):
         self.not_now = Button(theme, _("Cancel"), size="form")
         for button in (self.let, self.not_now):
             button.allow_shrinking()
-        self.let.clicked.connect(lambda: self._answer(let=True))
-        self.not_now.clicked.connect(lambda: self._answer(let=False))
+        self.let.clicked.connect(lambda: self._answer(is_allowed=True))
+        self.not_now.clicked.connect(lambda: self._answer(is_allowed=False))
         self._lay_out(theme)
         shadow = QGraphicsDropShadowEffect(self)
         shadow.setBlurRadius(32)
@@ -131,9 +135,9 @@ class MotionPermissionCard(QWidget):
         if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _answer(self, *, let: bool) -> None:
+    def _answer(self, *, is_allowed: bool) -> None:
         try:
-            self._moving.answer(let=let, always=let and self.always.isChecked())
+            self._moving.answer(is_allowed=is_allowed, always=is_allowed and self.always.isChecked())
         except SettingsError as error:
             self._complain(error.sentence)
         self.refresh()
@@ -169,7 +173,7 @@ class MotionPermissionCard(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
-            self._answer(let=False)
+            self._answer(is_allowed=False)
         else:
             super().keyPressEvent(event)
 

@@ -124,14 +124,14 @@ class ShortcutSheet(Overlay):
 
     def _entries(self) -> list[tuple[str, Entry]]:
         groups: dict[str, list[Entry]] = {}
-        for row in self._shortcuts.commands.values():
-            if not row.in_shortcuts:
+        for command in self._shortcuts.commands.values():
+            if not command.in_shortcuts:
                 continue
-            keys = "\n".join(self._shortcuts.keys_of(row.id))
-            note = _("custom") if self._shortcuts.is_customised(row.id) else ""
-            group_name = row.menu or GROUP_LABELS.get(row.id.partition(".")[0], "View")
+            keys = "\n".join(self._shortcuts.keys_of(command.id))
+            note = _("custom") if self._shortcuts.is_customised(command.id) else ""
+            group_name = command.menu or GROUP_LABELS.get(command.id.partition(".")[0], "View")
             group = groups.setdefault(_(group_name), [])
-            group.append(Entry(f"command:{row.id}", row.label, "", note, keys))
+            group.append(Entry(f"command:{command.id}", command.label, "", note, keys))
         for number, fixed in enumerate(FIXED_KEYS):
             keys = "\n".join(fixed.key.split(", "))
             groups.setdefault(_(fixed.scope), []).append(
@@ -141,8 +141,8 @@ class ShortcutSheet(Overlay):
 
     def _on_selection_changed(self) -> None:
         entry = self.rows.entry
-        command = entry is not None and entry.kind == "command"
-        self.reset.setEnabled(command and entry is not None and self._shortcuts.is_customised(entry.name))
+        is_command = entry is not None and entry.kind == "command"
+        self.reset.setEnabled(is_command and entry is not None and self._shortcuts.is_customised(entry.name))
         self.reset_all.setEnabled(
             any(self._shortcuts.is_customised(name) for name in self._shortcuts.commands)
         )

@@ -401,9 +401,9 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
         return Dock(context.theme, description, description.make(context), density, number)
     except CAUGHT_ERRORS as error:
         traceback.clear_frames(error.__traceback__)
-        unmade = FailedPanel(context, description, error)
-    dock = Dock(context.theme, description, unmade, density, number)
-    unmade.take = dock.replace
+        failed_panel = FailedPanel(context, description, error)
+    dock = Dock(context.theme, description, failed_panel, density, number)
+    failed_panel.take = dock.replace
     return dock
 
 

@@ -32,9 +32,9 @@ class SavedLayouts:
     In its methods, ``base`` is the name of a workbench's built-in layout.
     """
 
-    def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:
+    def __init__(self, state: WindowState, report_error: Callable[[str], object]) -> None:
         # `report_error` is called with a message about damaged entries.
-        self._state, self._complain = state, complain
+        self._state, self._complain = state, report_error
         self._current: dict[str, str] = {}
 
     def all(self) -> tuple[CustomLayout, ...]:

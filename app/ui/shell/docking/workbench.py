@@ -215,9 +215,9 @@ class Workbench(QMainWindow):
         Args:
             name: Key of the dock, which is the name of the panel for the first one of a kind.
         """
-        brought = self._layout.companions.get(name, "")
-        if brought and name not in self.docks and brought not in self.docks:
-            self.open(brought)
+        companion = self._layout.companions.get(name, "")
+        if companion and name not in self.docks and companion not in self.docks:
+            self.open(companion)
         dock = self._dock(name)
         if dock is None:
             return None

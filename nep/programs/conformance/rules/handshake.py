@@ -60,7 +60,7 @@ def _hello_form(bench: Bench) -> None:
         int(bench.latest_record("subscriber", topic)["id"]),
         topic,
         one_part=level == 1,
-        tells=level == 2,
+        acknowledges_echoes=level == 2,
         batches=level == 3,
     )
     expect("hello", next(iter(publisher.hellos)), expected)

@@ -176,7 +176,7 @@ class SimulatedStudio:
     def allow(self) -> None:
         """Give the permission to move robots if Studio asks for it."""
         if self.session.fleet.permission.question is not None:
-            self.session.fleet.permission.answer(let=True)
+            self.session.fleet.permission.answer(is_allowed=True)
 
     def move(self, name: str, action: str) -> None:
         """Invoke an action as its form does, and give the permission if it is required."""
@@ -198,7 +198,7 @@ class SimulatedStudio:
         acting.send(message)
         while acting.question is not None or self.session.fleet.permission.question is not None:
             if acting.question is not None:
-                acting.answer(let=True)
+                acting.answer(is_allowed=True)
             self.allow()
 
     def send_from_alarm(self, name: str) -> None:
