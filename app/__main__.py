@@ -25,7 +25,7 @@ from nep.errors import NepError
 from nep.i18n import _, set_initial_language
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.descriptors import raise_open_file_limit
-from nep.system.streams import close_streams, command_line_arguments, prepare_streams, print_error
+from nep.system.streams import command_line_arguments, flush_streams, prepare_streams, print_error
 from nep.version import __version__
 
 CHILD_MODULES = (
@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_error(f"nep-studio: {message}")
         return 2
     finally:
-        close_streams()
+        flush_streams()
 
 
 def _main(arguments: Sequence[str]) -> int:
@@ -221,7 +221,7 @@ def self_test(folder: Path, *, web: bool) -> int:
     code = test.run(show)
     outcome = test.report.failure or _("the self-test passed")
     with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
-        (sys.stderr if code else sys.stdout).write(f"{outcome}: {test.place.folder}\n")
+        (sys.stderr if code else sys.stdout).write(f"{outcome}: {test.environment.folder}\n")
     return code
 
 
@@ -295,7 +295,7 @@ def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
         return code
     _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in running))
     logging.shutdown()
-    close_streams()
+    flush_streams()
     os._exit(code)
 
 

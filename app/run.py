@@ -23,7 +23,7 @@ from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
-from app.core.robots.motion.permission import actions_by_robot, risky_actions
+from app.core.robots.motion.permission import actions_by_robot, risky_action_titles
 from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.report import StopReport
 from app.core.robots.stop.stopper import RobotStopper
@@ -223,7 +223,7 @@ def _rejection_exit_code(
 def _would_move(program: Program, robots: Sequence[Robot], write_line: Callable[[str], None]) -> bool:
     real = [robot for robot in robots if not robot.virtual]
     used_actions = actions_by_robot(program, real)
-    moves = {robot.name: risky_actions(robot, actions) for robot, actions in used_actions}
+    moves = {robot.name: risky_action_titles(robot, actions) for robot, actions in used_actions}
     for name, titles in moves.items():
         if titles:
             write_line(
@@ -283,7 +283,10 @@ def _run(
         # Immediately, and again when the program has ended and can't move the robots any more.
         stopper.send_stop(ends=runner.program_key)
         runner.close()
-        names = [*(robot.name for robot in discovered.robots if robot.name in program.robots), *events.silent]
+        names = [
+            *(robot.name for robot in discovered.robots if robot.name in program.robots),
+            *events.unresponsive_robots,
+        ]
         report = stopper.stop_all(names, ends=runner.program_key)
         for line in stop_lines(report):
             write_line(line)
@@ -322,7 +325,7 @@ class _RunEvents:
         self._write_line = write_line
         self._last = ""
         self.ok = True
-        self.silent: tuple[str, ...] = ()
+        self.unresponsive_robots: tuple[str, ...] = ()
 
     def __call__(self, event: RunnerEvent) -> None:
         if event.kind == "running" and event.description != self._last:
@@ -332,7 +335,7 @@ class _RunEvents:
         elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
             self._write_line(event.text)
         if event.kind == "ended":
-            self.ok, self.silent = event.is_ok, event.unresponsive_robots
+            self.ok, self.unresponsive_robots = event.is_ok, event.unresponsive_robots
             if event.elapsed_s is not None:
                 self._write_line(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
 

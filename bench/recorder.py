@@ -211,7 +211,7 @@ def large_file(folder: Path, gigabytes: float) -> bool:
     with closing(FileReader(made)) as small, made.open("rb") as file:
         large = FileWriter(path)
         for number, each in small.info.channels.items():
-            large.table.add_numbered(number, each)
+            large.table.add_with_id(number, each)
         chunks = small.chunks()
         shift = 0
         while large.size_bytes < gigabytes * 1e9:

@@ -124,7 +124,7 @@ class Runs:
         scene = panel.canvas.scene
         assert scene is not None
         every = frozenset(group.key for group in scene.graph.groups)
-        panel._choices = replace(panel._choices, toggled=every)  # noqa: SLF001
+        panel._options = replace(panel._options, toggled=every)  # noqa: SLF001
         while len(late) < 2 or not placed(panel):
             late.append(self.meter.measure(0.25).late_max)
         print(

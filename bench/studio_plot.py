@@ -142,11 +142,11 @@ def main() -> int:
             sender.tell(f"{what} {seconds + SETTLE_S + 1}")
             sender.answer()
             run_for(SETTLE_S)
-            came = [len(shown.curve.samples) + shown.curve.samples.begun for shown in plot.shown]
+            came = [len(shown.curve.samples) + shown.curve.samples.evicted_count for shown in plot.shown]
             lost = plot.curves.lost
             drawings.took_ms.clear()
             row = meter.measure(seconds)
-            more = [len(each.curve.samples) + each.curve.samples.begun for each in plot.shown]
+            more = [len(each.curve.samples) + each.curve.samples.evicted_count for each in plot.shown]
             beyond.append(show(name, row, plain.process, drawings))
             rates = [(b - a) / row.seconds for a, b in zip(came, more, strict=True)]
             print(

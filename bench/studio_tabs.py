@@ -110,7 +110,7 @@ class Bench:
         document = self.window.session.documents.find_by_path(path)
         assert document is not None
         (tab,) = (
-            each for each in self.window.window.findChildren(BehaviourTab) if each.facts.key == document.key
+            each for each in self.window.window.findChildren(BehaviourTab) if each.state.key == document.key
         )
         self.ask("(window.benchTab = {}, 0)")
         began = time.time() * 1000

@@ -32,7 +32,7 @@ _PLUGINS = frozenset({
     "platformthemes", "printsupport", "styles", "texttospeech", "tls", "wayland-decoration-client",
     "wayland-graphics-integration-client", "wayland-shell-integration", "xcbglintegrations",
 })  # fmt: skip
-_FFMPEG_OF_QT = re.compile(r"(?:lib)?(?:av(?:codec|format|util)|sw(?:scale|resample))(?:-\d+\.dll|\.)")
+_QT_FFMPEG = re.compile(r"(?:lib)?(?:av(?:codec|format|util)|sw(?:scale|resample))(?:-\d+\.dll|\.)")
 """FFmpeg libraries for video; Studio plays only tones, which don't need them."""
 _NOT_PLUGINS = re.compile(r"(?:lib)?(?:qgtk3|qtvirtualkeyboardplugin|qtexttospeech_mock|ffmpegmediaplugin)\b")
 """Excluded plug-ins in included folders: the GTK theme (with all of GTK), virtual keyboard, mock voice."""
@@ -52,7 +52,7 @@ _UNUSED = re.compile(
 )
 
 
-_OF_THE_SYSTEM = re.compile(
+_SYSTEM_LIBRARIES = re.compile(
     r"""
     ^lib(?:stdc\+\+|gcc_s|
     X11|X11-xcb|Xau|Xdmcp|Xext|Xfixes|Xrender|drm|gbm|epoxy|fontconfig|freetype|harfbuzz|fribidi|thai|datrie|
@@ -69,7 +69,7 @@ Bundled copies wouldn't match the computer's graphics driver, fonts or printers.
 """
 
 
-_OF_THE_BUILD = frozenset({"direct_url.json", "RECORD"})
+_BUILD_METADATA = frozenset({"direct_url.json", "RECORD"})
 """Metadata files of a distribution that depend on the build machine: source folder and checksums."""
 
 
@@ -82,9 +82,9 @@ def is_wanted(name: str) -> bool:
     path = PurePosixPath(name.replace("\\", "/"))
     parts = path.parts
     # Test all parts: a macOS framework is a folder of this name, and a partial one can't be signed.
-    if any(_UNUSED.search(part) for part in parts) or _OF_THE_SYSTEM.match(str(path)):
+    if any(_UNUSED.search(part) for part in parts) or _SYSTEM_LIBRARIES.match(str(path)):
         return False
-    if _FFMPEG_OF_QT.match(path.name) and ("PySide6" in parts or len(parts) == 1):
+    if _QT_FFMPEG.match(path.name) and ("PySide6" in parts or len(parts) == 1):
         return False
     if parts[:1] == ("pyqtgraph",):
         return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(parts[1:3])  # colour maps have licences of their own
@@ -95,13 +95,13 @@ def is_wanted(name: str) -> bool:
     if path.name.startswith("opencv_videoio_ffmpeg"):  # Windows; for other systems see film_libraries.py
         return False
     if "PySide6" in parts:
-        return _is_wanted_of_qt(path)
-    if path.parent.suffix == ".dist-info" and path.name in _OF_THE_BUILD:
+        return _is_wanted_qt_file(path)
+    if path.parent.suffix == ".dist-info" and path.name in _BUILD_METADATA:
         return False
     return path.suffix not in {".pyi", ".h", ".pxd", ".a", ".lib"}
 
 
-def _is_wanted_of_qt(path: PurePosixPath) -> bool:
+def _is_wanted_qt_file(path: PurePosixPath) -> bool:
     parts = path.parts
     if "qml" in parts or path.name.startswith(
         ("qtwebengine_devtools_resources", "v8_context_snapshot.debug")

@@ -34,7 +34,7 @@ def _machine() -> str:
     return {"amd64": "x86_64", "aarch64": "arm64"}.get(machine, machine)
 
 
-def last_commit_s(root: Path = ROOT) -> int:
+def source_date_s(root: Path = ROOT) -> int:
     """Return the timestamp for all files of a package, in seconds since 1970.
 
     The timestamp is $SOURCE_DATE_EPOCH if set, else the time of the last commit, else of
@@ -69,7 +69,7 @@ class Context:
     root: Path = ROOT
     version: str = __version__
     machine: str = field(default_factory=_machine)
-    epoch: int = field(default_factory=last_commit_s)
+    epoch: int = field(default_factory=source_date_s)
 
     @property
     def dist(self) -> Path:

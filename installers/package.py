@@ -60,7 +60,7 @@ def write_sums(folder: Path) -> Path:
     return sums
 
 
-def told(paths: Iterable[Path]) -> str:
+def format_sizes(paths: Iterable[Path]) -> str:
     """Return the names and sizes of files, one per line."""
     return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.1f} MB" for path in paths)
 
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     sums = write_sums(dist)
     print(
-        f"· in {dist.name}/, after {time.monotonic() - start_s:.0f} s:\n{told([*paths, sums])}",
+        f"· in {dist.name}/, after {time.monotonic() - start_s:.0f} s:\n{format_sizes([*paths, sums])}",
         flush=True,
     )
     return 0

@@ -27,7 +27,7 @@ def _load_attribute(name: str) -> object:
     # has reached its open-file limit or changed its working directory.
     if name == "__version__":
         globals()[name] = importlib.import_module("nep.version").__version__
-    elif name == "__all__" or not (name.startswith("_") or _is_submodule(name)):
+    elif name == "__all__" or not (name.startswith("_") or _import_submodule(name)):
         public = vars(importlib.import_module("nep.public"))
         names = {each: public[each] for each in public if not each.startswith("_")}
         globals().update(names, __all__=[*sorted(names), "__version__"])
@@ -41,7 +41,7 @@ def _load_attribute(name: str) -> object:
     return globals()[name]
 
 
-def _is_submodule(name: str) -> bool:
+def _import_submodule(name: str) -> bool:
     # `import nep` gives access to submodules such as `nep.errors`; importing them here keeps that.
     full_name = f"nep.{name}"
     try:

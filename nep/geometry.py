@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Header", "Point", "Pose", "PoseStamped", "Quaternion", "Time", "Transform", "Twist", "Vector3"]
 
-_NS = 1_000_000_000
+_NS_PER_S = 1_000_000_000
 
 
 @dataclass
@@ -37,11 +37,11 @@ class Time:
     @classmethod
     def from_ns(cls, stamp_ns: int) -> Self:
         """Create a time stamp from nanoseconds since 1970, such as `Message.stamp_ns`."""
-        return cls(*divmod(stamp_ns, _NS))
+        return cls(*divmod(stamp_ns, _NS_PER_S))
 
     def to_ns(self) -> int:
         """Return the time stamp in nanoseconds since 1970."""
-        return self.sec * _NS + self.nanosec
+        return self.sec * _NS_PER_S + self.nanosec
 
 
 @dataclass

@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 
-def _matrix() -> list[float]:
+def _unknown_covariance() -> list[float]:
     # 3 x 3 covariance, all zero: unknown
     return [0.0] * 9
 
@@ -55,11 +55,11 @@ class Imu:
 
     header: Header = field(default_factory=Header)
     orientation: Quaternion = field(default_factory=Quaternion)
-    orientation_covariance: list[float] = field(default_factory=_matrix)
+    orientation_covariance: list[float] = field(default_factory=_unknown_covariance)
     angular_velocity: Vector3 = field(default_factory=Vector3)
-    angular_velocity_covariance: list[float] = field(default_factory=_matrix)
+    angular_velocity_covariance: list[float] = field(default_factory=_unknown_covariance)
     linear_acceleration: Vector3 = field(default_factory=Vector3)
-    linear_acceleration_covariance: list[float] = field(default_factory=_matrix)
+    linear_acceleration_covariance: list[float] = field(default_factory=_unknown_covariance)
 
 
 @dataclass
@@ -164,7 +164,7 @@ class NavSatFix:
     latitude: float = 0.0
     longitude: float = 0.0
     altitude: float = 0.0
-    position_covariance: list[float] = field(default_factory=_matrix)
+    position_covariance: list[float] = field(default_factory=_unknown_covariance)
     position_covariance_type: int = COVARIANCE_TYPE_UNKNOWN
 
 

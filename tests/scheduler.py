@@ -42,7 +42,7 @@ LONG_S = {
 def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
     """Return True if a worker may run the tests of a file or group.
 
-    With two workers more than processors (`tools.check.side_by_side`), the last one only gets tests of
+    With two workers more than processors (`tools.check.parallel_options`), the last one only gets tests of
     `MOSTLY_WAITING`: it uses the time in which other workers wait, without more windows open at once.
     """
     is_last = workers > processors + 1 and worker == f"gw{workers - 1}"

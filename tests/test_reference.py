@@ -102,7 +102,7 @@ Second, with 0.5.4 in it.
 
 
 def test_docstring_is_split_into_paragraphs_arguments_and_errors() -> None:
-    words = reference.words_of(DOCSTRING, ["count", "size"])
+    words = reference.parse_docstring(DOCSTRING, ["count", "size"])
     assert words.names == {"count": "how many there are.", "size": "`size` is in metres."}
     assert words.raises == ("`NepError` when it fails, and `ValueError`.",)
     assert words.paragraphs == (
@@ -114,12 +114,12 @@ def test_docstring_is_split_into_paragraphs_arguments_and_errors() -> None:
 
 
 def test_two_column_list_is_parsed() -> None:
-    words = reference.words_of("A thing.\n\n`a`   one\n`long`  two\n       and three\n`b` four", [])
+    words = reference.parse_docstring("A thing.\n\n`a`   one\n`long`  two\n       and three\n`b` four", [])
     assert words.names == {"a": "one", "long": "two and three", "b": "four"}
     assert words.paragraphs == ("A thing.",)
 
 
 def test_first_sentence_is_not_parsed_as_an_argument() -> None:
-    words = reference.words_of("`name` is no name. `name`: the name.", ["name"])
+    words = reference.parse_docstring("`name` is no name. `name`: the name.", ["name"])
     assert words.paragraphs == ("`name` is no name.",)
     assert words.names == {"name": "the name."}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nep.version import __version__
-from tools.release_notes import CHANGELOG, RefusedError, checked_version, main, section, with_links
+from tools.release_notes import CHANGELOG, InvalidReleaseError, checked_version, main, section, with_links
 
 TEXT = """# Changelog
 
@@ -41,19 +41,19 @@ def test_section_ends_at_the_next_heading() -> None:
 
 @pytest.mark.parametrize("version", ["1.1", "10.0", "1.10.0rc1", "2026-12-01", "1.10"])
 def test_similar_version_is_not_matched(version: str) -> None:
-    with pytest.raises(RefusedError, match="no section '## "):
+    with pytest.raises(InvalidReleaseError, match="no section '## "):
         section(TEXT, version)
 
 
 def test_empty_section_is_rejected() -> None:
-    with pytest.raises(RefusedError, match=r"says nothing of 1\.0\.0"):
+    with pytest.raises(InvalidReleaseError, match=r"says nothing of 1\.0\.0"):
         section(TEXT, "1.0.0")
 
 
 def test_tag_must_match_the_version_of_the_sources() -> None:
     assert checked_version("v1.2.3", "1.2.3") == checked_version("1.2.3", "1.2.3") == "1.2.3"
     for tag in ("v1.2.4", "v1.2", "vv1.2.3", "release-1.2.3", ""):
-        with pytest.raises(RefusedError, match=r"is not the version of nep/version\.py"):
+        with pytest.raises(InvalidReleaseError, match=r"is not the version of nep/version\.py"):
             checked_version(tag, "1.2.3")
 
 

@@ -13,7 +13,7 @@ import pytest
 import dev
 from installers.macos import information
 from tools.computer import ROOT, Computer, Trouble, venv_python
-from tools.versions import OLDEST_MACOS, PROMISED, environment, found, versions
+from tools.versions import OLDEST_MACOS, PROMISED, environment, find_interpreters, versions
 
 HERE = "{}.{}".format(*sys.version_info[:2])
 OTHERS = [each for each in PROMISED if each != HERE]
@@ -62,7 +62,7 @@ def test_pythons_are_found_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Pa
         }
     )
     system = Pythons(answers, {f"python{first}": "/bin/first", "py": "/py"})
-    assert found(system.computer(), tmp_path) == {
+    assert find_interpreters(system.computer(), tmp_path) == {
         HERE: sys.executable,
         first: "/bin/first",
         second: "C:/Program Files/python.exe",
@@ -73,14 +73,14 @@ def test_pythons_are_found_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Pa
 @pytest.mark.parametrize("said", ["", "3.9 cpython /bin/x\n", "pyenv: python3.12: command not found", "\0"])
 def test_interpreter_that_does_not_report_the_expected_version_is_ignored(said: str, tmp_path: Path) -> None:
     system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in PROMISED})
-    assert found(system.computer(), tmp_path) == {}
+    assert find_interpreters(system.computer(), tmp_path) == {}
     with pytest.raises(Trouble, match="none of these Pythons is here; install one"):
         versions(system.computer(), [], tmp_path / "made", tmp_path)
 
 
 def test_python_implementations_except_cpython_are_ignored(tmp_path: Path) -> None:
     system = Pythons({sys.executable: f"{HERE} pypy {sys.executable}\n"})
-    assert found(system.computer(), tmp_path) == {}
+    assert find_interpreters(system.computer(), tmp_path) == {}
 
 
 def test_each_python_gets_two_environments_created_once_with_hashes(

@@ -320,7 +320,7 @@ def test_remote_access_alerts_are_translated() -> None:
     alerts = Alerts()
     settings = SimpleNamespace(get=lambda _key, default: default, set=lambda _key, _value: None)
     reach = RemoteAccess("127.0.0.1:7780", settings, alerts, lambda _event: None)
-    reach.changed(RemoteAccessChanged(("127.0.0.1",), "Xx"))
+    reach.on_changed(RemoteAccessChanged(("127.0.0.1",), "Xx"))
     for alert in alerts.active:
         said(alert.title, alert.detail, alert.button or "")
 

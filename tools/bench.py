@@ -35,7 +35,17 @@ NAMES = (
     "blocks_editor",
     "studio_tabs",
 )
-ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
+SPECIAL_NAMES = (
+    "nep_clients",
+    "nep_tail",
+    "nep_ros",
+    "paper",
+    "soak",
+    "ways",
+    "film",
+    "package_start",
+    "recorder",
+)
 """Benchmarks that run only if they are named on the command line.
 
 They are slow, need ROS 1, Node.js or a package of Studio, or don't measure times.
@@ -48,7 +58,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", choices=[*NAMES, *ASKED, []], help="all when none is given")
+    parser.add_argument(
+        "names", nargs="*", choices=[*NAMES, *SPECIAL_NAMES, []], help="all when none is given"
+    )
     names = parser.parse_args(own_arguments.split() if dashes else None).names or NAMES
     codes = []
     for name in names:

@@ -19,7 +19,7 @@ from app.blocks.toolbox.help import EXAMPLES  # noqa: E402
 PAGE = ROOT / "docs" / "blocks.md"
 BEGIN, END = "<!-- blocks: made by tools/blocks_page.py -->", "<!-- end of blocks -->"
 _HEAD = "| block | what it does | Python |\n|---|---|---|"
-_HOLE = re.compile(r"%([A-Z_]+)")
+_PLACEHOLDER = re.compile(r"%([A-Z_]+)")
 
 
 def tables() -> str:
@@ -40,15 +40,15 @@ def page(text: str) -> str:
 
 
 def _row(block: Block) -> str:
-    label = " ".join(_HOLE.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
+    label = " ".join(_PLACEHOLDER.sub(lambda hole: f"({hole[1].lower()})", block.text).split())
     description = " ".join(part for part in (block.tooltip, block.help, EXAMPLES[block.type]) if part)
-    return f"| {label} | {description} | {_python(block)} |"
+    return f"| {label} | {description} | {_python_code(block)} |"
 
 
-def _python(block: Block) -> str:
+def _python_code(block: Block) -> str:
     if block.mutator in ("function", "call"):
         return "`def name(inputs): …`" if block.mutator == "function" else "`name(inputs)`"
-    templates = (_HOLE.sub(lambda hole: hole[1].lower(), each) for each in block.templates)
+    templates = (_PLACEHOLDER.sub(lambda hole: hole[1].lower(), each) for each in block.templates)
     lines = (
         re.sub(r"\s*\n\s*", " ", each).replace(" body", " …").replace(" else: else", " else: …")
         for each in templates

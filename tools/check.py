@@ -70,7 +70,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("mypy", (python, "-m", "mypy")),
         Check("lint-imports", (lint_imports, "--no-logo", "--cache-dir", "build/import-linter")),
         Check("tests read", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), in_background=True),
-        Check("pytest", (python, "-m", "pytest", *side_by_side(), *pytest_arguments)),
+        Check("pytest", (python, "-m", "pytest", *parallel_options(), *pytest_arguments)),
     )
     if fast:
         return all_checks[:-2]
@@ -79,7 +79,7 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
     )  # a few tests are collected quickly anyway
 
 
-def side_by_side() -> tuple[str, ...]:
+def parallel_options() -> tuple[str, ...]:
     """Return the options for parallel tests with pytest-xdist: two workers more than cores, at most six.
 
     Many tests wait for processes and windows: on two cores, one extra worker leaves a fifth of the time

@@ -24,8 +24,8 @@ from tools.versions import environment
 
 FOLDER = ROOT / "build" / "fuzz"
 HARNESS = "tests/fuzz/harness.py"
-MINUTES = 15.0
-MIN_S = 1
+DEFAULT_MINUTES = 15.0
+MIN_TARGET_S = 1
 """Minimum time for a target in seconds."""
 
 
@@ -34,11 +34,11 @@ def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
 
     Args:
         weights: Weight of each target; targets with a weight above 1 get twice the time of the others.
-        minutes: Total time. Each target gets at least `MIN_S` seconds.
+        minutes: Total time. Each target gets at least `MIN_TARGET_S` seconds.
     """
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
     unit_s = minutes * 60 / max(1, sum(shares.values()))
-    return {name: max(MIN_S, round(unit_s * share)) for name, share in shares.items()}
+    return {name: max(MIN_TARGET_S, round(unit_s * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:
@@ -65,7 +65,7 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
         prog="dev.py fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", metavar="TARGET", help="all when none is given")
-    parser.add_argument("--minutes", type=float, default=MINUTES, help="for all targets together")
+    parser.add_argument("--minutes", type=float, default=DEFAULT_MINUTES, help="for all targets together")
     parser.add_argument("--list", action="store_true", help="name the targets")
     parser.add_argument("--again", type=Path, metavar="FILE", help="give these bytes to their target")
     options = parser.parse_args([each for each in arguments if each != "--"])
@@ -89,7 +89,7 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
     findings_folder.mkdir(parents=True)
     plan = [f"{name}={seconds}" for name, seconds in seconds_each(selected, options.minutes).items()]
     code = computer.do([*command, str(folder), *plan], computer.environ, None)
-    return max(code, _told(folder / "findings"))
+    return max(code, _report_findings(folder / "findings"))
 
 
 def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
@@ -101,7 +101,7 @@ def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
     return weights
 
 
-def _told(folder: Path) -> int:
+def _report_findings(folder: Path) -> int:
     # Prints the findings; returns 1 if there are any.
     findings = findings_in(folder)
     for path in findings:

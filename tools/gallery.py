@@ -108,7 +108,7 @@ def _fields(theme: Theme) -> list[QWidget]:
     ]
 
 
-def _rest(theme: Theme) -> list[QWidget]:
+def _status_widgets(theme: Theme) -> list[QWidget]:
     spark = Sparkline(theme)
     spark.set_values(WAVE)
     bar = ValueBar(theme, 0.6)
@@ -140,12 +140,12 @@ def page(theme: Theme) -> QWidget:
     column = QVBoxLayout(container)
     column.setSpacing(12)
     column.addWidget(label("What would you like to do?", "display"))
-    for widget in (*_buttons(theme), *_fields(theme), *_rest(theme)):
+    for widget in (*_buttons(theme), *_fields(theme), *_status_widgets(theme)):
         column.addWidget(widget)
     return container
 
 
-def pictures(percent: int) -> QPixmap:
+def render_themes(percent: int) -> QPixmap:
     """Render the page in both themes side by side, with the text size in percent."""
     shots = []
     for mode in ("light", "dark"):
@@ -177,7 +177,7 @@ def main() -> int:
     application = QApplication(sys.argv[:1])
     fonts.load()
     if options.picture is not None:
-        return 0 if pictures(options.text).save(str(options.picture)) else 1
+        return 0 if render_themes(options.text).save(str(options.picture)) else 1
     theme = Theme("system")
     theme.apply()
     gallery = page(theme)

@@ -36,17 +36,17 @@ from tools.small_png import shrink
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "resources" / "guide"
 COLOURS = 128  # sufficient for flat surfaces, and a sixth smaller than with 256
-WAY = 10  # steps of a mouse movement
+DRAG_STEPS = 10  # steps of a mouse movement
 THEMES = ("light", "dark")
-WIDE = 640
+CROP_WIDTH_PX = 640
 """Maximum width of an image in the guide in px; images of the whole window are scaled down."""
 WINDOW, WHOLE = QSize(1280, 800), QSize(1200, 740)
 ARROW = ((0, 0), (0, 17), (4, 13.3), (6.8, 19.5), (9.6, 18.2), (6.9, 12.2), (12.3, 12))
-TAB = "document.querySelector('.nepTab:not([hidden])')"
+VISIBLE_TAB_JS = "document.querySelector('.nepTab:not([hidden])')"
 TALK, SWING = "talk", "swing"  # blocks highlighted in the images
 
 
-def variable(kind: str, *, id: str = "", **kwargs: object) -> Block:
+def variable_block(kind: str, *, id: str = "", **kwargs: object) -> Block:
     """Create a block that uses the variable "points"."""
     result = block(kind, id=id, **kwargs)
     result["fields"] = {"VAR": {"id": "points"}}
@@ -58,7 +58,7 @@ def placed(x: int, y: int, script: Block) -> Block:
     return {**script, "x": x, "y": y}
 
 
-def hello() -> list[Block]:
+def greeting_scripts() -> list[Block]:
     """Return the scripts of the guide's first behaviour."""
     swing = chain(
         pepper("do_turn", id=SWING, DIRECTION="left", ANGLE=number(30)),
@@ -72,28 +72,28 @@ def hello() -> list[Block]:
     return [placed(28, 28, first)]
 
 
-def beginning() -> list[Block]:
+def single_script() -> list[Block]:
     """Return one script: a start block with one block below it."""
     say_block = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
     return [placed(28, 28, chain(block("events_started"), say_block))]
 
 
-def counting() -> list[Block]:
+def counting_scripts() -> list[Block]:
     """Return scripts that count touches with a variable."""
     start = chain(
         block("events_started"),
-        variable("variables_set", VALUE=number(3)),
+        variable_block("variables_set", VALUE=number(3)),
         pepper("do_say", TEXT=text("Touch my head or my hands.")),
     )
     touched = chain(
         pepper("when_touched", PLACE="head"),
-        variable("variables_change", BY=number(1)),
+        variable_block("variables_change", BY=number(1)),
         pepper("do_say", TEXT=text("Thank you.")),
     )
     return [placed(28, 28, start), placed(28, 210, touched)]
 
 
-def wrong() -> list[Block]:
+def faulty_scripts() -> list[Block]:
     """Return scripts with errors: a block without a start, and two scripts that both move the robot."""
     first = chain(block("events_started"), pepper("do_turn", DIRECTION="left", ANGLE=number(90)))
     second = chain(block("events_started"), pepper("do_walk", DISTANCE=number(0.3)))
@@ -102,10 +102,10 @@ def wrong() -> list[Block]:
 
 
 SCRIPTS = {
-    "Greeting": hello,
-    "A dance": beginning,
-    "Reaction to touch": counting,
-    "A careful walk": wrong,
+    "Greeting": greeting_scripts,
+    "A dance": single_script,
+    "Reaction to touch": counting_scripts,
+    "A careful walk": faulty_scripts,
 }
 """Functions that create the scripts of a behaviour, by the name of the behaviour.
 
@@ -124,7 +124,7 @@ def write_behaviour(folder: Path, name: str) -> Path:
         "name": name,
         "workspace": {
             "blocks": {"languageVersion": 0, "blocks": SCRIPTS[name]()},
-            "variables": [{"name": "points", "id": "points"}] if SCRIPTS[name] is counting else [],
+            "variables": [{"name": "points", "id": "points"}] if SCRIPTS[name] is counting_scripts else [],
         },
         "robots": json.loads(EXAMPLE.read_text("utf-8"))["robots"],
     }
@@ -139,8 +139,8 @@ class GuidePictures(SelfDrive):
     def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
         self._home, self._theme = home, theme
         self._crops: dict[str, Callable[[], QRect]] = {
-            "toolbox": lambda: QRect(self._panel_rect("behaviour").topLeft(), QSize(WIDE, 400)),
-            "running": lambda: QRect(0, window.run_bar.geometry().top(), WIDE, 400),
+            "toolbox": lambda: QRect(self._panel_rect("behaviour").topLeft(), QSize(CROP_WIDTH_PX, 400)),
+            "running": lambda: QRect(0, window.run_bar.geometry().top(), CROP_WIDTH_PX, 400),
             "variables": lambda: self._panel_rect("behaviour") | self._panel_rect("variables"),
             "problems": lambda: self._panel_rect("behaviour") | self._panel_rect("problems"),
             "backpack": lambda: self._panel_rect("behaviour"),
@@ -155,20 +155,20 @@ class GuidePictures(SelfDrive):
         run, window = self._commands.run, self._window
         runs = window.session.runs
 
-        def glows(id: str) -> Callable[[], bool]:
+        def is_block_running(id: str) -> Callable[[], bool]:
             return lambda: runs.view().state == "running" and id in runs.running_blocks
 
         return [
             Step("the theme", lambda: run(f"theme.{self._theme}"), window.isVisible),
             Step("the start page", lambda: window.resize(WHOLE), window.isVisible, picture="start"),
-            Step("the virtual robot", lambda: run("robots.virtual"), self._robot_there, 40, settle_s=2.0),
+            Step("the virtual robot", lambda: run("robots.virtual"), self._is_robot_ready, 40, settle_s=2.0),
             *self._open("Greeting"),
-            Step("the window", lambda: None, self._page_is_there, picture="window", settle_s=2.0),
+            Step("the window", lambda: None, self._is_page_ready, picture="window", settle_s=2.0),
             Step("a usual size", lambda: window.resize(WINDOW), lambda: True, settle_s=1.0),
-            Step("it runs", lambda: run("run.run"), glows(SWING), 30, "running", 0.5),
+            Step("it runs", lambda: run("run.run"), is_block_running(SWING), 30, "running", 0.5),
             *self._stop(),
             *self._open("A dance"),
-            *self._drag_out(),
+            *self._drag_from_toolbox(),
             Step("a whole window", lambda: window.resize(WHOLE), lambda: True, settle_s=1.0),
             *self._open("Reaction to touch"),
             Step("its values", lambda: run("panel:variables"), lambda: True),
@@ -179,39 +179,39 @@ class GuidePictures(SelfDrive):
             Step(
                 "what is wrong",
                 lambda: run("panel:problems"),
-                self._page_is_there,
+                self._is_page_ready,
                 picture="problems",
                 settle_s=2.5,
             ),
-            *self._pack(),
-            Step("a second robot", lambda: run("robots.turtle"), self._two_robots, 40, "room", 3.0),
+            *self._add_to_backpack(),
+            Step("a second robot", lambda: run("robots.turtle"), self._are_two_robots_ready, 40, "room", 3.0),
             Step("the topics", lambda: run("layout.developer"), lambda: len(window.session.topics) > 3, 20),
             Step("the list", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
         ]
 
     def _open(self, name: str) -> list[Step]:
         path = write_behaviour(self._home, name)
-        files, page = self._commands.files, self._page_is_there
+        files, page = self._commands.files, self._is_page_ready
         return [Step(f"the behaviour {name}", lambda: files.open_example(path), page, 30, settle_s=1.5)]
 
     def _stop(self) -> list[Step]:
         run, runs = self._commands.run, self._window.session.runs
         stopped = Step("stopped", lambda: run("run.stop"), lambda: runs.view().state == "proven")
         world = self._window.session.fleet.change_world
-        return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._robot_there)]
+        return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._is_robot_ready)]
 
-    def _drag_out(self) -> list[Step]:
+    def _drag_from_toolbox(self) -> list[Step]:
         # Drags a block from the toolbox to the end of the script.
-        labels = f"[...{TAB}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
+        labels = f"[...{VISIBLE_TAB_JS}.querySelectorAll('.blocklyToolboxCategoryLabel')]"
         movement = f"{labels}.find(e => e.textContent === {json.dumps(translate('category', 'Movement'))})"
-        turn_block = f"{TAB}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
-        last = f"{TAB}.querySelector('[data-id={TALK}] > .blocklyPath')"
+        turn_block = f"{VISIBLE_TAB_JS}.querySelector('.blocklyFlyout .robot_pepper_do_turn')"
+        last = f"{VISIBLE_TAB_JS}.querySelector('[data-id={TALK}] > .blocklyPath')"
 
-        def open_it() -> None:
+        def open_category() -> None:
             position = self._element_rect(movement).center()
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
-        def carry() -> None:
+        def start_drag() -> None:
             start, end = (
                 self._element_rect(turn_block).topLeft() + QPoint(12, 18),
                 self._element_rect(last).bottomLeft(),
@@ -219,7 +219,8 @@ class GuidePictures(SelfDrive):
             QTest.mouseMove(self._target, start)
             QTest.mousePress(self._target, Qt.MouseButton.LeftButton, pos=start)
             self._mouse_path = [
-                start + (end + QPoint(36, 34) - start) * part / WAY for part in range(1, WAY + 1)
+                start + (end + QPoint(36, 34) - start) * part / DRAG_STEPS
+                for part in range(1, DRAG_STEPS + 1)
             ]
 
         def move() -> bool:
@@ -233,21 +234,24 @@ class GuidePictures(SelfDrive):
         return [
             Step("its categories", lambda: None, lambda: self._has_element(movement), 20),
             Step(
-                "a category", open_it, lambda: self._has_element(turn_block) and self._has_element(last), 20
+                "a category",
+                open_category,
+                lambda: self._has_element(turn_block) and self._has_element(last),
+                20,
             ),
-            Step("a block in the hand", carry, move, 10, "toolbox", 1.0),
-            Step("it is let go", self._let_go, lambda: True, settle_s=1.0),
+            Step("a block in the hand", start_drag, move, 10, "toolbox", 1.0),
+            Step("it is let go", self._release_mouse, lambda: True, settle_s=1.0),
         ]
 
-    def _let_go(self) -> None:
+    def _release_mouse(self) -> None:
         QTest.mouseRelease(self._target, Qt.MouseButton.LeftButton, pos=QPoint(600, 300))
         self._mouse = None
 
-    def _pack(self) -> list[Step]:
+    def _add_to_backpack(self) -> list[Step]:
         # Adds a stack to the backpack and opens it.
         button = "[...document.querySelectorAll('.nepBackpack')].find(e => e.offsetParent)"
-        sheet = f"{TAB}.querySelector('.blocklyFlyout.nepPacked .blocklyBlock')"
-        first = f"{TAB}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
+        sheet = f"{VISIBLE_TAB_JS}.querySelector('.blocklyFlyout.nepPacked .blocklyBlock')"
+        first = f"{VISIBLE_TAB_JS}.querySelector('.blocklyBlockCanvas .robot_pepper_do_turn > .blocklyPath')"
 
         def choose() -> None:
             position = self._element_rect(first).topLeft() + QPoint(10, 12)
@@ -257,7 +261,7 @@ class GuidePictures(SelfDrive):
             keys = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
             QTest.keyClick(self._target, Qt.Key.Key_P, keys)
 
-        def look_into() -> None:
+        def open_backpack() -> None:
             position = self._element_rect(button).center()
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
@@ -267,13 +271,13 @@ class GuidePictures(SelfDrive):
             ),
             Step("one is chosen", choose, lambda: True),
             Step("it is packed", pack, lambda: True),
-            Step("the backpack", look_into, lambda: self._has_element(sheet), 10, "backpack", 8.0),
+            Step("the backpack", open_backpack, lambda: self._has_element(sheet), 10, "backpack", 8.0),
         ]
 
-    def _robot_there(self) -> bool:
+    def _is_robot_ready(self) -> bool:
         return any(link.state in {"ready", "busy"} for link in self._window.session.fleet.links)
 
-    def _two_robots(self) -> bool:
+    def _are_two_robots_ready(self) -> bool:
         return sum(link.state in {"ready", "busy"} for link in self._window.session.fleet.links) > 1
 
     @property
@@ -292,7 +296,7 @@ class GuidePictures(SelfDrive):
             raise TypeError("the page of the blocks is not there yet")
         return target
 
-    def _page_is_there(self) -> bool:
+    def _is_page_ready(self) -> bool:
         return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
 
     def _has_element(self, element: str) -> bool:
@@ -313,11 +317,11 @@ class GuidePictures(SelfDrive):
             f" return r ? JSON.stringify([r.left, r.top, r.width, r.height]) : ''; }})({element})"
         )
 
-        def take(result: object) -> None:
+        def store_rect(result: object) -> None:
             self._element_rects[element] = json.loads(result) if isinstance(result, str) and result else None
 
-        if self._page_is_there() and self._editor.web is not None:
-            self._editor.web.page.runJavaScript(script, take)
+        if self._is_page_ready() and self._editor.web is not None:
+            self._editor.web.page.runJavaScript(script, store_rect)
 
     def _panel_rect(self, panel: str) -> QRect:
         bench = self._window.bench
@@ -333,7 +337,7 @@ class GuidePictures(SelfDrive):
         picture = self._window.grab(crop()) if crop is not None else self._window.grab()
         if self._mouse is not None and crop is not None:
             paint_mouse(picture, self._mouse - crop().topLeft())
-        max_width = round(WIDE * IMAGE_PIXEL_RATIO)
+        max_width = round(CROP_WIDTH_PX * IMAGE_PIXEL_RATIO)
         if picture.width() > max_width:
             picture = picture.scaledToWidth(max_width, Qt.TransformationMode.SmoothTransformation)
         path = self._folder / f"{name}.png"
@@ -361,14 +365,14 @@ def take_screenshots(folder: Path, theme: str) -> int:
         application = make_application()
         application.setQuitOnLastWindowClosed(False)
         window = make_window(Session(), Options(theme=theme, self_drive=folder))
-        window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+        window.on_closed = lambda: QTimer.singleShot(0, application.quit)
         window.show()
         window.start_session()
         pictures = GuidePictures(window, folder, Path(home), theme)
         application.exec()
     for picture in pictures.pictures:
         shrink(picture, COLOURS)
-    return 0 if pictures.well else 1
+    return 0 if pictures.has_succeeded else 1
 
 
 def take_all(folder: Path) -> int:

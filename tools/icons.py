@@ -13,16 +13,16 @@ import sys
 from pathlib import Path
 
 TARGET = Path(__file__).resolve().parents[1] / "resources" / "icons"
-HEAD = re.compile(r"\s*(?:<!--.*?-->\s*)?<svg\b[^>]*>(.*)</svg>\s*", re.DOTALL)
+SVG_PATTERN = re.compile(r"\s*(?:<!--.*?-->\s*)?<svg\b[^>]*>(.*)</svg>\s*", re.DOTALL)
 
 
-def inside(svg: str) -> str:
+def svg_content(svg: str) -> str:
     """Return the content of the <svg> element as one line.
 
     Raises:
         ValueError: The text isn't a Lucide icon.
     """
-    match = HEAD.fullmatch(svg)
+    match = SVG_PATTERN.fullmatch(svg)
     if match is None:
         raise ValueError("no svg element")
     return re.sub(r"\s*/>", "/>", re.sub(r">\s+<", "><", match.group(1).strip()))
@@ -31,7 +31,7 @@ def inside(svg: str) -> str:
 def main(package: Path) -> int:
     """Write lucide.txt and the licence; return the exit code."""
     lines = [
-        f"{path.stem}\t{inside(path.read_text('utf-8'))}\n"
+        f"{path.stem}\t{svg_content(path.read_text('utf-8'))}\n"
         for path in sorted((package / "icons").glob("*.svg"))
     ]
     (TARGET / "lucide.txt").write_text("".join(lines), "utf-8")

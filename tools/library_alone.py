@@ -32,7 +32,7 @@ EXTRAS = {"nanomsg": "nanomsg", "zenoh": "zenoh", "ros2": "ros2"}
 """Extra that the error for an unavailable back end must mention, by name of the back end."""
 
 
-def installed() -> list[str]:
+def check_installation() -> list[str]:
     """Check that nep is imported from the installation and no extra is installed; return the failures."""
     faults = [f"{name} is installed" for name in ABSENT if importlib.util.find_spec(name)]
     if not Path(nep.__file__).is_relative_to(sys.prefix):
@@ -40,7 +40,7 @@ def installed() -> list[str]:
     return faults
 
 
-def modules() -> list[str]:
+def check_imports() -> list[str]:
     """Check that all modules of nep, including back ends, can be imported; return the failures."""
     faults = []
     for module_info in pkgutil.walk_packages(nep.__path__, "nep."):
@@ -53,7 +53,7 @@ def modules() -> list[str]:
     return faults
 
 
-def messages(master: str | None) -> list[str]:
+def check_messages(master: str | None) -> list[str]:
     """Check messages of all plain types; return the failures.
 
     Args:
@@ -74,19 +74,19 @@ def messages(master: str | None) -> list[str]:
     return faults
 
 
-def _added_up(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a client sends
+def _sum(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a client sends
     return {"sum": sum(request["of"])}
 
 
-def services(master: str) -> list[str]:
+def check_services(master: str) -> list[str]:
     """Check a service whose server runs in a separate thread; return the failures."""
     with nep.node("server", master=master) as server, nep.node("caller", master=master) as two:
-        server.new_server("sum", _added_up, threads=1)
+        server.new_server("sum", _sum, threads=1)
         reply = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
     return [] if reply == {"sum": 6} else [f"the service answered {reply!r}"]
 
 
-def sentences(master: str) -> list[str]:
+def check_missing_extras(master: str) -> list[str]:
     """Check that the error for a missing package names its extra; return the failures."""
     faults = []
     with nep.node("painter", master=master) as node:
@@ -106,23 +106,23 @@ def sentences(master: str) -> list[str]:
     return faults
 
 
-def command_line(master: str) -> list[str]:
+def check_command_line(master: str) -> list[str]:
     """Check the installed command `nep`; return the failures."""
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
-        completed = _said(arguments)
+        completed = _run_nep(arguments)
         # The doctor may find a problem of this computer.
         allowed = {0, 1} if "doctor" in arguments else {0}
         if "Traceback" in completed.stderr or completed.returncode not in allowed:
             faults.append(
                 f"nep {' '.join(arguments)} ended with {completed.returncode}: {completed.stderr[-500:]}"
             )
-    if _said(["--help"], "es").stdout == _said(["--help"]).stdout:
+    if _run_nep(["--help"], "es").stdout == _run_nep(["--help"]).stdout:
         faults.append("nep --help says the same in Spanish and in English: its translations are missing")
     return faults
 
 
-def _said(arguments: list[str], language: str = "en") -> subprocess.CompletedProcess[str]:
+def _run_nep(arguments: list[str], language: str = "en") -> subprocess.CompletedProcess[str]:
     # Runs the installed script in a language.
     script = Path(sys.executable).with_name("nep.exe" if sys.platform == "win32" else "nep")
     return subprocess.run(
@@ -139,13 +139,13 @@ def main() -> int:
     """Run all checks and print the failures; return 1 if there are any."""
     with nep.master("127.0.0.1:0", learn_s=0.0) as master:
         faults = [
-            *installed(),
-            *modules(),
-            *messages(None),
-            *messages(master.address),
-            *services(master.address),
-            *sentences(master.address),
-            *command_line(master.address),
+            *check_installation(),
+            *check_imports(),
+            *check_messages(None),
+            *check_messages(master.address),
+            *check_services(master.address),
+            *check_missing_extras(master.address),
+            *check_command_line(master.address),
         ]
     faults += [f"{name} was loaded" for name in ABSENT if name in sys.modules]
     for fault in faults:

@@ -33,7 +33,7 @@ EDITABLE = ("editables",)
 """Build requirements of editable installs with hatchling, which pyproject.toml doesn't declare."""
 
 
-def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
+def compile_command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
     """Return the uv command that writes one file of pins; it expects build requirements on stdin.
 
     Args:
@@ -73,7 +73,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output.parent.mkdir(exist_ok=True)
         requirements = "uv>=0.9" if extra == INSTALLER else builds
         completed = subprocess.run(
-            command(uv, extra, output, options.upgrade), cwd=ROOT, input=requirements, text=True, check=False
+            compile_command(uv, extra, output, options.upgrade),
+            cwd=ROOT,
+            input=requirements,
+            text=True,
+            check=False,
         )
         if completed.returncode != 0:
             return completed.returncode

@@ -30,7 +30,7 @@ MADE_BY = "Made from the docstrings by `python3 dev.py reference`; do not write 
 
 
 @dataclass(frozen=True)
-class Field:
+class PageSpec:
     """Page of the reference.
 
     Attributes:
@@ -44,39 +44,39 @@ class Field:
     homes: tuple[str, ...]
 
 
-PAGES: Mapping[str, Field] = {
-    "nodes": Field(
+PAGES: Mapping[str, PageSpec] = {
+    "nodes": PageSpec(
         "Nodes, publishers and subscribers",
         'Begin with `nep.node("name")`; docs/first-programs.md shows how.',
         ("nep.nodes.node", "nep.nodes", "nep.backends.connection"),
     ),
-    "messages": Field(
+    "messages": PageSpec(
         "Messages",
         "What a subscriber gets, and what can be published beside plain values; see docs/types.md and "
         "docs/latency.md.",
         ("nep.messages",),
     ),
-    "types": Field(
+    "types": PageSpec(
         "Types of robots' messages",
         "Dataclasses in `nep.geometry` and `nep.sensor`, for `new_pub` and `new_sub`; see docs/types.md.",
         ("nep.geometry", "nep.sensor"),
     ),
-    "services": Field(
+    "services": PageSpec(
         "Services, surveys and parameters",
         "Programs that answer each other; see docs/services.md and docs/patterns.md.",
         ("nep.patterns.services", "nep.patterns.parameters"),
     ),
-    "blackboard": Field(
+    "blackboard": PageSpec(
         "Blackboards",
         "The newest value of each key; see docs/blackboard.md.",
         ("nep.programs",),
     ),
-    "masters": Field(
+    "masters": PageSpec(
         "Masters and the graph",
         "Who is there, and who talks to whom.",
         ("nep.masters.master", "nep.masters", "nep.system", "nep.protocol"),
     ),
-    "errors": Field("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
+    "errors": PageSpec("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
 }
 OWN_PAGES = ("nep.geometry", "nep.sensor")
 """Public modules with pages that list every name in their `__all__`."""
@@ -92,7 +92,7 @@ INTERNAL = frozenset({
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
     "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
     "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
-    "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
+    "Server.run_one", "Server.spin_queue", "Subscriber.decoded", "Subscriber.is_typed",
     "Subscriber.payloads", "Subscriber.decoded_unshared", "Subscriber.typed", "Subscriber.want_messages",
     "Subscriber.want_payloads",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.claim_tick",
@@ -104,7 +104,9 @@ _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
 """Types of default values, keyed by the beginning of the value's source text."""
 
 _SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
-_SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
+_ARGUMENT_SENTENCE = re.compile(
+    r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL
+)
 _LISTED = re.compile(r"^`(\w+)`\s+(.*)$")
 _IN_COLUMNS = re.compile(r"`\w+`\s{2,}")
 _SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):\n")
@@ -114,7 +116,7 @@ _CODE = "    "
 
 
 @dataclass(frozen=True)
-class Words:
+class ParsedDocstring:
     """Parsed docstring.
 
     Attributes:
@@ -128,7 +130,7 @@ class Words:
     raises: tuple[str, ...]
 
 
-def words_of(docstring: str, names: Iterable[str]) -> Words:
+def parse_docstring(docstring: str, names: Iterable[str]) -> ParsedDocstring:
     """Parse a docstring.
 
     Args:
@@ -152,7 +154,7 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
             continue
         remaining = []
         for sentence in _SENTENCE.split(" ".join(paragraph.split())):
-            match = None if is_first else _SAID.fullmatch(sentence)
+            match = None if is_first else _ARGUMENT_SENTENCE.fullmatch(sentence)
             is_first = False
             if match and match.group(1) in known_names and match.group(1) not in descriptions:
                 descriptions[match.group(1)] = (
@@ -164,7 +166,7 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
                 remaining.append(sentence)
         if remaining:
             paragraphs.append(" ".join(remaining))
-    return Words(tuple(paragraphs), descriptions, tuple(raises))
+    return ParsedDocstring(tuple(paragraphs), descriptions, tuple(raises))
 
 
 def _add_section(
@@ -294,7 +296,11 @@ class Reference:
         if isinstance(item, griffe.Function):
             return [f"## {name}", *self._function(item, f"{name}")]
         value = item.value if isinstance(item, griffe.Attribute) else ""
-        return [f"## {name}", _block(f"{name} = {value}"), *self._prose(words_of(_said(item), ()))]
+        return [
+            f"## {name}",
+            _block(f"{name} = {value}"),
+            *self._prose(parse_docstring(_docstring_of(item), ())),
+        ]
 
     def _class_entry(self, name: str, cls: griffe.Class) -> list[str]:
         members = self.members(cls)
@@ -303,7 +309,7 @@ class Reference:
         is_made = name in MADE_BY_HAND or cls.module.path in OWN_PAGES
         start = constructor if is_made and isinstance(constructor, griffe.Function) else None
         arguments = [member.name for member in start.parameters if member.name != "self"] if start else []
-        docs = words_of(_said(cls), [*(member.name for member in attributes), *arguments])
+        docs = parse_docstring(_docstring_of(cls), [*(member.name for member in attributes), *arguments])
         parts = [f"## {name}"]
         if start is not None:
             parts.append(_block(self._signature(start, name, has_result=False)))
@@ -328,11 +334,11 @@ class Reference:
         return parts
 
     def _function(self, function: griffe.Function, name: str) -> list[str]:
-        docs = words_of(_said(function), [each.name for each in function.parameters])
+        docs = parse_docstring(_docstring_of(function), [each.name for each in function.parameters])
         parts = [_block(self._signature(function, name)), *self._prose(docs)]
         return [*parts, *self._arguments(function, docs), *self._raises(docs)]
 
-    def _prose(self, docs: Words) -> list[str]:
+    def _prose(self, docs: ParsedDocstring) -> list[str]:
         return [part for paragraph in docs.paragraphs for part in self._filled(paragraph)]
 
     def _filled(self, paragraph: str) -> list[str]:
@@ -341,10 +347,10 @@ class Reference:
         linked = self._linked(paragraph)
         return [textwrap.fill(linked, WIDTH, break_long_words=False, break_on_hyphens=False)]
 
-    def _raises(self, docs: Words) -> list[str]:
+    def _raises(self, docs: ParsedDocstring) -> list[str]:
         return [part for each in docs.raises for part in self._filled(f"**Raises** {each}")]
 
-    def _arguments(self, function: griffe.Function, docs: Words) -> list[str]:
+    def _arguments(self, function: griffe.Function, docs: ParsedDocstring) -> list[str]:
         parameters = [each for each in function.parameters if each.name != "self"]
         if not any(each.name in docs.names for each in parameters):
             return []
@@ -356,14 +362,14 @@ class Reference:
         return ["\n".join(("| argument | type | default | description |", "|---|---|---|---|", *rows))]
 
     def _attributes(
-        self, attributes: Sequence[griffe.Attribute], docs: Words, constructor: object
+        self, attributes: Sequence[griffe.Attribute], docs: ParsedDocstring, constructor: object
     ) -> list[str]:
         # Attributes without an annotation have the type of the constructor's argument of the same name.
         arguments = constructor.parameters if isinstance(constructor, griffe.Function) else ()
         given = {attribute.name: attribute.annotation for attribute in arguments}
         rows = []
         for attribute in attributes:
-            description = " ".join(_said(attribute).split()) or docs.names.get(attribute.name, "")
+            description = " ".join(_docstring_of(attribute).split()) or docs.names.get(attribute.name, "")
             annotation = (
                 attribute.annotation if attribute.annotation is not None else given.get(attribute.name)
             )
@@ -436,7 +442,7 @@ def _target(member: griffe.Object | griffe.Alias) -> griffe.Object:
     return member.final_target if isinstance(member, griffe.Alias) else member
 
 
-def _said(item: griffe.Object) -> str:
+def _docstring_of(item: griffe.Object) -> str:
     return item.docstring.value if item.docstring else ""
 
 

@@ -21,7 +21,7 @@ CHANGELOG = Path(__file__).resolve().parents[1] / "CHANGELOG.md"
 _LINK_TO_FILE = re.compile(r"\]\((?![a-z]+:|#)([^)\s]+)\)")
 
 
-class RefusedError(Exception):
+class InvalidReleaseError(Exception):
     """Error for an invalid release; the message contains the reason and the fix."""
 
 
@@ -36,7 +36,7 @@ def checked_version(tag: str, version: str = __version__) -> str:
         InvalidReleaseError: The tag doesn't match the version.
     """
     if tag.removeprefix("v") != version:
-        raise RefusedError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
+        raise InvalidReleaseError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
     return version
 
 
@@ -54,9 +54,9 @@ def section(changelog: str, version: str) -> str:
     for heading, text in zip(parts[1::2], parts[2::2], strict=True):
         if heading.split()[0].strip("[]") == version:
             if not text.strip():
-                raise RefusedError(f"CHANGELOG.md says nothing of {version}")
+                raise InvalidReleaseError(f"CHANGELOG.md says nothing of {version}")
             return text.strip() + "\n"
-    raise RefusedError(
+    raise InvalidReleaseError(
         f"CHANGELOG.md has no section '## {version}'; write one, of what stands under 'Unreleased' now"
     )
 
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None, changelog: Path = CHANGELOG) ->
     options = parser.parse_args(arguments)
     try:
         notes = section(changelog.read_text(encoding="utf-8"), checked_version(options.tag))
-    except RefusedError as refused:
+    except InvalidReleaseError as refused:
         print(f"release notes: {refused}", file=sys.stderr)
         return 1
     sys.stdout.buffer.write((with_links(notes, options.links) if options.links else notes).encode())

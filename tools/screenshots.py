@@ -133,7 +133,7 @@ class Pictures(SelfDrive):
         run, session = self._commands.run, self._window.session
         return [
             Step("the start page", self._show_start_page, self._window.isVisible, picture="start"),
-            Step("the virtual robot", self._start_demo, self._robot_there, 40, settle_s=2.5),
+            Step("the virtual robot", self._start_demo, self._is_robot_ready, 40, settle_s=2.5),
             *self._run_to(TOUCH),
             *self._stop(),
             *self._run_to(TOUCH, "behaviour-light", settle_s=0.5),
@@ -142,24 +142,31 @@ class Pictures(SelfDrive):
             Step("a message", self._inspect, lambda: True, settle_s=1.0),
             *self._run_to(TURN, "developer-dark", settle_s=0.4),
             *self._stop(),
-            Step("the palette", self._find, lambda: True, picture="palette", settle_s=1.0),
+            Step("the palette", self._search_palette, lambda: True, picture="palette", settle_s=1.0),
             Step("the palette closed", lambda: run("palette.open"), lambda: True),
             Step("light", lambda: run("theme.light"), lambda: True),
             *self._run_to(TURN, "developer-light", settle_s=0.4),
             *self._stop(),
-            Step("its actions", self._robots, self._robot_there, picture="robots", settle_s=1.5),
+            Step("its actions", self._show_robots, self._is_robot_ready, picture="robots", settle_s=1.5),
         ]
 
     def _run_to(self, block: str, picture: str = "", settle_s: float = 0.6) -> list[Step]:
         # Resets the robot and runs until this block runs.
         runs = self._window.session.runs
 
-        def glows() -> bool:
+        def is_block_running() -> bool:
             return runs.view().state == "running" and block in runs.running_blocks
 
         return [
-            Step("the robot back in its place", self._reset, self._robot_there, settle_s=1.5),
-            Step(f"{block} runs", lambda: self._commands.run("run.run"), glows, 30, picture, settle_s),
+            Step("the robot back in its place", self._reset, self._is_robot_ready, settle_s=1.5),
+            Step(
+                f"{block} runs",
+                lambda: self._commands.run("run.run"),
+                is_block_running,
+                30,
+                picture,
+                settle_s,
+            ),
         ]
 
     def _stop(self, next_command: str = "", picture: str = "") -> list[Step]:
@@ -178,7 +185,7 @@ class Pictures(SelfDrive):
             else [stop]
         )
 
-    def _robot_there(self) -> bool:
+    def _is_robot_ready(self) -> bool:
         return any(link.state in {"ready", "busy"} for link in self._window.session.fleet.links)
 
     def _reset(self) -> None:
@@ -188,13 +195,13 @@ class Pictures(SelfDrive):
         self._commands.run("robots.virtual")
         self._commands.files.open(self._behaviour)
 
-    def _find(self) -> None:
+    def _search_palette(self) -> None:
         # Opens the palette with the search "rob".
         self._commands.run("palette.open")
         for palette in self._window.findChildren(CommandPalette):
             palette.field.setText("rob")
 
-    def _robots(self) -> None:
+    def _show_robots(self) -> None:
         self._reset()
         self._commands.run("layout.behaviour")
         self._commands.run("panel:robots")
@@ -214,14 +221,14 @@ def take_screenshots(folder: Path) -> int:
         application = make_application()
         application.setQuitOnLastWindowClosed(False)
         window = make_window(Session(), Options(theme="light", self_drive=folder))
-        window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+        window.on_closed = lambda: QTimer.singleShot(0, application.quit)
         window.show()
         window.start_session()
         pictures = Pictures(window, folder, behaviour)
         application.exec()
     for picture in pictures.pictures:
         shrink(picture)
-    return 0 if pictures.well else 1
+    return 0 if pictures.has_succeeded else 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -22,16 +22,16 @@ from app.ui.blockly.view import BlocklyView  # noqa: E402
 
 SAMPLE = ROOT / "tests" / "data" / "blockly"
 SETTLE_MS = 700
-SENTENCE = "“turn left” needs a number. Put one into the gap."
+ERROR_TEXT = "“turn left” needs a number. Put one into the gap."
 
-CLICK = """
+CLICK_CATEGORY_JS = """
 for (const label of document.querySelectorAll('.blocklyToolboxCategoryLabel'))
   if (label.textContent === NAME)
     label.closest('.blocklyToolboxCategory').dispatchEvent(new PointerEvent('pointerdown', {bubbles: true}));
 """
 
 
-def options() -> argparse.Namespace:
+def parse_arguments() -> argparse.Namespace:
     """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
@@ -54,29 +54,29 @@ class Photographer(QObject):
         self._folder = folder
         self._category = category
         self._tokens = json.loads((ROOT / "resources" / "theme" / "tokens.json").read_text("utf-8"))
-        view.ready.connect(self._light)
+        view.ready.connect(self._show_light_theme)
 
-    def _light(self) -> None:
+    def _show_light_theme(self) -> None:
         self._view.set_theme(self._tokens, dark=False)
         self._view.highlight(["say_touch"])
         self._decorate()
-        QTimer.singleShot(SETTLE_MS, self, self._dark)
+        QTimer.singleShot(SETTLE_MS, self, self._show_dark_theme)
 
-    def _dark(self) -> None:
+    def _show_dark_theme(self) -> None:
         self._save("light")
         self._view.set_theme(self._tokens, dark=True)
         self._view.highlight([])
         self._view.mark_stopped(["say_touch"])
-        QTimer.singleShot(SETTLE_MS, self, self._errors)
+        QTimer.singleShot(SETTLE_MS, self, self._show_errors)
 
-    def _errors(self) -> None:
+    def _show_errors(self) -> None:
         self._save("dark")
         self._view.set_theme(self._tokens, dark=False)
         self._view.mark_stopped([])
-        self._view.set_errors({"b2": SENTENCE, "wave": "NAO is not connected."})
-        QTimer.singleShot(SETTLE_MS, self, self._end)
+        self._view.set_errors({"b2": ERROR_TEXT, "wave": "NAO is not connected."})
+        QTimer.singleShot(SETTLE_MS, self, self._finish)
 
-    def _end(self) -> None:
+    def _finish(self) -> None:
         self._save("errors")
         QApplication.exit(0)
 
@@ -84,7 +84,7 @@ class Photographer(QObject):
         self._view.set_absent(["wave"])
         self._view.set_live_values({"Pepper/battery": "84 %"})
         if self._category and self._view.web is not None:
-            self._view.web.page.runJavaScript(CLICK.replace("NAME", json.dumps(self._category)))
+            self._view.web.page.runJavaScript(CLICK_CATEGORY_JS.replace("NAME", json.dumps(self._category)))
 
     def _save(self, name: str) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ class Photographer(QObject):
 
 def main() -> int:
     """Create the images; return 0 on success."""
-    arguments = options()
+    arguments = parse_arguments()
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
     scheme.register_scheme()

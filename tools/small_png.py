@@ -15,7 +15,7 @@ import numpy as np
 from PySide6.QtGui import QImage
 
 COLOURS = 256
-EXACT = 0.4375  # share of the table for the most frequent colours; the others are found by clustering
+EXACT_SHARE = 0.4375  # share of the table for the most frequent colours; the others are found by clustering
 SAMPLE, ROUNDS = 40_000, 12
 
 
@@ -30,7 +30,7 @@ def shrink(path: Path, max_colours: int = COLOURS) -> int:
     height, width = picture.shape[:2]
     packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
     colours, inverse, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
-    table = _table(colours, counts, max_colours)
+    table = _colour_table(colours, counts, max_colours)
     index = _nearest(_channels(colours), table)[inverse].astype(np.uint8).reshape(height, width)
     image = QImage(index.tobytes(), width, height, width, QImage.Format.Format_Indexed8)
     image.setColorTable([0xFF000000 | (r << 16) | (g << 8) | b for b, g, r in table.astype(int).tolist()])
@@ -44,10 +44,10 @@ def _channels(colours: np.ndarray) -> np.ndarray:
     return np.stack([colours & 255, colours >> 8 & 255, colours >> 16 & 255], axis=1).astype(np.float32)
 
 
-def _table(colours: np.ndarray, counts: np.ndarray, max_colours: int) -> np.ndarray:
+def _colour_table(colours: np.ndarray, counts: np.ndarray, max_colours: int) -> np.ndarray:
     # The most frequent colours, and cluster centres of the others.
     order = np.argsort(counts)[::-1]
-    as_they_are = round(EXACT * max_colours)
+    as_they_are = round(EXACT_SHARE * max_colours)
     exact, rest, cluster_count = order[:as_they_are], order[as_they_are:], max_colours - as_they_are
     table = _channels(colours[exact])
     if len(rest) <= cluster_count:

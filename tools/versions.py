@@ -26,7 +26,9 @@ from tools.computer import ROOT, Computer, Trouble, timed, venv_python
 PROMISED = ("3.10", "3.11", "3.12", "3.13")
 FOLDER = ROOT / "build" / "versions"
 TESTS = ("tests/nep", "tests/interop")
-WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
+VERSION_SCRIPT = (
+    "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
+)
 PYENV = ".pyenv/versions"
 OLDEST_MACOS = "13_0"
 """Minimum macOS version of the package (installers/macos/information.py), in the format of wheel tags."""
@@ -44,12 +46,12 @@ class Outcome:
     version: str
     failed: list[str] = field(default_factory=list)
 
-    def told(self) -> str:
+    def table_row(self) -> str:
         """Format the result as one line of the table."""
         return f"  Python {self.version}  {'FAILED: ' + ', '.join(self.failed) if self.failed else 'ok'}"
 
 
-def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
+def find_interpreters(computer: Computer, home: Path | None = None) -> dict[str, str]:
     """Find interpreters of the supported Python versions on this computer; return their paths by version.
 
     Searches the current interpreter, the PATH, the Windows launcher and pyenv, in this order.
@@ -57,7 +59,9 @@ def found(computer: Computer, home: Path | None = None) -> dict[str, str]:
     have: dict[str, str] = {}
     for version in PROMISED:
         for command in _candidates(computer, version, home or Path.home()):
-            match = re.fullmatch(r"(\S+) cpython (.+)", computer.ask([*command, "-c", WHO]).strip())
+            match = re.fullmatch(
+                r"(\S+) cpython (.+)", computer.ask([*command, "-c", VERSION_SCRIPT]).strip()
+            )
             if match and match[1] == version:
                 have[version] = match[2]
                 break
@@ -71,11 +75,11 @@ def _candidates(computer: Computer, version: str, home: Path) -> list[list[str]]
         commands.append([path])
     if launcher := computer.which("py"):
         commands.append([launcher, f"-{version}"])
-    newest_first = sorted((home / PYENV).glob(f"{version}.*"), key=_number, reverse=True)
+    newest_first = sorted((home / PYENV).glob(f"{version}.*"), key=_patch_number, reverse=True)
     return [*commands, *([str(venv_python(each, computer.platform))] for each in newest_first)]
 
 
-def _number(folder: Path) -> int:
+def _patch_number(folder: Path) -> int:
     # Last number of a folder such as 3.10.13; -1 for 3.13.0t and similar.
     last = folder.name.rpartition(".")[2]
     return int(last) if last.isdecimal() else -1
@@ -184,7 +188,11 @@ def versions(
             f"there is no file {options.install}; python -m build makes dist/*.whl and dist/*.tar.gz"
         )
     distribution = str(Path(options.install).resolve()) if options.install else "."
-    have = {version: python for version, python in found(computer, home).items() if version in selected}
+    have = {
+        version: python
+        for version, python in find_interpreters(computer, home).items()
+        if version in selected
+    }
     absent = [version for version in selected if version not in have]
     if absent:
         print(f"· not on this computer: Python {', '.join(absent)}", flush=True)
@@ -197,5 +205,5 @@ def versions(
         if not options.plain:
             failed += try_tests(computer, python, folder / version, options.pytest_arguments)
         outcomes.append(Outcome(version, failed))
-    print("\n" + "\n".join(each.told() for each in outcomes), file=sys.stderr, flush=True)
+    print("\n" + "\n".join(each.table_row() for each in outcomes), file=sys.stderr, flush=True)
     return 1 if any(each.failed for each in outcomes) else 0

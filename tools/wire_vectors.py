@@ -24,7 +24,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.masters.graph import Graph
 from nep.protocol import requests, wire
-from nep.protocol.encoding import ReplyEncoder, encode_request, write
+from nep.protocol.encoding import ReplyEncoder, encode_request, to_plain
 
 FOLDER = Path(__file__).resolve().parents[1] / "tests" / "data" / "wire"
 MALFORMED_COUNT = 1000
@@ -58,7 +58,12 @@ def filters() -> list[dict[str, Any]]:
             "means": {"kind": "topic", "topic": "/größe"},
         },
     ]
-    levels: tuple[dict[str, bool], ...] = ({}, {"one_part": True}, {"tells": True}, {"batches": True})
+    levels: tuple[dict[str, bool], ...] = (
+        {},
+        {"one_part": True},
+        {"acknowledges_echoes": True},
+        {"batches": True},
+    )
     for level, options in enumerate(levels):
         for subscriber, topic in ((SUBSCRIBER, TOPIC), (1, "/a/b"), (2**63 - 1, "/größe")):
             cases.append(
@@ -315,7 +320,7 @@ def master() -> dict[str, Any]:
             }
         )
     ping = encode_request(requests.Ping(), 1)
-    done_reply = msgpack.packb({"is": "done", "re": 1, "what": write(requests.DoneReply(1, 0))})
+    done_reply = msgpack.packb({"is": "done", "re": 1, "what": to_plain(requests.DoneReply(1, 0))})
     return {
         "epoch": str(EPOCH),
         "asked": request_cases,

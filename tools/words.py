@@ -223,7 +223,7 @@ def compile_all(folder: Path = LOCALE_FOLDER) -> None:
     info_by_language: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
     for language in languages(folder):
         catalog = read(po_file(folder, language), language)
-        info_by_language[language] = facts(language, catalog)
+        info_by_language[language] = language_info(language, catalog)
         _write_mo(catalog, po_file(folder, language).with_suffix(".mo"))
     compile_pseudo(folder)
     (folder / "languages.json").write_text(_json(info_by_language), encoding="utf-8")
@@ -263,7 +263,7 @@ def _json(value: Mapping[str, object]) -> str:
     return json.dumps(value, ensure_ascii=False, indent=1, sort_keys=True) + "\n"
 
 
-def facts(language: str, catalog: Catalog) -> dict[str, object]:
+def language_info(language: str, catalog: Catalog) -> dict[str, object]:
     """Return the native name of a language, its share of translated messages, and its formats.
 
     The formats are taken from Unicode's CLDR and stored in languages.json, so that programs don't need
@@ -342,7 +342,7 @@ def check(folder: Path = LOCALE_FOLDER) -> list[str]:
             problems.append(
                 f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'"
             )
-        made_of_it = (_told(catalog), _for_editor(catalog), facts(language, catalog))
+        made_of_it = (_translations_of(catalog), _for_editor(catalog), language_info(language, catalog))
         existing = (
             _compiled(path),
             _read_json(path.with_name(EDITOR_CATALOGUE)),
@@ -367,7 +367,7 @@ def _wrong_entries(catalog: Catalog) -> Iterator[str]:
                 yield f"'{form}' has not the markup of '{_shown(key)}'"
 
 
-def _told(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
+def _translations_of(catalog: Catalog) -> dict[Key, tuple[str, ...]]:
     return {
         Key(_context(each.context), _ids(each.id)): _ids(each.string)
         for each in catalog
@@ -385,7 +385,7 @@ def _compiled(po: Path) -> dict[Key, tuple[str, ...]]:
     if not path.is_file():
         return {}
     with path.open("rb") as stream:
-        return _told(read_mo(stream))
+        return _translations_of(read_mo(stream))
 
 
 def _read_json(path: Path) -> Mapping[str, object]:

@@ -99,7 +99,7 @@ class SessionAlarms:
         self._pending_send: _PendingSend | None = None
         self.on_moved: OnMoved = ignore_moved
         """Called before a message that moves robots is sent, with the robots and "alarm"."""
-        self.keep: ActionStarter | None = None
+        self.save_flight_recorder: ActionStarter | None = None
         self.run_behaviour: Callable[[str], str] | None = None
         self.on_event: Callable[[AlarmEvent], object] = _ignore_event
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
@@ -120,7 +120,7 @@ class SessionAlarms:
         self.alarms = Alarms(alarm_file.rules, alarm_file.history, carriers, clock=clock, clock_s=clock_s)
         self._written: object = self._state()
         self._view: GraphView | None = None
-        self._on: set[str] = set()
+        self._active_ids: set[str] = set()
 
     # ---- interface of the panel and menus
 
@@ -142,7 +142,11 @@ class SessionAlarms:
     @property
     def active(self) -> Sequence[AlarmRule]:
         """Active alarms: the condition is true and the alarm is not snoozed."""
-        return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
+        return [
+            rule
+            for rule in self.rules
+            if rule.id in self._active_ids and not rule.is_snoozed(self._clock_s())
+        ]
 
     def create(self, condition: AlarmCondition) -> AlarmRule:
         """Return a new alarm that shows a banner while a condition is true, and add it to the list.
@@ -235,7 +239,7 @@ class SessionAlarms:
     def check(self) -> None:
         """Update the alerts and save changed alarms. Called once a second."""
         for rule in self.rules:
-            if rule.id in self._on:
+            if rule.id in self._active_ids:
                 self._update_alert(rule, self.alarms.evaluator.state(rule).value, count=0)
         self._write()
         try:
@@ -276,12 +280,12 @@ class SessionAlarms:
         rule, alerts = event.rule, self._session.alerts
         self.on_event(event)
         if event.kind == "off":
-            self._on.discard(rule.id)
+            self._active_ids.discard(rule.id)
             alerts.resolve(_alert_id(rule.id))
             return
         if event.kind == "still":
             alerts.resolve(_alert_id(rule.id))  # the snooze dismissed its banner
-        self._on.add(rule.id)
+        self._active_ids.add(rule.id)
         self._update_alert(rule, event.value, count=1)
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
             alerts.dismiss(_alert_id(rule.id))
@@ -324,10 +328,10 @@ class SessionAlarms:
         on_done(True, _("sound"))
 
     def _save_recording(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
-        if self.keep is None:
+        if self.save_flight_recorder is None:
             on_done(False, _("nothing saved: recording is off"))
         else:
-            self.keep(event, action, on_done)
+            self.save_flight_recorder(event, action, on_done)
 
     def _run(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         error_text = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)

@@ -55,7 +55,7 @@ class Console:
         self._ignored_pids: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
         self._errors = log_handler.NewErrorFilter()
         self._count = 0
-        self.left_out = 0
+        self.dropped_count = 0
         """Number of records from the network that were dropped because too many arrived at once."""
         self.revision = 0
 
@@ -77,7 +77,7 @@ class Console:
             dropped: Number of messages lost before ``messages``.
         """
         if dropped:
-            self.left_out += dropped
+            self.dropped_count += dropped
             message = ngettext(
                 "{count} log record was dropped: too many at once",
                 "{count} log records were dropped: too many at once",

@@ -25,7 +25,7 @@ from app.core.alerts import Alerts
 from nep.i18n import _
 from nep.version import __version__
 
-FILE_BYTES, FILES_KEPT = 1_000_000, 3
+FILE_BYTES, BACKUP_COUNT = 1_000_000, 3
 MAX_COUNTED_FAULTS = 500
 CONSOLE_EXTRA: dict[str, object] = {"in_console": True}
 """``extra`` of a record for the log file only, because the Console already shows the event in other words."""
@@ -133,7 +133,7 @@ class LogFile(RotatingFileHandler):
     def __init__(self, folder: Path) -> None:
         # `delay`: the folder is created with the first line.
         super().__init__(
-            folder / "studio.log", maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8", delay=True
+            folder / "studio.log", maxBytes=FILE_BYTES, backupCount=BACKUP_COUNT, encoding="utf-8", delay=True
         )
         self.setLevel(logging.WARNING)
         self.setFormatter(logging.Formatter(LOG_FORMAT))

@@ -145,7 +145,7 @@ class Session:
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, post_event)
         self.web_pages = WebPages(self.address, post_event)
         self.doctor = create_doctor(self.address, self.settings.path.parent)
-        self._learning = MasterChangeDetector()
+        self._master_change_detector = MasterChangeDetector()
 
     def _add_robots(self) -> None:
         submit, clock = self.source.submit, self._clock
@@ -172,8 +172,8 @@ class Session:
         )
 
     def _connect_parts(self) -> None:
-        self.runs.coming, self.runs.also_stops = (lambda: self.starting_robots), self.acting.disarm
-        self.alarms.keep, self.alarms.on_event = (
+        self.runs.starting_robots, self.runs.before_stop = (lambda: self.starting_robots), self.acting.disarm
+        self.alarms.save_flight_recorder, self.alarms.on_event = (
             self.recordings.save_for_alarm,
             self.recordings.events.on_alarm,
         )
@@ -363,7 +363,7 @@ class Session:
             self.launcher.check()
             self.last_robots.save(self.launcher)
             if self.master.kind == "none" and self._start_processes:
-                self.launcher.ensure_master_running()
+                self.launcher.ensure_master_with_backoff()
             self.web_pages.check()
         with self.guarded(lazy("count lost messages")):
             missed = self.source.lost_counts()
@@ -376,8 +376,8 @@ class Session:
             self._health.check(self.runs.used_robots, self.launcher.virtual_robots)
             self.documents.retry_journals()
             self._health.report_journal_problem(self.documents.journal_error)
-            self._health.report_settings_problem(self.settings.not_kept)
-            self._health.program(self._program.executable_state())
+            self._health.report_settings_problem(self.settings.write_error)
+            self._health.report_executable_state(self._program.executable_state())
 
     def _close_replays(self) -> None:
         self.return_to_live()
@@ -448,7 +448,7 @@ class Session:
             with self.guarded(lazy("receive messages of {topic}"), topic=key):
                 self.live.networks.add(key, batch, now)
         with self.guarded(lazy("update the plots")):
-            self.live.series.add(drained.batches)
+            self.live.series.dispatch(drained.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
         with self.guarded(lazy("update the robots")):
@@ -522,13 +522,13 @@ class Session:
                 | RecorderExited()
                 | WebServerStarted()
             ):
-                self._on_part(event, now)
+                self._forward_event(event, now)
             case JobFailed() if event.message_template:
                 self.console.add("error", "studio", _(event.message_template).format(error=event.message))
             case _:
                 pass
 
-    def _on_part(
+    def _forward_event(
         self,
         event: RemoteAccessChanged | NetworkEvent | RecorderEvent | RecorderExited | WebServerStarted,
         now: float,
@@ -536,15 +536,15 @@ class Session:
         if isinstance(event, NetworkEvent):
             self.live.networks.on_event(event, now)
         elif isinstance(event, RemoteAccessChanged):
-            self.remote_access.changed(event)
+            self.remote_access.on_changed(event)
         elif isinstance(event, WebServerStarted):
-            self.web_pages.started(event)
+            self.web_pages.on_started(event)
         else:
             self.recordings.on_event(event)
 
     def _on_graph(self, view: GraphView, now: float) -> None:
         self.remote_access.update_graph(view)
-        if self._learning.is_incomplete(self.live.graph, view, now):
+        if self._master_change_detector.is_incomplete(self.live.graph, view, now):
             return
         live = self.live
         before = live.graph

@@ -27,9 +27,9 @@ LIGHTS = "Lights"
 STEP_INTERVAL_S = 1 / 30
 FEEDBACK_PERIOD_STEPS = 6
 SPEED, TURN_SPEED = 0.35, 80.0
-SLOWEST, SLOWEST_TURN = 0.03, 6.0
-SLOW_DOWN, TURN_SLOW_DOWN = 0.5, 200.0  # m/s², °/s²
-ARRIVED_M, ARRIVED_DEG = 0.008, 0.8
+MIN_SPEED, MIN_TURN_SPEED = 0.03, 6.0
+DECELERATION, TURN_DECELERATION = 0.5, 200.0  # m/s², °/s²
+DISTANCE_TOLERANCE_M, ANGLE_TOLERANCE_DEG = 0.008, 0.8
 MIN_DISTANCE_M = 0.03
 STANDSTILL_TIMEOUT_S = 1.0
 MAX_DISTANCE_M = 5.0
@@ -51,13 +51,13 @@ class Wheels(Protocol):
     def pose(self) -> tuple[float, float, float]:
         """Return the position (x and y in m) and the orientation (theta in degrees)."""
 
-    def still(self) -> bool:
+    def is_still(self) -> bool:
         """Return True if the base is not moving."""
 
-    def bumped(self) -> str:
+    def bumped_side(self) -> str:
         """Return the side at which the base touches something, such as "left"; "" if it touches nothing."""
 
-    def light(self, colour: str) -> None:
+    def set_light(self, colour: str) -> None:
         """Set the colour of the light.
 
         Args:
@@ -168,7 +168,7 @@ class DiffDrive:
     )
     def light(self, call: Call, colour: Colour = "#35c26b") -> None:  # noqa: ARG002 - it needs no call
         """Set the colour of the light."""
-        self.wheels.light(colour)
+        self.wheels.set_light(colour)
 
     @safe_stop(watchdog_s=0.5, within_s=0.1)
     def stop(self) -> None:
@@ -177,7 +177,7 @@ class DiffDrive:
             self.wheels.drive(0.0, 0.0)
         waited = threading.Event()
         for _turn in range(round(STANDSTILL_TIMEOUT_S / 0.005)):
-            if self.wheels.still():
+            if self.wheels.is_still():
                 return
             waited.wait(0.005)
         raise Failed(_("its wheels keep turning"))
@@ -210,13 +210,13 @@ class DiffDrive:
         read_distance = self.odometer()
 
         def steer(remaining: float) -> None:
-            speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * remaining)))
+            speed = min(SPEED, max(MIN_SPEED, math.sqrt(2 * DECELERATION * remaining)))
             self._set_speeds(call, math.copysign(speed, distance), 0.0)
 
         def send_feedback(moved: float) -> None:
             call.feedback(**create_feedback(round(moved, 2)))
 
-        self._steer(call, abs(distance), ARRIVED_M, read_distance, steer, send_feedback)
+        self._steer(call, abs(distance), DISTANCE_TOLERANCE_M, read_distance, steer, send_feedback)
         return read_distance()
 
     def _turn_on_spot(
@@ -232,13 +232,13 @@ class DiffDrive:
             return abs(turned[0])
 
         def steer(remaining: float) -> None:
-            speed = min(TURN_SPEED, max(SLOWEST_TURN, math.sqrt(2 * TURN_SLOW_DOWN * remaining)))
+            speed = min(TURN_SPEED, max(MIN_TURN_SPEED, math.sqrt(2 * TURN_DECELERATION * remaining)))
             self._set_speeds(call, 0.0, math.copysign(speed, angle))
 
         def send_feedback(progress: float) -> None:
             call.feedback(**create_feedback(round(progress, 1)))
 
-        self._steer(call, abs(angle), ARRIVED_DEG, turned_deg, steer, send_feedback)
+        self._steer(call, abs(angle), ANGLE_TOLERANCE_DEG, turned_deg, steer, send_feedback)
 
     def _steer(
         self,
@@ -252,7 +252,7 @@ class DiffDrive:
         steps = 0
         try:
             while (remaining := amount - read_progress()) > tolerance:
-                if steps and self.wheels.bumped() and self.wheels.still():
+                if steps and self.wheels.bumped_side() and self.wheels.is_still():
                     raise Failed(_("{action}: something is in the way").format(action=call.action))
                 steer(remaining)
                 if steps % FEEDBACK_PERIOD_STEPS == 0:

@@ -41,7 +41,7 @@ def robot(name: str) -> Robot:
     return parse({**thing_model(), "title": name})
 
 
-def ready(message: object) -> str | None:
+def announced_name(message: object) -> str | None:
     """Return the name of the robot that a message on ``rize_event`` announces; None for other messages."""
     fields = as_object(message)
     return text(fields.get("name")) if fields.get("robot") == "ready" else None

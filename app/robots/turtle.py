@@ -82,17 +82,17 @@ class VirtualWheels:
         with self._lock:
             return self.body.driven_m
 
-    def still(self) -> bool:
+    def is_still(self) -> bool:
         """Return True if the base is not moving."""
         with self._lock:
             self._advance_locked()  # don't wait for the next step of the body thread
             return self.body.is_still
 
-    def bumped(self) -> str:
+    def bumped_side(self) -> str:
         """Return the side at which the base touches something, such as "left"; "" if it touches nothing."""
         return self.body.pressed_bumper
 
-    def light(self, colour: str) -> None:
+    def set_light(self, colour: str) -> None:
         """Set the colour of the light (``#rrggbb``)."""
         with self._lock:
             self.body.light = colour

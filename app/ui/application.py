@@ -196,7 +196,7 @@ def raise_startup_alerts(session: Session) -> None:
 def report_crashes(session: Session, this_run: StudioRun) -> None:
     """Store crash reports of earlier runs, and offer a problem report for crashes since the last start."""
     reports = CrashReports()
-    for crash in this_run.left():
+    for crash in this_run.pop_crashes():
         reports.add(crash)
     show_crash_alert(session.alerts, reports)
 
@@ -376,7 +376,7 @@ def _run_window(
     session = Session()
     window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
-    window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+    window.on_closed = lambda: QTimer.singleShot(0, application.quit)
     window.can_restart = not options.is_standalone  # other windows don't restore their tabs
     close_on_signals(window, this_run)
     hearing = QTimer(window)
@@ -409,6 +409,6 @@ def _run_window(
     sandbox.configure_sandbox(os.environ, trial)  # requires the event loop, which creates the page
     code = application.exec()
     speaker.close()
-    if driver is not None and not driver.well:
+    if driver is not None and not driver.has_succeeded:
         return 1
     return RESTART_EXIT_CODE if window.wants_restart else code

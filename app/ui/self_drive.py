@@ -105,7 +105,7 @@ class SelfDrive(QObject):
         self._window, self._commands, self._folder = window, window.commands, folder
         self._listener = listener if listener is not None else ResultPrinter()
         self._failed_picture = failed_picture
-        self.well = False
+        self.has_succeeded = False
         self.pictures: list[Path] = []
         self._steps = iter(steps if steps is not None else self._plan())
         self._step: Step | None = None
@@ -126,7 +126,7 @@ class SelfDrive(QObject):
         def has_robot() -> bool:
             return any(link.state in {"ready", "busy"} for link in session.fleet.links)
 
-        def state(*names: str) -> Callable[[], bool]:
+        def has_run_state(*names: str) -> Callable[[], bool]:
             return lambda: session.runs.view().state in names
 
         def is_block_highlighted() -> bool:
@@ -143,7 +143,7 @@ class SelfDrive(QObject):
                 "the program runs", lambda: run("run.run"), is_block_highlighted, 30, "behaviour-light", 1.5
             ),
             Step("dark while it runs", lambda: run("theme.dark"), lambda: True, 5, "behaviour-dark"),
-            Step("every robot stopped", lambda: run("run.stop"), state("proven"), 5, "stopped-dark"),
+            Step("every robot stopped", lambda: run("run.stop"), has_run_state("proven"), 5, "stopped-dark"),
             Step("the topics", lambda: run("layout.developer"), self._has_demo_topics, 20),
             Step("a message", self._inspect, has_inspected_topic, 20, "developer-dark", 2.5),
             Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
@@ -229,7 +229,7 @@ class SelfDrive(QObject):
             sys.stderr.write(f"the picture {path} can't be written\n")
 
     def _finish(self, succeeded: bool, message: str) -> None:
-        self.well = succeeded
+        self.has_succeeded = succeeded
         self._timer.stop()
         self._step = None
         try:

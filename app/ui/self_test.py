@@ -75,12 +75,12 @@ class WindowSteps:
         # `web`: the page of the block editor is loaded.
         self._window, self._session, self._test, self._web = window, window.session, test, web
         self._painted = False
-        self._drawn = b""
+        self._drawing = b""
         self._is_drawing_requested = False
-        self._watched = False
-        self._rest: Mapping[str, object] = {}
-        self._speech = self._moved = ""
-        self._stopped_after: object = None
+        self._is_watching_state = False
+        self._initial_state: Mapping[str, object] = {}
+        self._speech = self._movement = ""
+        self._message_before_stop: object = None
         FirstPaint(window, self._on_painted)
 
     def all(self) -> list[Step]:
@@ -146,11 +146,11 @@ class WindowSteps:
             case "behaviour":
                 return session.document.name
             case "editor":
-                return _("{count} bytes of drawing").format(count=len(self._drawn))
+                return _("{count} bytes of drawing").format(count=len(self._drawing))
             case "run":
                 return session.runs.view().title
             case "moves":
-                return f"“{self._speech}”, {self._moved}"
+                return f"“{self._speech}”, {self._movement}"
             case "stop":
                 return session.runs.view().result or ""
         return ""
@@ -179,8 +179,8 @@ class WindowSteps:
         return link if link is not None and link.state in {"ready", "busy"} else None
 
     def _has_robot(self) -> bool:
-        if not self._watched and self._robot_link() is not None:
-            self._watched = True
+        if not self._is_watching_state and self._robot_link() is not None:
+            self._is_watching_state = True
             self._session.watch(STATE_TOPIC)  # watched until the session ends
         return bool(self._state())
 
@@ -196,15 +196,15 @@ class WindowSteps:
         if not self._is_drawing_requested and isinstance(editor, SupportsPictures):
             self._is_drawing_requested = True
             editor.picture("svg", True, self._on_drawing)
-        return bool(self._drawn)
+        return bool(self._drawing)
 
     def _on_drawing(self, drawing: bytes) -> None:
-        self._is_drawing_requested, self._drawn = False, drawing
+        self._is_drawing_requested, self._drawing = False, drawing
         if drawing:
             self._test.report.record_time("editor_ready")
 
     def _run(self) -> None:
-        self._rest = self._state()
+        self._initial_state = self._state()
         self._window.commands.run("run.run")
 
     def _is_running(self) -> bool:
@@ -218,23 +218,25 @@ class WindowSteps:
     def _has_moved(self) -> bool:
         state = self._state()
         turned = (
-            name for name in state if name.startswith(JOINT_PREFIXES) and state[name] != self._rest.get(name)
+            name
+            for name in state
+            if name.startswith(JOINT_PREFIXES) and state[name] != self._initial_state.get(name)
         )
         self._speech = self._speech or str(state.get("speech") or "")
-        self._moved = self._moved or next(
-            (f"{name} {self._rest.get(name)} → {state[name]}" for name in turned), ""
+        self._movement = self._movement or next(
+            (f"{name} {self._initial_state.get(name)} → {state[name]}" for name in turned), ""
         )
-        return bool(self._speech and self._moved)
+        return bool(self._speech and self._movement)
 
     def _stop(self) -> None:
-        self._stopped_after = self._newest_message()
+        self._message_before_stop = self._newest_message()
         self._window.commands.run("run.stop")
 
     def _has_stopped(self) -> bool:
         view, state = self._session.runs.view(), self._state()
         is_idle = state.get("moving") is False and not state.get("speech")
         proven = view.state == "proven" and bool(view.result) and view.result_status == "ok"
-        return proven and is_idle and self._newest_message() is not self._stopped_after
+        return proven and is_idle and self._newest_message() is not self._message_before_stop
 
     def _newest_message(self) -> object:
         topic = self._session.topics.get(STATE_TOPIC)
@@ -266,7 +268,7 @@ class SelfTestListener:
         if not step.picture:
             self._test.record_success(step.details())
             return
-        colours = colour_count(QImage(str(self._test.place.path(PICTURE))))
+        colours = colour_count(QImage(str(self._test.environment.path(PICTURE))))
         if colours < MIN_COLOURS:
             self._test.fail(_("the screenshot of the window has only {count} colours").format(count=colours))
         else:
@@ -317,6 +319,6 @@ def run_window_steps(test: SelfTest, *, web: bool) -> int:
         )
         steps = WindowSteps(window, test, web=web).all()
         listener, picture = SelfTestListener(test, window.session), PICTURE.removesuffix(".png")
-        return SelfDrive(window, test.place.folder, steps, listener, picture)
+        return SelfDrive(window, test.environment.folder, steps, listener, picture)
 
     return run(Options(make_driver=make_driver, web=web))

@@ -289,14 +289,14 @@ class _SpeechWorker(QObject):
 
     def __init__(self, make: Callable[[], Engine], orders: deque[Request], speaker: QtSpeaker) -> None:
         super().__init__()
-        self._make, self._orders, self._speaker = make, orders, speaker
+        self._make, self._requests, self._speaker = make, orders, speaker
         self._engine: Engine | None = None
         self.loop = QEventLoop()
         self.woken.connect(self.process, Qt.ConnectionType.QueuedConnection)
 
     def process(self) -> None:
-        while self._orders:
-            kind, args, generation = self._orders.popleft()
+        while self._requests:
+            kind, args, generation = self._requests.popleft()
             if kind == "end":
                 self._stop_output("all")
                 self._engine = None
@@ -340,8 +340,8 @@ class QtSpeaker(QObject):
         # `make` creates the engine, in its thread, on first use.
         super().__init__(parent)
         self._make = make
-        self._orders: deque[Request] = deque()
-        self._desk: _SpeechWorker | None = None
+        self._requests: deque[Request] = deque()
+        self._worker: _SpeechWorker | None = None
         self._thread: threading.Thread | None = None
         self._generations: dict[str, int] = {"say": 0, "play": 0}
         self._busy = False
@@ -419,21 +419,21 @@ class QtSpeaker(QObject):
     def _enqueue(self, kind: str, *args: object) -> None:
         if self._closed:
             return
-        self._orders.append((kind, args, self._generations.get(kind, 0)))
+        self._requests.append((kind, args, self._generations.get(kind, 0)))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run_thread, name="robots' voice", daemon=True)
             self._thread.start()
-        elif self._desk is not None:
-            self._desk.woken.emit()
+        elif self._worker is not None:
+            self._worker.woken.emit()
 
     def _run_thread(self) -> None:
-        desk = _SpeechWorker(self._make, self._orders, self)
+        desk = _SpeechWorker(self._make, self._requests, self)
         desk.ended.connect(self._on_ended, Qt.ConnectionType.QueuedConnection)
         desk.reported.connect(self._on_reported, Qt.ConnectionType.QueuedConnection)
-        self._desk = desk
+        self._worker = desk
         desk.woken.emit()
         desk.loop.exec()
-        self._desk = None
+        self._worker = None
 
     def _on_ended(self, generation: int) -> None:
         if generation == self._generations["say"]:

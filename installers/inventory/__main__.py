@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 from installers.inventory.bill import bill, write_licences  # noqa: E402 - started by its path
 from installers.inventory.libraries import parts_in_folder  # noqa: E402
-from installers.inventory.parts import PROJECT, InventoryError, others, parts_of  # noqa: E402
+from installers.inventory.parts import PROJECT, InventoryError, other_parts, parts_of  # noqa: E402
 from installers.inventory.wheels import parts_in_wheels  # noqa: E402
 
 
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     system, epoch, program_folder, folder, bill_file = sys.argv[1:] if arguments is None else arguments
     version = metadata.version(PROJECT)
     try:
-        parts = [*parts_of(), *others(ROOT / "resources")]
+        parts = [*parts_of(), *other_parts(ROOT / "resources")]
         parts += parts_in_wheels(tuple(parts))
         parts += parts_in_folder(Path(program_folder), tuple(parts))
         write_licences(parts, Path(folder), version)

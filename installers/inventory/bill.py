@@ -21,8 +21,8 @@ from installers.inventory.parts import LICENCES, PROJECT, InventoryError, Part
 __all__ = ["bill", "standard_texts", "write_licences"]
 
 NOTICE = LICENCES.parent / "notice.txt"
-CRATES = "rust-crates.txt"
-_SAME = {"Unicode-DFS-2016": "Unicode-3.0"}
+CRATES_FILE = "rust-crates.txt"
+_LICENCE_ALIASES = {"Unicode-DFS-2016": "Unicode-3.0"}
 """Replacements for licences whose wording differs from another licence only in names."""
 
 
@@ -71,7 +71,7 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
     for name in texts:
         content += f"\n---- {name} ----\n\n{(LICENCES / f'{name}.txt').read_text('utf-8').strip()}\n"
     licences.mkdir(parents=True, exist_ok=True)
-    (licences / CRATES).write_text(content, "utf-8", newline="\n")
+    (licences / CRATES_FILE).write_text(content, "utf-8", newline="\n")
 
 
 def standard_texts(part: Part) -> Sequence[str]:
@@ -86,7 +86,7 @@ def standard_texts(part: Part) -> Sequence[str]:
     # Ignores that AND binds more tightly than OR: no crate mixes them without brackets.
     for alternatives in re.split(r"\s+AND\s+", part.licence):
         ids = [
-            _SAME.get(each, each)
+            _LICENCE_ALIASES.get(each, each)
             for each in re.findall(r"[A-Za-z][\w.-]*\d[\w.-]*|MIT|ISC|Zlib", alternatives)
         ]
         available = [each for each in ids if (LICENCES / f"{each}.txt").is_file()]

@@ -179,18 +179,20 @@ LIBRARIES = (
 )  # fmt: skip
 """Known libraries, identified by patterns of their file names without the suffix and version numbers."""
 _PATTERNS = [(re.compile(f"(?:{each.files}){_EXTENSION}", re.IGNORECASE), each) for each in LIBRARIES]
-_PYTHON_KNOWS = {
+_VERSIONS_IN_PYTHON = {
     "expat": pyexpat.EXPAT_VERSION.rpartition("_")[2],
     "openssl": ssl.OPENSSL_VERSION.split()[1],
     "sqlite": sqlite3.sqlite_version,
     "zlib": zlib.ZLIB_RUNTIME_VERSION,
 }
 """Versions of libraries as reported by the interpreter that is frozen."""
-_FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)[.-]")
+_FFMPEG_LIBRARY = re.compile(
+    r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)[.-]"
+)
 """Names of FFmpeg's libraries, for which the package contains empty replacements (film_libraries.py)."""
-_EMPTY = 96 * 1024
+_MAX_EMPTY_LIBRARY_BYTES = 96 * 1024
 _QT = re.compile(r"(?:lib)?Qt\w*(?:\.framework)?\b|QtWebEngineProcess")
-_OURS = frozenset({"nep", "nep-studio", "nep.exe", "nep-studio.exe"})
+_OWN_PROGRAMS = frozenset({"nep", "nep-studio", "nep.exe", "nep-studio.exe"})
 _MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf")
 
 
@@ -221,21 +223,21 @@ def parts_in_folder(folder: Path, known_parts: Sequence[Part]) -> Iterator[Part]
     Raises:
         InventoryError: Libraries are unknown or have no licence text; the message has a line for each.
     """
-    wheel_names = _names_of_wheels({each.name for each in known_parts if each.kind == "pypi"})
+    wheel_names = _known_files({each.name for each in known_parts if each.kind == "pypi"})
     names, problems, libraries = {each.name for each in known_parts}, list[str](), dict[str, Library]()
     for path in compiled_files(folder):
         library = library_of(path.name)
         if library is not None:
             if library.of not in names:
                 libraries[path.name] = library
-        elif not _is_told(path, wheel_names):
+        elif not _is_known_file(path, wheel_names):
             problems.append(f"'{path.relative_to(folder)}' is of nothing that is told: put it into LIBRARIES")
     parts_by_name = dict[str, Part]()
     packages = _debian_packages(
         name for name, library in libraries.items() if library.is_of_system or not library.of
     )
     for name, library in libraries.items():
-        part = packages[name].part(library) if name in packages else _carried(name, library)
+        part = packages[name].part(library) if name in packages else _part_of_library(name, library)
         if part is None:
             problems.append(f"'{name}' is of no package of this computer, so its licence text is missing")
         else:
@@ -245,13 +247,13 @@ def parts_in_folder(folder: Path, known_parts: Sequence[Part]) -> Iterator[Part]
     yield from parts_by_name.values()
 
 
-class _Known(NamedTuple):
+class _KnownFiles(NamedTuple):
     extensions: frozenset[str]
     qt: frozenset[str]
     python: frozenset[str]
 
 
-def _names_of_wheels(names: Collection[str]) -> _Known:
+def _known_files(names: Collection[str]) -> _KnownFiles:
     extensions, qt = set[str](), set[str]()
     for name in names:
         for file in metadata.distribution(name).files or ():
@@ -264,7 +266,7 @@ def _names_of_wheels(names: Collection[str]) -> _Known:
     python = {
         path.name for each in folders if each.is_dir() for path in each.iterdir() if _is_extension(path)
     }
-    return _Known(frozenset(extensions), frozenset(qt), frozenset(python))
+    return _KnownFiles(frozenset(extensions), frozenset(qt), frozenset(python))
 
 
 def _is_extension(path: PurePath) -> bool:
@@ -272,21 +274,21 @@ def _is_extension(path: PurePath) -> bool:
     return path.suffix in {".pyd", ".so"} and not path.name.startswith("lib")
 
 
-def _is_told(path: Path, wheel_names: _Known) -> bool:
+def _is_known_file(path: Path, wheel_names: _KnownFiles) -> bool:
     # True for Studio's programs, known extension modules, Qt's files and the empty FFmpeg libraries.
-    if path.name in _OURS or path.name in wheel_names.extensions or path.name in wheel_names.qt:
+    if path.name in _OWN_PROGRAMS or path.name in wheel_names.extensions or path.name in wheel_names.qt:
         return True
     if path.name in wheel_names.python or (path.name == "Python" and "Python.framework" in path.parts):
         return True
-    return _FILMS.match(path.name) is not None and path.stat().st_size < _EMPTY
+    return _FFMPEG_LIBRARY.match(path.name) is not None and path.stat().st_size < _MAX_EMPTY_LIBRARY_BYTES
 
 
-def _carried(name: str, library: Library) -> Part | None:
+def _part_of_library(name: str, library: Library) -> Part | None:
     # From the table above; None without a licence text.
     if not (library.rights or library.texts):
         return None
     match = re.search(library.version, name) if library.version else None
-    version = match[1] if match else _PYTHON_KNOWS.get(library.of, "")
+    version = match[1] if match else _VERSIONS_IN_PYTHON.get(library.of, "")
     text = own_text(library.rights, *library.texts)
     return Part(library.of, version, library.licence, text, "generic")
 

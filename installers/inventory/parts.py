@@ -22,7 +22,7 @@ __all__ = [
     "Part",
     "Texts",
     "editor_parts",
-    "others",
+    "other_parts",
     "own_text",
     "parts_of",
 ]
@@ -150,7 +150,7 @@ def _texts(distribution: metadata.Distribution) -> Iterator[tuple[str, Path]]:
             yield "-".join(each for each in file.parts[1:] if each != "licenses"), path
 
 
-def others(resources: Path) -> Iterator[Part]:
+def other_parts(resources: Path) -> Iterator[Part]:
     """Yield the parts that aren't Python dependencies.
 
     These are CPython, Qt, PyInstaller's boot loader, npm packages, fonts and icons.

@@ -244,14 +244,14 @@ def _words(build_info: str, line: str) -> list[str]:
     return match[1].split() if match else []
 
 
-def _compiled(distribution: metadata.Distribution) -> Iterator[Path]:
+def _compiled_files(distribution: metadata.Distribution) -> Iterator[Path]:
     for file in distribution.files or ():
         path = Path(str(distribution.locate_file(file)))
         if (file.suffix in COMPILED or ".so." in file.name) and path.is_file():
             yield path
 
 
-def _file(distribution: metadata.Distribution, name: str) -> Texts:
+def _licence_text(distribution: metadata.Distribution, name: str) -> Texts:
     # The topmost file of this name. Raises InventoryError.
     candidates = [
         file for file in distribution.files or () if file.name == name and ".dist-info" in file.parts[0]
@@ -262,8 +262,8 @@ def _file(distribution: metadata.Distribution, name: str) -> Texts:
     return ((name, Path(str(distribution.locate_file(file)))),)
 
 
-def _first(distribution: metadata.Distribution, pattern: bytes) -> str:
-    return next(filter(None, (version_in(path, pattern) for path in _compiled(distribution))), "")
+def _find_version(distribution: metadata.Distribution, pattern: bytes) -> str:
+    return next(filter(None, (version_in(path, pattern) for path in _compiled_files(distribution))), "")
 
 
 def _crates_of(distribution: metadata.Distribution, within: str) -> Iterator[Part]:
@@ -273,8 +273,8 @@ def _crates_of(distribution: metadata.Distribution, within: str) -> Iterator[Par
             yield from parts_of_crates(bill, within)
 
 
-def _in_iceoryx2(distribution: metadata.Distribution) -> Iterator[Part]:
-    crates = {pair for path in _compiled(distribution) for pair in CRATE.findall(path.read_bytes())}
+def _parts_in_iceoryx2(distribution: metadata.Distribution) -> Iterator[Part]:
+    crates = {pair for path in _compiled_files(distribution) for pair in CRATE.findall(path.read_bytes())}
     for name, version in sorted((name.decode(), version.decode()) for name, version in crates):
         if name not in CRATES:
             raise InventoryError(
@@ -283,9 +283,9 @@ def _in_iceoryx2(distribution: metadata.Distribution) -> Iterator[Part]:
         yield Part(name, version, CRATES[name], (), "cargo", "iceoryx2")
 
 
-def _in_numpy(distribution: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_numpy(distribution: metadata.Distribution) -> Iterator[Part]:
     # As listed in its licence: OpenBLAS, LAPACK, GCC's Fortran runtime.
-    text = _file(distribution, "LICENSE.txt")
+    text = _licence_text(distribution, "LICENSE.txt")
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
     components = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
     if "OpenBLAS" not in {name for name, _licence in components}:
@@ -298,19 +298,23 @@ def _in_numpy(distribution: metadata.Distribution) -> Iterator[Part]:
         yield Part(canonicalize_name(name.replace(" ", "-")), version, licence, texts, "generic", "numpy")
 
 
-def _in_opencv(distribution: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_opencv(distribution: metadata.Distribution) -> Iterator[Part]:
     build_info = next(
-        (each[0] for each in (BUILD.search(path.read_bytes()) for path in _compiled(distribution)) if each),
+        (
+            each[0]
+            for each in (BUILD.search(path.read_bytes()) for path in _compiled_files(distribution))
+            if each
+        ),
         b"",
     )
     if not build_info:
         raise InventoryError("OpenCV's library does not tell any more what was built into it")
     yield from parts_of_build(
-        build_info.decode("utf-8", "replace"), _file(distribution, "LICENSE-3RD-PARTY.txt")
+        build_info.decode("utf-8", "replace"), _licence_text(distribution, "LICENSE-3RD-PARTY.txt")
     )
 
 
-def _in_pynng(distribution: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_pynng(distribution: metadata.Distribution) -> Iterator[Part]:
     version = f"{nng.NNG_MAJOR_VERSION}.{nng.NNG_MINOR_VERSION}.{nng.NNG_PATCH_VERSION}"
     rights = (
         "Copyright 2018-2025 Staysail Systems, Inc. <info@staysail.tech>\n"
@@ -319,12 +323,12 @@ def _in_pynng(distribution: metadata.Distribution) -> Iterator[Part]:
         "Copyright 2017 Garrett D'Amore <garrett@damore.org>"
     )
     yield Part("nng", version, "MIT", own_text(rights, "MIT"), "generic", "pynng")
-    mbed = _first(distribution, rb"Mbed TLS (\d+\.\d+\.\d+)")
+    mbed = _find_version(distribution, rb"Mbed TLS (\d+\.\d+\.\d+)")
     text = own_text("Copyright The Mbed TLS Contributors", "Apache-2.0")
     yield Part("mbedtls", mbed, "Apache-2.0 OR GPL-2.0-or-later", text, "generic", "pynng")
 
 
-def _in_pyside(distribution: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_pyside(distribution: metadata.Distribution) -> Iterator[Part]:
     engine = (
         Path(str(distribution.locate_file(each)))
         for each in distribution.files or ()
@@ -336,30 +340,35 @@ def _in_pyside(distribution: metadata.Distribution) -> Iterator[Part]:
     yield Part("chromium", version, "BSD-3-Clause", text, "generic", "qt")
 
 
-def _in_pyzmq(distribution: metadata.Distribution) -> Iterator[Part]:
-    zeromq, sodium = _file(distribution, "LICENSE.zeromq.txt"), _file(distribution, "LICENSE.libsodium.txt")
+def _parts_in_pyzmq(distribution: metadata.Distribution) -> Iterator[Part]:
+    zeromq, sodium = (
+        _licence_text(distribution, "LICENSE.zeromq.txt"),
+        _licence_text(distribution, "LICENSE.libsodium.txt"),
+    )
     yield Part("libzmq", zmq.zmq_version(), "MPL-2.0", zeromq, "generic", "pyzmq")
-    yield Part("libsodium", _first(distribution, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq")
+    yield Part(
+        "libsodium", _find_version(distribution, rb"\0(1\.0\.\d\d)\0"), "ISC", sodium, "generic", "pyzmq"
+    )
 
 
-def _in_lz4(_found: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_lz4(_found: metadata.Distribution) -> Iterator[Part]:
     text = own_text("Copyright (C) 2011-2023, Yann Collet.", "BSD-2-Clause")
     yield Part("lz4-library", lz4.library_version_string(), "BSD-2-Clause", text, "generic", "lz4")
 
 
-def _in_zstandard(_found: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_zstandard(_found: metadata.Distribution) -> Iterator[Part]:
     version = ".".join(map(str, zstandard.ZSTD_VERSION))
     text = own_text("Copyright (c) Meta Platforms, Inc. and affiliates. All rights reserved.", "BSD-3-Clause")
     yield Part("zstd", version, "BSD-3-Clause", text, "generic", "zstandard")
 
 
 _KNOWN: Mapping[str, Callable[[metadata.Distribution], Iterator[Part]]] = {
-    "iceoryx2": _in_iceoryx2,
-    "lz4": _in_lz4,
-    "numpy": _in_numpy,
-    "opencv-python-headless": _in_opencv,
-    "pynng": _in_pynng,
-    "pyside6-addons": _in_pyside,
-    "pyzmq": _in_pyzmq,
-    "zstandard": _in_zstandard,
+    "iceoryx2": _parts_in_iceoryx2,
+    "lz4": _parts_in_lz4,
+    "numpy": _parts_in_numpy,
+    "opencv-python-headless": _parts_in_opencv,
+    "pynng": _parts_in_pynng,
+    "pyside6-addons": _parts_in_pyside,
+    "pyzmq": _parts_in_pyzmq,
+    "zstandard": _parts_in_zstandard,
 }

@@ -17,14 +17,14 @@ from pathlib import Path
 from installers.context import Context, PackageError
 from installers.shared_libraries import remove_dead_links, remove_unneeded, size_of
 
-__all__ = ["FILMS", "leave_out_films"]
+__all__ = ["FFMPEG_LIBRARIES", "remove_ffmpeg"]
 
-FILMS = re.compile(r"lib(?:av(?:codec|format|util)|sw(?:scale|resample))-[0-9a-f]+\.so\.")
+FFMPEG_LIBRARIES = re.compile(r"lib(?:av(?:codec|format|util)|sw(?:scale|resample))-[0-9a-f]+\.so\.")
 _IMPORTED = re.compile(r"\b(FUNC|OBJECT|NOTYPE)\s+\w+\s+\w+\s+UND\s+(\w+)@(\w+)")
 _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 
 
-def leave_out_films(context: Context) -> int:
+def remove_ffmpeg(context: Context) -> int:
     """Replace FFmpeg's libraries by empty ones; return the number of bytes saved.
 
     Raises:
@@ -37,7 +37,7 @@ def leave_out_films(context: Context) -> int:
         raise PackageError(f"'{missing[0]}' is missing; try: apt-get install gcc binutils")
     before = size_of(folder)
     users = [internal / "cv2" / "cv2.abi3.so"]
-    films = [path for path in sorted(folder.iterdir()) if FILMS.match(path.name)]
+    films = [path for path in sorted(folder.iterdir()) if FFMPEG_LIBRARIES.match(path.name)]
     imported = _imported_by(users)
     needed = {name for user in users for name in _needed_by(user)}
     for path in films:
@@ -50,28 +50,28 @@ def leave_out_films(context: Context) -> int:
     return before - size_of(folder)
 
 
-def _read(option: str, path: Path) -> str:
+def _readelf(option: str, path: Path) -> str:
     return subprocess.run(
         ["readelf", "--wide", option, path], capture_output=True, text=True, check=True
     ).stdout
 
 
 def _needed_by(path: Path) -> list[str]:
-    return _NEEDED.findall(_read("--dynamic", path))
+    return _NEEDED.findall(_readelf("--dynamic", path))
 
 
 def _imported_by(paths: Iterable[Path]) -> Mapping[str, set[str]]:
     # By symbol version, such as LIBAVCODEC_62.
     names_by_version: dict[str, set[str]] = {}
     for path in paths:
-        for _kind, name, version in _IMPORTED.findall(_read("--dyn-syms", path)):
+        for _kind, name, version in _IMPORTED.findall(_readelf("--dyn-syms", path)):
             names_by_version.setdefault(version, set()).add(name)
     return names_by_version
 
 
 def _make_empty(context: Context, path: Path, imported: Mapping[str, set[str]]) -> None:
     # A library of the same name whose functions do nothing.
-    versions = re.findall(r"Name: (LIB\w+)", _read("--version-info", path))
+    versions = re.findall(r"Name: (LIB\w+)", _readelf("--version-info", path))
     names_by_version = {version: sorted(imported.get(version, ())) for version in dict.fromkeys(versions)}
     source, script = context.work / "empty.c", context.work / "empty.map"
     names = [name for each in names_by_version.values() for name in each]

@@ -17,7 +17,7 @@ from pathlib import Path
 from installers.context import APP, ROOT, Context, PackageError
 from installers.freeze import add_licences, freeze
 from installers.icon_files import ICON_SIZES, paint_icons
-from installers.linux.film_libraries import leave_out_films
+from installers.linux.film_libraries import remove_ffmpeg
 from installers.linux.system_libraries import libc_needed, system_packages
 
 HERE = Path(__file__).resolve().parent
@@ -49,7 +49,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     if not (keep_frozen and context.frozen.is_dir()):
         freeze(context)
         strip(context)
-        leave_out_films(context)
+        remove_ffmpeg(context)
     bill = add_licences(context, context.frozen, context.frozen)
     add_share(context, context.frozen)
     packages = [debian_package(context), archive(context), bill]
@@ -142,8 +142,8 @@ def debian_package(context: Context) -> Path:
     for name in ("postinst", "prerm"):
         shutil.copyfile(HERE / name, control / name)
         (control / name).chmod(0o755)
-    (control / "md5sums").write_text("".join(_sums(root, control)), "utf-8")
-    _give_one_time(root, context.epoch)
+    (control / "md5sums").write_text("".join(_md5_sums(root, control)), "utf-8")
+    _set_times(root, context.epoch)
     target = context.dist / f"{NAME}_{context.version}_{_architecture(context)}.deb"
     context.run("dpkg-deb", "--root-owner-group", "-Zxz", "-z6", "--threads-max=2", "--build", root, target)
     return target
@@ -160,8 +160,8 @@ def control_file(context: Context, root: Path, control: Path) -> str:
     files = [path for path in root.rglob("*") if path.is_file() and control not in path.parents]
     size = sum(path.lstat().st_size for path in files)
     packages, optional = system_packages(root / PREFIX)
-    needed = [f"libc6 (>= {libc_needed(root)})", *map(_alternatives, packages)]
-    recommended = [*map(_alternatives, optional), *RECOMMENDED]
+    needed = [f"libc6 (>= {libc_needed(root)})", *map(_format_alternatives, packages)]
+    recommended = [*map(_format_alternatives, optional), *RECOMMENDED]
     return (
         f"Package: {NAME}\nVersion: {context.version}\nArchitecture: {_architecture(context)}\n"
         "Maintainer: The NEP Studio authors <nep-studio@localhost>\nSection: science\nPriority: optional\n"
@@ -172,7 +172,7 @@ def control_file(context: Context, root: Path, control: Path) -> str:
     )
 
 
-def _alternatives(entry: str) -> str:
+def _format_alternatives(entry: str) -> str:
     return " | ".join(entry.split("|"))
 
 
@@ -191,13 +191,13 @@ def _set_modes(root: Path) -> None:
             path.chmod(0o755 if is_run else 0o644)
 
 
-def _give_one_time(root: Path, epoch: int) -> None:
+def _set_times(root: Path, epoch: int) -> None:
     # dpkg-deb clamps newer timestamps but keeps older ones.
     for path in [root, *root.rglob("*")]:
         os.utime(path, (epoch, epoch), follow_symlinks=False)
 
 
-def _sums(root: Path, control: Path) -> Iterable[str]:
+def _md5_sums(root: Path, control: Path) -> Iterable[str]:
     files = [path for path in sorted(root.rglob("*")) if path.is_file() and not path.is_symlink()]
     names = [str(path.relative_to(root)) for path in files if control not in path.parents]
     completed = subprocess.run(["md5sum", "--", *names], cwd=root, capture_output=True, text=True, check=True)

@@ -49,9 +49,9 @@ PACKAGES = {
     "libxcb-dri3.so.0": "libxcb-dri3-0",
     "libxcb.so.1": "libxcb1",
 }
-ALWAYS = ("xkb-data",)
+ALWAYS_REQUIRED = ("xkb-data",)
 """Required packages that no library is linked with: keyboard layouts for libxkbcommon."""
-_OF_LIBC = re.compile(r"(?:ld-linux-|lib(?:c|dl|m|pthread|resolv|rt|util)\.so\.)")
+_LIBC_LIBRARY = re.compile(r"(?:ld-linux-|lib(?:c|dl|m|pthread|resolv|rt|util)\.so\.)")
 _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 _GLIBC = re.compile(rb"GLIBC_(\d+)\.(\d+)\b")
 
@@ -67,12 +67,12 @@ def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
     included = {path.name for path in folder.rglob("*") if path.is_file()}
     needed, optional = set[str](), set[str]()
     for path in _binaries(folder):
-        for name in _NEEDED.findall(_read(path)):
-            if name not in included and not _OF_LIBC.match(name):
+        for name in _NEEDED.findall(_readelf(path)):
+            if name not in included and not _LIBC_LIBRARY.match(name):
                 if name not in PACKAGES:
                     raise PackageError(f"'{path.name}' needs '{name}': put it into PACKAGES, or inside")
                 (optional if "plugins" in path.parts else needed).add(PACKAGES[name])
-    return sorted({*needed, *ALWAYS}), sorted(optional - needed)
+    return sorted({*needed, *ALWAYS_REQUIRED}), sorted(optional - needed)
 
 
 def libc_needed(folder: Path) -> str:
@@ -85,7 +85,7 @@ def libc_needed(folder: Path) -> str:
     return "{}.{}".format(*max(versions)) if versions else "2.28"
 
 
-def _read(path: Path) -> str:
+def _readelf(path: Path) -> str:
     command = ["readelf", "--dynamic", "--wide", str(path)]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 

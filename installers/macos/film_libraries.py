@@ -14,24 +14,24 @@ from pathlib import Path
 
 from installers.context import Context, PackageError, this_system
 from installers.macos.information import OLDEST_MACOS
-from installers.macos.layout import compiled
+from installers.macos.layout import binaries
 from installers.macos.mach_o import read
 from installers.shared_libraries import remove_dead_links, remove_unneeded, size_of
 
-__all__ = ["FILMS", "leave_out_films"]
+__all__ = ["FFMPEG_LIBRARIES", "remove_ffmpeg"]
 
-FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)\.")
+FFMPEG_LIBRARIES = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)\.")
 _IMPORTED = re.compile(r"\(undefined\).* external _(\w+) \(from (lib\w+)")
 
 
-def leave_out_films(context: Context, app: Path) -> int:
+def remove_ffmpeg(context: Context, app: Path) -> int:
     """Replace FFmpeg's libraries by empty ones; return the bytes saved, 0 if there are none.
 
     Raises:
         PackageError: A step has failed or the compiler is missing. If FFmpeg remained in the package,
             the whole package would have to be under FFmpeg's licence.
     """
-    films = [path for path in compiled(app) if FILMS.match(path.name)]
+    films = [path for path in binaries(app) if FFMPEG_LIBRARIES.match(path.name)]
     if not films:
         return 0
     folder = films[0].parent

@@ -13,17 +13,17 @@ from app.core.documents.file_format import SUFFIX
 __all__ = [
     "APP_ICON",
     "BUNDLE_ID",
-    "DOCUMENTED",
+    "DOCUMENTED_KEYS",
     "DOCUMENT_ICON",
     "LANGUAGES",
     "OLDEST_MACOS",
     "PROGRAM",
     "apple_version",
+    "documentation_url",
     "information",
-    "sentences",
-    "source_of",
-    "write_information",
-    "write_sentences",
+    "localised_texts",
+    "write_info_plist",
+    "write_localised_texts",
 ]
 
 BUNDLE_ID = "org.nep.studio"
@@ -34,8 +34,8 @@ APP_ICON, DOCUMENT_ICON = "nep-studio.icns", "behaviour.icns"
 LANGUAGES = ("en", "es", "fr", "ja")
 
 _BEHAVIOUR = f"{BUNDLE_ID}.behaviour"
-_BEHAVIOUR_WORDS, _RECORDING_WORDS = "Robot behaviour", "Recording of messages"
-_WORDS: Mapping[str, tuple[str, str, str, str]] = {
+_BEHAVIOUR_TYPE_NAME, _RECORDING_TYPE_NAME = "Robot behaviour", "Recording of messages"
+_LOCALISED_TEXTS: Mapping[str, tuple[str, str, str, str]] = {
     "NSLocalNetworkUsageDescription": (
         "NEP Studio finds robots and their programs on your network and exchanges messages with them.",
         "NEP Studio busca robots y sus programas en tu red e intercambia mensajes con ellos.",
@@ -72,11 +72,11 @@ _WORDS: Mapping[str, tuple[str, str, str, str]] = {
         "NEP Studio ouvre et enregistre vos comportements dans ce dossier.",
         "NEP Studioは、このフォルダーでふるまいを開き、保存します。",
     ),
-    _BEHAVIOUR_WORDS: (
-        _BEHAVIOUR_WORDS, "Comportamiento de robot", "Comportement de robot", "ロボットのふるまい",
+    _BEHAVIOUR_TYPE_NAME: (
+        _BEHAVIOUR_TYPE_NAME, "Comportamiento de robot", "Comportement de robot", "ロボットのふるまい",
     ),
-    _RECORDING_WORDS: (
-        _RECORDING_WORDS, "Grabación de mensajes", "Enregistrement de messages", "メッセージの記録",
+    _RECORDING_TYPE_NAME: (
+        _RECORDING_TYPE_NAME, "Grabación de mensajes", "Enregistrement de messages", "メッセージの記録",
     ),
 }  # fmt: skip
 """Texts shown by macOS in the order of `LANGUAGES`. Document types are keyed by their English names.
@@ -86,13 +86,13 @@ requests access without such a text; with the text but without the entitlement, 
 silently. There is no text for Apple events, because Studio sends none.
 """
 
-_OF_TYPES = frozenset(
+_TYPE_KEYS = frozenset(
     {
         "UTTypeConformsTo", "UTTypeDescription", "UTTypeIconFile", "UTTypeIdentifier",
         "UTTypeTagSpecification",
     }
 )  # fmt: skip
-DOCUMENTED = frozenset(
+DOCUMENTED_KEYS = frozenset(
     {
         "CFBundleDevelopmentRegion", "CFBundleDisplayName", "CFBundleDocumentTypes", "CFBundleExecutable",
         "CFBundleIconFile", "CFBundleIdentifier", "CFBundleInfoDictionaryVersion", "CFBundleLocalizations",
@@ -104,18 +104,18 @@ DOCUMENTED = frozenset(
         "UTExportedTypeDeclarations", "UTImportedTypeDeclarations",
     }
 )  # fmt: skip
-"""Keys of Info.plist that the package uses and Apple documents (`source_of`, as of November 2026)."""
-_DOCUMENTED_WITHIN: Mapping[str, frozenset[str]] = {
+"""Keys of Info.plist that the package uses and Apple documents (`documentation_url`, as of November 2026)."""
+_DOCUMENTED_SUBKEYS: Mapping[str, frozenset[str]] = {
     "CFBundleDocumentTypes": frozenset(
         {
             "CFBundleTypeIconFile", "CFBundleTypeName", "CFBundleTypeRole", "LSHandlerRank",
             "LSItemContentTypes",
         }
     ),
-    "UTExportedTypeDeclarations": _OF_TYPES,
-    "UTImportedTypeDeclarations": _OF_TYPES,
+    "UTExportedTypeDeclarations": _TYPE_KEYS,
+    "UTImportedTypeDeclarations": _TYPE_KEYS,
 }  # fmt: skip
-_PAGES = "https://developer.apple.com/documentation/bundleresources/information-property-list/"
+_DOCUMENTATION_URL = "https://developer.apple.com/documentation/bundleresources/information-property-list/"
 
 
 def apple_version(version: str) -> str:
@@ -129,7 +129,7 @@ def apple_version(version: str) -> str:
     return match.group()
 
 
-def source_of(key: str, within: str = "") -> str:
+def documentation_url(key: str, within: str = "") -> str:
     """Return the URL of Apple's page about a key of Info.plist.
 
     Args:
@@ -139,15 +139,15 @@ def source_of(key: str, within: str = "") -> str:
     Raises:
         KeyError: The key isn't documented.
     """
-    if key not in (_DOCUMENTED_WITHIN[within] if within else DOCUMENTED):
+    if key not in (_DOCUMENTED_SUBKEYS[within] if within else DOCUMENTED_KEYS):
         raise KeyError(key)
-    return _PAGES + "/".join(each.lower() for each in (within, key) if each)
+    return _DOCUMENTATION_URL + "/".join(each.lower() for each in (within, key) if each)
 
 
-def sentences(language: str) -> dict[str, str]:
+def localised_texts(language: str) -> dict[str, str]:
     """Return the texts in one of `LANGUAGES` by their keys in InfoPlist.strings."""
     index = LANGUAGES.index(language)
-    return {key: texts[index] for key, texts in _WORDS.items()}
+    return {key: texts[index] for key, texts in _LOCALISED_TEXTS.items()}
 
 
 def information(version: str, machine: str) -> dict[str, Any]:
@@ -185,10 +185,10 @@ def information(version: str, machine: str) -> dict[str, Any]:
         "NSHighResolutionCapable": True,
         "NSPrincipalClass": "NSApplication",
         "NSSupportsAutomaticGraphicsSwitching": True,
-        **{key: texts[0] for key, texts in _WORDS.items() if key.endswith("UsageDescription")},
+        **{key: texts[0] for key, texts in _LOCALISED_TEXTS.items() if key.endswith("UsageDescription")},
         "CFBundleDocumentTypes": [
             {
-                "CFBundleTypeName": _BEHAVIOUR_WORDS,
+                "CFBundleTypeName": _BEHAVIOUR_TYPE_NAME,
                 "CFBundleTypeRole": "Editor",
                 "CFBundleTypeIconFile": DOCUMENT_ICON,
                 "LSHandlerRank": "Owner",
@@ -198,7 +198,7 @@ def information(version: str, machine: str) -> dict[str, Any]:
         "UTExportedTypeDeclarations": [
             {
                 "UTTypeIdentifier": _BEHAVIOUR,
-                "UTTypeDescription": _BEHAVIOUR_WORDS,
+                "UTTypeDescription": _BEHAVIOUR_TYPE_NAME,
                 "UTTypeIconFile": DOCUMENT_ICON,
                 "UTTypeConformsTo": ["public.json"],
                 "UTTypeTagSpecification": {
@@ -210,7 +210,7 @@ def information(version: str, machine: str) -> dict[str, Any]:
         "UTImportedTypeDeclarations": [
             {
                 "UTTypeIdentifier": f"{BUNDLE_ID}.mcap",
-                "UTTypeDescription": _RECORDING_WORDS,
+                "UTTypeDescription": _RECORDING_TYPE_NAME,
                 "UTTypeConformsTo": ["public.data"],
                 "UTTypeTagSpecification": {"public.filename-extension": ["mcap"]},
             }
@@ -218,15 +218,15 @@ def information(version: str, machine: str) -> dict[str, Any]:
     }
 
 
-def write_information(path: Path, version: str, machine: str) -> Path:
+def write_info_plist(path: Path, version: str, machine: str) -> Path:
     """Write Info.plist to `path` and return the path."""
     path.write_bytes(plistlib.dumps(information(version, machine)))
     return path
 
 
-def write_sentences(resources: Path) -> None:
+def write_localised_texts(resources: Path) -> None:
     """Write InfoPlist.strings for each language into the application's Resources."""
     for language in LANGUAGES:
         folder = resources / f"{language}.lproj"
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "InfoPlist.strings").write_bytes(plistlib.dumps(sentences(language)))
+        (folder / "InfoPlist.strings").write_bytes(plistlib.dumps(localised_texts(language)))

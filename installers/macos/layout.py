@@ -10,15 +10,15 @@ from pathlib import Path
 from installers.macos.information import LANGUAGES, OLDEST_MACOS, information
 from installers.macos.mach_o import read
 
-__all__ = ["BUNDLES", "WEB_PROCESS", "check", "compiled", "is_bundle", "made_for_newer"]
+__all__ = ["BUNDLES", "WEB_PROCESS", "binaries", "binaries_for_newer_macos", "check", "is_bundle"]
 
 BUNDLES = frozenset({".app", ".framework", ".bundle", ".plugin", ".xpc"})
 WEB_PROCESS = "QtWebEngineProcess.app"
-_IN_CONTENTS = frozenset(
+_CONTENTS_ENTRIES = frozenset(
     {"Info.plist", "PkgInfo", "MacOS", "Frameworks", "Resources", "_CodeSignature", "CodeResources"}
 )
 _CODE_FOLDERS = ("MacOS", "Frameworks")
-_OF_MACOS = ("/usr/lib/", "/System/")
+_SYSTEM_FOLDERS = ("/usr/lib/", "/System/")
 _WEB_FILES = ("icudtl.dat", "qtwebengine_resources.pak", "qtwebengine_locales/en-US.pak")
 
 
@@ -27,7 +27,7 @@ def is_bundle(path: Path) -> bool:
     return path.suffix in BUNDLES and path.is_dir() and not path.is_symlink()
 
 
-def compiled(folder: Path) -> Iterator[Path]:
+def binaries(folder: Path) -> Iterator[Path]:
     """Yield all binaries below a folder in sorted order, without following links."""
     return (path for path in _files(folder) if not path.is_symlink() and read(path))
 
@@ -45,7 +45,9 @@ def check(app: Path, version: str, machine: str) -> list[str]:
     """
     contents = app / "Contents"
     problems = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
-    problems += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
+    problems += [
+        f"{name} has no place in Contents" for name in _names(contents) if name not in _CONTENTS_ENTRIES
+    ]
     problems += _check_information(contents, version, machine)
     problems += _check_links(app)
     problems += _check_places(contents)
@@ -53,17 +55,17 @@ def check(app: Path, version: str, machine: str) -> list[str]:
         if is_bundle(framework):
             problems += _check_framework(framework, app)
     problems += _check_web(contents)
-    problems += _check_linked(contents)
-    for path in compiled(contents):
+    problems += _check_linked_libraries(contents)
+    for path in binaries(contents):
         machines = {each.machine for each in read(path)}
         if machine not in machines:
             problems.append(
-                f"{_of(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}"
+                f"{_relative_path(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}"
             )
     return problems
 
 
-def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
+def binaries_for_newer_macos(app: Path, machine: str) -> dict[Path, str]:
     """Return the binaries built for a newer macOS than the application requires, with the version of each.
 
     The older macOS loads such a binary, which fails only when it calls a missing function. Therefore
@@ -74,7 +76,7 @@ def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
         path: max(
             (each.oldest_macos or (0, 0) for each in read(path) if each.machine == machine), default=(0, 0)
         )
-        for path in compiled(app / "Contents")
+        for path in binaries(app / "Contents")
     }
     return {path: f"{wants[0]}.{wants[1]}" for path, wants in min_versions.items() if wants > oldest}
 
@@ -89,7 +91,7 @@ def _names(folder: Path) -> list[str]:
     return sorted(each.name for each in folder.iterdir()) if folder.is_dir() else []
 
 
-def _of(path: Path, app: Path) -> str:
+def _relative_path(path: Path, app: Path) -> str:
     return str(path.relative_to(app))
 
 
@@ -132,55 +134,61 @@ def _check_links(app: Path) -> Iterator[str]:
                 continue
             target = path.readlink()
             if target.is_absolute():
-                yield f"{_of(path, app)} is a link to the absolute '{target}'"
+                yield f"{_relative_path(path, app)} is a link to the absolute '{target}'"
             elif not path.resolve().is_relative_to(root):
-                yield f"{_of(path, app)} leads out of the application"
+                yield f"{_relative_path(path, app)} leads out of the application"
             elif not path.exists():
-                yield f"{_of(path, app)} leads nowhere"
+                yield f"{_relative_path(path, app)} leads nowhere"
 
 
 def _check_places(contents: Path) -> Iterator[str]:
     # Only code belongs into MacOS and Frameworks, whose subfolders must have no dots.
     app = contents.parent
-    for path in compiled(contents / "Resources"):
-        yield f"{_of(path, app)} is code among the resources, which codesign does not sign"
+    for path in binaries(contents / "Resources"):
+        yield f"{_relative_path(path, app)} is code among the resources, which codesign does not sign"
     for name in _CODE_FOLDERS:
         for folder, folders, names in os.walk(contents / name):
             subfolders = [Path(folder, each) for each in folders]
             folders[:] = sorted(path.name for path in subfolders if not is_bundle(path))
             for path in subfolders:
                 if "." in path.name and not path.is_symlink() and not is_bundle(path):
-                    yield f"{_of(path, app)} has a dot in its name, so codesign takes it for a bundle"
+                    yield (
+                        f"{_relative_path(path, app)} has a dot in its name, so codesign takes it for "
+                        "a bundle"
+                    )
             for path in (Path(folder, each) for each in sorted(names)):
                 if not path.is_symlink() and not read(path):
-                    yield f"{_of(path, app)} is no code, so its signature would be lost when it is copied"
+                    yield (
+                        f"{_relative_path(path, app)} is no code, so its signature would be lost when it "
+                        "is copied"
+                    )
 
 
-def _check_linked(contents: Path) -> Iterator[str]:
+def _check_linked_libraries(contents: Path) -> Iterator[str]:
     # Linked libraries must be in the application or part of macOS.
     file_names = {path.name for path in _files(contents)}
-    for path in compiled(contents):
+    for path in binaries(contents):
         for name in dict.fromkeys(name for each in read(path) for name in each.needs):
             if name.startswith("/"):
-                is_available = name.startswith(_OF_MACOS)
+                is_available = name.startswith(_SYSTEM_FOLDERS)
             else:
                 is_available = name.rpartition("/")[2] in file_names
             if not is_available:
-                yield f"{_of(path, contents.parent)} is linked with '{name}', which is not there"
+                yield f"{_relative_path(path, contents.parent)} is linked with '{name}', which is not there"
 
 
 def _check_framework(framework: Path, app: Path) -> Iterator[str]:
     name = framework.stem
     for path in sorted(framework.iterdir()):
         if path.name != "Versions" and not path.is_symlink():
-            yield f"{_of(path, app)} is beside Versions and no link into it"
+            yield f"{_relative_path(path, app)} is beside Versions and no link into it"
     current = framework / "Versions" / "Current"
     if not current.is_symlink():
-        yield f"{_of(framework, app)} has no link Versions/Current"
+        yield f"{_relative_path(framework, app)} has no link Versions/Current"
     elif not (current / name).is_file() or not read(current / name):
-        yield f"{_of(framework, app)} has no library '{name}'"
+        yield f"{_relative_path(framework, app)} has no library '{name}'"
     elif not (current / "Resources" / "Info.plist").is_file():
-        yield f"{_of(framework, app)} has no Resources/Info.plist"
+        yield f"{_relative_path(framework, app)} has no Resources/Info.plist"
 
 
 def _check_web(contents: Path) -> Iterator[str]:
@@ -191,9 +199,9 @@ def _check_web(contents: Path) -> Iterator[str]:
         return
     process = frameworks[0] / "Helpers" / WEB_PROCESS / "Contents" / "MacOS" / "QtWebEngineProcess"
     if not process.is_file() or not read(process):
-        yield f"{_of(frameworks[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
+        yield f"{_relative_path(frameworks[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
     elif not os.access(process, os.X_OK):
-        yield f"{_of(process, contents.parent)} may not be started"
+        yield f"{_relative_path(process, contents.parent)} may not be started"
     for name in _WEB_FILES:
         if not (frameworks[0] / "Resources" / name).is_file():
-            yield f"{_of(frameworks[0], contents.parent)} has no Resources/{name}"
+            yield f"{_relative_path(frameworks[0], contents.parent)} has no Resources/{name}"

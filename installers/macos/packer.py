@@ -11,8 +11,8 @@ from pathlib import Path
 from installers.context import APP, Context, PackageError, this_system
 from installers.freeze import add_licences, freeze
 from installers.macos import disk_image, layout, signing
-from installers.macos.film_libraries import leave_out_films
-from installers.macos.information import APP_ICON, DOCUMENT_ICON, write_information, write_sentences
+from installers.macos.film_libraries import remove_ffmpeg
+from installers.macos.information import APP_ICON, DOCUMENT_ICON, write_info_plist, write_localised_texts
 
 __all__ = ["application", "build", "finish", "pack", "prepare"]
 
@@ -36,7 +36,7 @@ def prepare(context: Context) -> Mapping[str, str]:
     pictures = _pictures(context)
     pictures.mkdir(parents=True, exist_ok=True)
     context.run(*context.python, "-m", "installers.macos.pictures", pictures)
-    information = write_information(context.work / "Info.plist", context.version, context.machine)
+    information = write_info_plist(context.work / "Info.plist", context.version, context.machine)
     return {
         "NEP_PACKAGE_ICON": str(pictures / APP_ICON),
         "NEP_PACKAGE_INFO_PLIST": str(information),
@@ -79,7 +79,7 @@ def pack(
     app = application(context)
     if not (keep_frozen and app.is_dir()):
         freeze(context)
-        leave_out_films(context, app)
+        remove_ffmpeg(context, app)
     context.dist.mkdir(parents=True, exist_ok=True)
     bill = add_licences(context, app, app / "Contents" / "Resources")
     finish(context, app, identity)
@@ -105,27 +105,31 @@ def finish(context: Context, app: Path, identity: signing.Identity) -> None:
         raise PackageError(f"the frozen application is not in '{app}'")
     resources = app / "Contents" / "Resources"
     shutil.copyfile(_pictures(context) / DOCUMENT_ICON, resources / DOCUMENT_ICON)
-    write_sentences(resources)
+    write_localised_texts(resources)
     if problems := layout.check(app, context.version, context.machine):
         raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(problems))
-    newer = layout.made_for_newer(app, context.machine)
+    newer = layout.binaries_for_newer_macos(app, context.machine)
     if newer:
-        _say(f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS")
+        _print_step(
+            f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS"
+        )
     signing.sign(context, app, identity)
     signing.verify(context, app)
     if identity.notary:
         signing.notarise(context, app, identity)
         signing.assess(context, app)
     elif identity.is_known:
-        _say("notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)")
+        _print_step("notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)")
     else:
-        _say("signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)")
+        _print_step(
+            "signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)"
+        )
 
 
 def _pictures(context: Context) -> Path:
     return context.work / "pictures"
 
 
-def _say(line: str) -> None:
+def _print_step(line: str) -> None:
     sys.stdout.write(f"· {line}\n")
     sys.stdout.flush()

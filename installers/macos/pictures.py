@@ -66,7 +66,7 @@ def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:
     painter.drawPolyline(QPolygonF(tip))
 
 
-def _painted(width: int, height: int, paint: Paint, size: float, theme: Theme) -> QImage:
+def _paint_image(width: int, height: int, paint: Paint, size: float, theme: Theme) -> QImage:
     image = QImage(width, height, QImage.Format.Format_ARGB32)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
@@ -76,7 +76,7 @@ def _painted(width: int, height: int, paint: Paint, size: float, theme: Theme) -
     return image
 
 
-def _argb(image: QImage) -> bytes:
+def _encode_argb(image: QImage) -> bytes:
     # Channels alpha, red, green, blue in runs, each preceded by its length minus one.
     converted = image.convertToFormat(QImage.Format.Format_RGBA8888)  # must outlive its bits
     pixels = bytes(converted.constBits())
@@ -89,7 +89,7 @@ def _argb(image: QImage) -> bytes:
     return bytes(encoded)
 
 
-def _png(image: QImage) -> bytes:
+def _encode_png(image: QImage) -> bytes:
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     # The stubs of PySide require str, the method itself bytes.
@@ -107,8 +107,8 @@ def icns(paint: Paint, theme: Theme) -> bytes:
     """
     pieces = []
     for kind, side in SIDES.items():
-        image = _painted(side, side, paint, side, theme)
-        content = _argb(image) if kind in _RAW else _png(image)
+        image = _paint_image(side, side, paint, side, theme)
+        content = _encode_argb(image) if kind in _RAW else _encode_png(image)
         pieces.append(kind + struct.pack(">I", len(content) + 8) + content)
     body = b"".join(pieces)
     return b"icns" + struct.pack(">I", len(body) + 8) + body
@@ -122,8 +122,8 @@ def write_pictures(folder: Path) -> None:
     (folder / DOCUMENT_ICON).write_bytes(icns(paint_document, theme))
     width, height = WINDOW
     for scale, name in ((1, BACKGROUND), (2, BACKGROUND.replace(".", "@2x."))):
-        picture = _painted(width * scale, height * scale, paint_background, scale, theme)
-        (folder / name).write_bytes(_png(picture))
+        picture = _paint_image(width * scale, height * scale, paint_background, scale, theme)
+        (folder / name).write_bytes(_encode_png(picture))
     theme.deleteLater()
 
 

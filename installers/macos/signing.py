@@ -19,7 +19,7 @@ from pathlib import Path
 
 from installers.context import Context, PackageError
 from installers.macos import entitlements
-from installers.macos.layout import WEB_PROCESS, compiled, is_bundle
+from installers.macos.layout import WEB_PROCESS, binaries, is_bundle
 from installers.macos.mach_o import read
 
 __all__ = [
@@ -37,7 +37,7 @@ __all__ = [
 
 AD_HOC = "-"
 """Ad hoc identity of codesign: the minimum for a program to start on Apple silicon."""
-_AT_ONCE = 50
+_MAX_PATHS_PER_COMMAND = 50
 _KEY_PARTS = ("NEP_MACOS_NOTARY_KEY", "NEP_MACOS_NOTARY_KEY_ID", "NEP_MACOS_NOTARY_ISSUER")
 
 
@@ -60,7 +60,7 @@ class Piece:
     """File or bundle that is signed separately."""
 
     path: Path
-    allowed: str = ""
+    entitlements_kind: str = ""
     """Entitlements: "studio", "web", or "" for none."""
 
 
@@ -93,16 +93,18 @@ def pieces(app: Path) -> list[Piece]:
     """Return all files and bundles to be signed; the contents of a bundle come before the bundle."""
     programs = {app / "Contents" / "MacOS"}
     bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
-    mains = {_main(bundle) for bundle in (app, *bundles)}
+    mains = {_main_binary(bundle) for bundle in (app, *bundles)}
     inner_pieces = [
         Piece(path, "studio" if path.parent in programs and _is_program(path) else "")
-        for path in compiled(app)
+        for path in binaries(app)
         if path not in mains
     ]
     inner_pieces += [
-        Piece(_signed(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles
+        Piece(_signed_path(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles
     ]
-    inner_pieces.sort(key=lambda piece: (-len(piece.path.parts), bool(piece.allowed), str(piece.path)))
+    inner_pieces.sort(
+        key=lambda piece: (-len(piece.path.parts), bool(piece.entitlements_kind), str(piece.path))
+    )
     return [*inner_pieces, Piece(app, "studio")]
 
 
@@ -117,11 +119,16 @@ def sign(context: Context, app: Path, identity: Identity) -> None:
         "studio": entitlements.write(context.work / "studio.entitlements", entitlements.STUDIO),
         "web": entitlements.write(context.work / "web-process.entitlements", entitlements.WEB_PROCESS),
     }
-    for kind, group in itertools.groupby(pieces(app), lambda piece: piece.allowed):
+    for kind, group in itertools.groupby(pieces(app), lambda piece: piece.entitlements_kind):
         extra = ("--entitlements", str(allowed[kind])) if kind else ()
         paths = [piece.path for piece in group]
-        for start in range(0, len(paths), _AT_ONCE):
-            context.run("codesign", *_how(identity), *extra, *paths[start : start + _AT_ONCE])
+        for start in range(0, len(paths), _MAX_PATHS_PER_COMMAND):
+            context.run(
+                "codesign",
+                *_codesign_options(identity),
+                *extra,
+                *paths[start : start + _MAX_PATHS_PER_COMMAND],
+            )
 
 
 def sign_image(context: Context, image: Path, identity: Identity) -> None:
@@ -142,13 +149,13 @@ def notarise(context: Context, path: Path, identity: Identity) -> None:
         sent = context.work / f"{path.stem}.zip"
         context.run("ditto", "-c", "-k", "--keepParent", path, sent)
     submit = ("xcrun", "notarytool", "submit", str(sent), *identity.notary)
-    output = _asked(context, *submit, "--wait", "--output-format", "json")
+    output = _output_of(context, *submit, "--wait", "--output-format", "json")
     try:
         result = json.loads(output)
     except ValueError:
         raise PackageError(f"notarytool answered what can't be read: {output.strip()}") from None
     if result.get("status") != "Accepted":
-        log = _asked(context, "xcrun", "notarytool", "log", str(result.get("id", "")), *identity.notary)
+        log = _output_of(context, "xcrun", "notarytool", "log", str(result.get("id", "")), *identity.notary)
         raise PackageError(f"Apple did not notarise '{path.name}' ({result.get('status')}): {log.strip()}")
     context.run("xcrun", "stapler", "staple", path)
     context.run("xcrun", "stapler", "validate", path)
@@ -165,13 +172,13 @@ def assess(context: Context, path: Path) -> None:
     context.run("spctl", "--assess", "--type", *how, "--verbose=2", path)
 
 
-def _how(identity: Identity) -> Iterator[str]:
+def _codesign_options(identity: Identity) -> Iterator[str]:
     yield from ("--force", "--sign", identity.name)
     # The hardened runtime's library validation rejects ad hoc signatures.
     yield from ("--options", "runtime", "--timestamp") if identity.is_known else ("--timestamp=none",)
 
 
-def _asked(context: Context, *command: str) -> str:
+def _output_of(context: Context, *command: str) -> str:
     try:
         completed = subprocess.run(
             command, cwd=context.root, env=dict(context.environ), capture_output=True, text=True, check=False
@@ -189,10 +196,10 @@ def _is_program(path: Path) -> bool:
     return any(each.is_program for each in read(path))
 
 
-def _main(bundle: Path) -> Path:
+def _main_binary(bundle: Path) -> Path:
     # The executable or library whose signature is that of the bundle.
     if bundle.suffix == ".framework":
-        return _signed(bundle) / bundle.stem
+        return _signed_path(bundle) / bundle.stem
     try:
         info = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
     except (OSError, ValueError, plistlib.InvalidFileException) as error:
@@ -200,7 +207,7 @@ def _main(bundle: Path) -> Path:
     return bundle / "Contents" / "MacOS" / str(info.get("CFBundleExecutable", bundle.stem))
 
 
-def _signed(bundle: Path) -> Path:
+def _signed_path(bundle: Path) -> Path:
     # codesign expects the version folder of a framework.
     versions = bundle / "Versions"
     return versions / (versions / "Current").readlink() if bundle.suffix == ".framework" else bundle

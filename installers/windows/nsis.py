@@ -12,7 +12,7 @@ from pathlib import Path, PurePath, PureWindowsPath
 from installers.context import Context, PackageError
 from installers.windows.version import COPYRIGHT, PUBLISHER, version_numbers
 
-__all__ = ["association", "entries", "make_setup"]
+__all__ = ["association_macros", "entry_macros", "make_setup"]
 
 HERE = Path(__file__).resolve().parent
 SOURCES = HERE / "setup"
@@ -24,7 +24,7 @@ PROGRAMS = ("nep-studio.exe", "nep.exe")
 UNINSTALLER = "uninstall.exe"
 BEHAVIOUR_ICON = "nep-behaviour.ico"
 """Name of the icon file of .nepb files; the .reg file refers to it."""
-ROOM_MB = 100
+EXTRA_SPACE_MB = 100
 """Free disk space in MB that is required in addition to the files, for settings and normal operation."""
 
 
@@ -40,7 +40,7 @@ def quoted(text: str | PurePath, folder: str = "") -> str:
     return f'"{folder}\\{escaped}"' if folder else f'"{escaped}"'
 
 
-def entries(frozen: Path) -> str:
+def entry_macros(frozen: Path) -> str:
     """Return the NSIS macros that unpack the frozen program and list the entries of its top folder.
 
     Files are sorted for reproducibility, and by type because similar files compress better.
@@ -68,7 +68,7 @@ def _files(frozen: Path) -> Iterator[Path]:
     return (path for path in frozen.rglob("*") if path.is_file())
 
 
-def association(reg_file: str) -> str:
+def association_macros(reg_file: str) -> str:
     """Return the macros that register and unregister the .nepb file type, from the text of a .reg file.
 
     The key of a file extension may contain values of other programs, so only Studio's values are
@@ -130,8 +130,8 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
     folder = context.work / "setup"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "entries.nsh").write_text(entries(context.frozen), "utf-8")
-    (folder / "association.nsh").write_text(association(REG_FILE.read_text("utf-8")), "utf-8")
+    (folder / "entries.nsh").write_text(entry_macros(context.frozen), "utf-8")
+    (folder / "association.nsh").write_text(association_macros(REG_FILE.read_text("utf-8")), "utf-8")
     target = context.dist / f"NEP-Studio-{context.version}-setup.exe"
     target.parent.mkdir(exist_ok=True)
     for path in (icon, picture):  # the installer preserves their timestamps
@@ -147,7 +147,7 @@ def make_setup(context: Context, icon: Path, picture: Path) -> Path:
         "ICON": icon,
         "PICTURE": picture,
         "SIZE_KB": size_kb,
-        "NEEDED_MB": size_kb // 1024 + ROOM_MB,
+        "NEEDED_MB": size_kb // 1024 + EXTRA_SPACE_MB,
     }
     makensis = _makensis()
     option = "/" if sys.platform == "win32" else "-"

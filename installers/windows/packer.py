@@ -21,10 +21,10 @@ from installers.windows.icon import write_icon
 from installers.windows.nsis import BEHAVIOUR_ICON, make_setup
 from installers.windows.version import version_resource
 
-__all__ = ["build", "make_zip", "refuse_files_of_wine"]
+__all__ = ["build", "make_zip", "reject_wine_files"]
 
-OF_WINE = (b"Wine builtin DLL", b"Wine placeholder DLL")
-EARLIEST = 315_532_800
+WINE_SIGNATURES = (b"Wine builtin DLL", b"Wine placeholder DLL")
+MIN_ZIP_TIME = 315_532_800
 """Earliest timestamp of a zip entry, 1 January 1980, in seconds since 1970."""
 
 
@@ -54,29 +54,31 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
         freeze(context)
     write_icon(painted, "nep-behaviour", context.frozen / BEHAVIOUR_ICON)
     bill = add_licences(context, context.frozen, context.frozen)
-    refuse_files_of_wine(context.frozen)
-    give_one_time(context.frozen, context.epoch)
+    reject_wine_files(context.frozen)
+    set_timestamps(context.frozen, context.epoch)
     return [make_setup(context, icon, picture), make_zip(context), bill]
 
 
-def refuse_files_of_wine(frozen: Path) -> None:
+def reject_wine_files(frozen: Path) -> None:
     """Raise `PackageError` if the package contains libraries of Wine.
 
     Windows would load these libraries instead of its own.
     """
     names = [
-        path.name for path in _files(frozen) if path.suffix.lower() in {".dll", ".exe"} and _is_of_wine(path)
+        path.name
+        for path in _files(frozen)
+        if path.suffix.lower() in {".dll", ".exe"} and _is_wine_file(path)
     ]
     if names:
         raise PackageError(f"the package would hold files of Wine: {', '.join(sorted(names))}")
 
 
-def _is_of_wine(path: Path) -> bool:
+def _is_wine_file(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(0x80)[0x40:].startswith(OF_WINE)
+        return file.read(0x80)[0x40:].startswith(WINE_SIGNATURES)
 
 
-def give_one_time(frozen: Path, epoch: int) -> None:
+def set_timestamps(frozen: Path, epoch: int) -> None:
     """Set the timestamp of all files to `epoch` (seconds since 1970), so that packages are reproducible."""
     for path in _files(frozen):
         os.utime(path, (epoch, epoch))
@@ -90,7 +92,7 @@ def make_zip(context: Context) -> Path:
     """Create the zip of the frozen Studio, with sorted entries and a single timestamp."""
     target = context.dist / f"NEP-Studio-{context.version}-windows-x64.zip"
     target.parent.mkdir(exist_ok=True)
-    moment = datetime.fromtimestamp(max(context.epoch, EARLIEST), timezone.utc).timetuple()[:6]
+    moment = datetime.fromtimestamp(max(context.epoch, MIN_ZIP_TIME), timezone.utc).timetuple()[:6]
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for path in _files(context.frozen):
             entry = zipfile.ZipInfo(f"{APP}/{path.relative_to(context.frozen).as_posix()}", moment)

@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 
 from installers.context import Context, PackageError
 
-__all__ = ["for_windows", "make_prefix", "windows_python"]
+__all__ = ["make_prefix", "windows_python", "windows_requirements"]
 
 HERE = Path(__file__).resolve().parent
 PYTHON = "3.11"
@@ -48,7 +48,7 @@ wine '{python}' "$@" 2>&1 | cat
 """
 
 
-def for_windows(lines: Iterable[str]) -> list[str]:
+def windows_requirements(lines: Iterable[str]) -> list[str]:
     """Return the pinned requirements that apply to Windows, without environment markers.
 
     pip evaluates markers for the computer that it runs on, even with ``--platform``.
@@ -87,9 +87,9 @@ def windows_python(context: Context) -> tuple[str]:
     if not (launcher.exists() and stamp.exists() and stamp.read_text("utf-8") == made_of):
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        _bring_python(context, folder)
+        _install_python(context, folder)
         make_prefix(folder / "prefix", folder / "ucrtbase.dll", context.environ)
-        _bring_packages(context, folder)
+        _install_packages(context, folder)
         python = folder / "python" / "python.exe"
         launcher.write_text(LAUNCHER.format(prefix=folder / "prefix", python=python), "utf-8")
         launcher.chmod(0o755)
@@ -115,20 +115,20 @@ def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> Non
         "WINEDEBUG": "-all",
         "WINEDLLOVERRIDES": "mscoree,mshtml=",
     }
-    _do(environ, "wineboot", "--init")
+    _run(environ, "wineboot", "--init")
     system = prefix / "drive_c" / "windows" / "system32"
     for source in sorted((HERE / "wine_dlls").glob("*.c")):
         target = system / f"{source.stem}.dll"
-        _do(environ, "x86_64-w64-mingw32-gcc", "-shared", "-s", "-o", target, source, "-ladvapi32")
+        _run(environ, "x86_64-w64-mingw32-gcc", "-shared", "-s", "-o", target, source, "-ladvapi32")
     shutil.copyfile(ucrtbase, system / "ucrtbase.dll")
     key = r"HKCU\Software\Wine"
-    _do(environ, "wine", "reg", "add", key, "/v", "Version", "/d", "win10", "/f")
+    _run(environ, "wine", "reg", "add", key, "/v", "Version", "/d", "win10", "/f")
     for name, how in OVERRIDES.items():
-        _do(environ, "wine", "reg", "add", rf"{key}\DllOverrides", "/v", name, "/d", how, "/f")
-    _do(environ, "wineserver", "--wait")  # which saves the registry
+        _run(environ, "wine", "reg", "add", rf"{key}\DllOverrides", "/v", name, "/d", how, "/f")
+    _run(environ, "wineserver", "--wait")  # which saves the registry
 
 
-def _do(environ: Mapping[str, str], *command: str | Path) -> None:
+def _run(environ: Mapping[str, str], *command: str | Path) -> None:
     arguments = [str(each) for each in command]
     # Use a file instead of a pipe: Wine's services keep the pipe of its output open.
     with TemporaryDirectory() as folder:
@@ -150,7 +150,7 @@ def _digest(context: Context) -> str:
     return digest.hexdigest()
 
 
-def _bring_python(context: Context, folder: Path) -> None:
+def _install_python(context: Context, folder: Path) -> None:
     # Extracts Python for Windows to folder/python, with Microsoft's C library.
     brought = folder / "brought"
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
@@ -188,10 +188,10 @@ def _pip_install(context: Context, folder: Path, *arguments: str | Path) -> None
     )  # fmt: skip
 
 
-def _bring_packages(context: Context, folder: Path) -> None:
+def _install_packages(context: Context, folder: Path) -> None:
     pinned = (context.root / "requirements" / "package.txt").read_text("utf-8").splitlines()
     requirements = folder / "requirements.txt"
-    requirements.write_text("\n".join(for_windows(pinned)) + "\n", "utf-8")
+    requirements.write_text("\n".join(windows_requirements(pinned)) + "\n", "utf-8")
     _pip_install(context, folder, "--require-hashes", "-r", requirements)
 
 

@@ -49,7 +49,7 @@ class DecodedCall(NamedTuple):
     timeout_s: float | None
 
 
-class CallBody(Protocol):
+class BodyCodec(Protocol):
     """Codec for a request or response body, which converts between maps and bytes."""
 
     def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - any payload
@@ -72,8 +72,8 @@ class TypedService:
     """
 
     name: str
-    request: CallBody
-    response: CallBody
+    request: BodyCodec
+    response: BodyCodec
     is_nep: bool = False
 
     # ---- for clients

@@ -29,7 +29,7 @@ def main() -> None:
 def _run() -> int:
     from nep.cli import interrupts  # noqa: PLC0415 - see `main`
     from nep.i18n import set_initial_language  # noqa: PLC0415
-    from nep.system.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
+    from nep.system.streams import buffer_output, flush_streams, prepare_streams  # noqa: PLC0415
 
     prepare_streams()
     buffer_output()
@@ -42,4 +42,4 @@ def _run() -> int:
         return run()
     finally:
         interrupts.exit_on_interrupt()
-        close_streams()
+        flush_streams()

@@ -41,14 +41,14 @@ class AlertPrinter:
 
     def __init__(self, out: Terminal) -> None:
         self._out = out
-        self._changes = AlertTracker()
+        self._tracker = AlertTracker()
 
     def start(self, _master: Master) -> None:
         """Do nothing; alerts are printed from the first graph change on."""
 
     def changed(self, view: GraphView) -> None:
         """Print the alerts that are new, changed or resolved in `view`."""
-        new, resolved = self._changes.update(view)
+        new, resolved = self._tracker.update(view)
         for alert in resolved:
             text = escaped(_("resolved: {sentence}").format(sentence=alert.sentence))
             console(out=self._out).print(text, style="green", markup=False)
@@ -65,7 +65,7 @@ class AlertLog:
     """
 
     def __init__(self) -> None:
-        self._changes = AlertTracker()
+        self._tracker = AlertTracker()
         self._node: Node | None = None
 
     def start(self, master: Master) -> None:
@@ -78,7 +78,7 @@ class AlertLog:
         """Log the alerts that are new, changed or resolved in `view`."""
         if self._node is None:
             return
-        new, resolved = self._changes.update(view)
+        new, resolved = self._tracker.update(view)
         for alert in resolved:
             self._node.log.info("resolved: %s", alert.sentence)
         for alert in new:

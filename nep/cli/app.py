@@ -168,7 +168,7 @@ def run() -> int:
     """
     raised: OSError | None = None
     try:
-        code = _exit_code()
+        code = _run_root_command()
     except NepError as error:
         print_error_message(str(error))
         code = 1
@@ -187,7 +187,7 @@ def _root_command() -> Callable[[list[str]], object]:
     return get_command(app)
 
 
-def _exit_code() -> int:
+def _run_root_command() -> int:
     try:
         _root_command()(command_line_arguments())
     except SystemExit as exit_:

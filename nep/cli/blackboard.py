@@ -11,7 +11,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.options import JsonOption, MasterOption, check_duration
-from nep.cli.screen import UNKNOWN, TextColumn, duration, print_status, show_json, show_table
+from nep.cli.screen import UNKNOWN, TextColumn, format_rounded_duration, print_status, show_json, show_table
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import format_payload
 from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
@@ -206,4 +206,4 @@ def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
 
 
 def _format_age(age_s: float) -> str:
-    return f"{age_s:.1f} s" if age_s < 10 else duration(age_s)
+    return f"{age_s:.1f} s" if age_s < 10 else format_rounded_duration(age_s)

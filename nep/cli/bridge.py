@@ -358,20 +358,20 @@ class _LiveReport(_Report):
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
         super().__init__(running)
-        self._notes = notes
+        self._warning_handler = notes
         out = console()
         out.soft_wrap = False
         self._live = Live(console=out, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
 
     def start(self) -> None:
         self._live.start()
-        self._notes.buffered = deque(maxlen=_MAX_WARNINGS)
+        self._warning_handler.buffered = deque(maxlen=_MAX_WARNINGS)
         self.show()
 
     def show(self) -> None:
         from rich.text import Text  # noqa: PLC0415 - see above
 
-        for note in self._notes.pop_all():
+        for note in self._warning_handler.pop_all():
             self._live.console.print(Text(escaped(note), "yellow"))
         self._live.update(self._table(), refresh=True)
 
@@ -380,7 +380,7 @@ class _LiveReport(_Report):
             self.show()
         finally:
             self._live.stop()
-            self._notes.buffered = None
+            self._warning_handler.buffered = None
 
     def _table(self) -> RenderableType:
         from rich import box  # noqa: PLC0415 - see above

@@ -22,10 +22,10 @@ from nep.cli.screen import (
     UNKNOWN,
     console,
     display_width,
+    format_size,
     json_highlighter,
     print_status,
     show_json,
-    size,
     write,
 )
 from nep.cli.table_file import CsvMessageWriter, FieldExtractor
@@ -321,7 +321,7 @@ def _format_body(message: Message, room: int, *, in_full: bool) -> str:
         payload = message.payload
     except DecodeError as error:
         text = _("{size_bytes}, not valid {codec}: {hexadecimal} ({reason})").format(
-            size_bytes=size(message.size_bytes),
+            size_bytes=format_size(message.size_bytes),
             codec=message.codec,
             hexadecimal=_format_hexadecimal(message.data),
             reason=error.reason,
@@ -330,7 +330,7 @@ def _format_body(message: Message, room: int, *, in_full: bool) -> str:
     if isinstance(payload, str):
         return escape_for_terminal(payload if in_full else shortened(payload, _MAX_SHOWN_CHARACTERS))
     if isinstance(payload, bytes):
-        return f"{size(len(payload))}: {_format_hexadecimal(payload)}"
+        return f"{format_size(len(payload))}: {_format_hexadecimal(payload)}"
     # re-encoding decoded JSON is 100 times faster than formatting each value
     is_exact = in_full and message.codec == "json" and not _has_nan(message.data)
     line = encode_json(payload).decode() if is_exact else format_payload(payload, in_full=in_full)
@@ -361,5 +361,5 @@ def _image_summary(message: Message) -> str:
         and len(shape) >= 2
         and all(isinstance(side, int) for side in shape[:2])
     ):
-        return f"{encoding} {shape[1]} x {shape[0]}, {size(message.size_bytes)}"
-    return f"{encoding}, {size(message.size_bytes)}"
+        return f"{encoding} {shape[1]} x {shape[0]}, {format_size(message.size_bytes)}"
+    return f"{encoding}, {format_size(message.size_bytes)}"

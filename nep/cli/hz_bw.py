@@ -16,7 +16,16 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.rate_window import Bandwidth, Delay, Frequency, LatchedFilter, LatencyWindow, RateWindow
-from nep.cli.screen import UNKNOWN, display_width, format_rate, padded, print_status, show_json, size, write
+from nep.cli.screen import (
+    UNKNOWN,
+    display_width,
+    format_rate,
+    format_size,
+    padded,
+    print_status,
+    show_json,
+    write,
+)
 from nep.cli.topic_wait import TopicMonitor
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, format_list, lazy
@@ -238,16 +247,16 @@ class _DelayReport(_Report):
             lazy("lost"),
         )
         super().__init__(topics, window_s, headings, self._delay_cells)
-        self._ages = {topic: LatencyWindow(window_s) for topic in topics}
-        self._windows = self._ages
+        self._latency_windows = {topic: LatencyWindow(window_s) for topic in topics}
+        self._windows = self._latency_windows
         self._unstamped: set[str] = set()
         self._uncompared: dict[str, int] = {}
         """Number of reports for each topic whose publisher's clock is not compared yet."""
 
     def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
-        window = self._ages[topic]
+        window = self._latency_windows[topic]
 
-        def on_messages(message: Message) -> None:
+        def on_message(message: Message) -> None:
             age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
             window.add_latency(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
             if age_s is None and topic not in self._unstamped:
@@ -258,7 +267,7 @@ class _DelayReport(_Report):
                     )
                 )
 
-        return node.new_callback(topic, msg_type, on_messages, with_message=True)
+        return node.new_callback(topic, msg_type, on_message, with_message=True)
 
     def _wait(self, node: Node, seconds: float) -> None:
         node.spin(seconds)
@@ -284,7 +293,7 @@ class _DelayReport(_Report):
 
     def _show(self, topic: str) -> None:
         super()._show(topic)
-        latency = self._ages[topic].delay(time.monotonic())
+        latency = self._latency_windows[topic].delay(time.monotonic())
         is_compared = latency is None or latency.uncertainty_s is not None
         if is_compared:
             self._uncompared.pop(topic, None)
@@ -312,8 +321,8 @@ def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Se
     bandwidth = window.bandwidth(now)
     if bandwidth is None:
         return None, (UNKNOWN,) * 4
-    sizes = (size(each) for each in (bandwidth.mean_bytes, bandwidth.min_bytes, bandwidth.max_bytes))
-    return bandwidth, (size(bandwidth.bandwidth_Bps, "/s"), *sizes)
+    sizes = (format_size(each) for each in (bandwidth.mean_bytes, bandwidth.min_bytes, bandwidth.max_bytes))
+    return bandwidth, (format_size(bandwidth.bandwidth_Bps, "/s"), *sizes)
 
 
 def format_latency(seconds: float, uncertainty_s: float | None) -> str:

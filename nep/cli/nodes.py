@@ -14,7 +14,7 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    duration,
+    format_rounded_duration,
     print_status,
     show_alerts,
     show_json,
@@ -161,7 +161,7 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
         escaped(node.language) or UNKNOWN,
         escaped(_(wire) if (wire := _WIRE_NAMES.get(node.generation)) else node.generation),
         str(node.pid) if node.pid is not None else UNKNOWN,
-        duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
+        format_rounded_duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
         "\n".join(map(escaped, topics["publishes"])) or UNKNOWN,
         "\n".join(map(escaped, topics["subscribes"])) or UNKNOWN,

@@ -114,7 +114,7 @@ def play(
                 template = ngettext("published {count} message", "published {count} messages", sender.count)
                 print_status(template.format(count=sender.count))
         exit_if_damaged(recording)
-        if limits.was_named_blocked:
+        if limits.was_named_topic_blocked:
             raise typer.Exit(1)
 
 
@@ -141,7 +141,7 @@ class _MotionPermissions:
     ) -> None:
         self.names = names
         self.guard: MotionGuard | None = None
-        self.was_named_blocked = False
+        self.was_named_topic_blocked = False
         self._topics = recording.topics
         self._recorded = player.moving_topics(recording)
         self._allowed, self._armed = allowed, armed
@@ -179,7 +179,7 @@ class _MotionPermissions:
                 blocked[name] = reason
                 if name not in before:
                     print_status(_("not published: {reason}").format(reason=reason))
-                    self.was_named_blocked |= recorded in self._named_topics
+                    self.was_named_topic_blocked |= recorded in self._named_topics
         return blocked
 
     def _block_reason(self, recorded: str) -> str:
@@ -233,7 +233,7 @@ class _Sender:
     def __init__(
         self, node: Node, recording: reader.Recording, selected: Sequence[str], limits: _MotionPermissions
     ) -> None:
-        self.limits, names = limits, limits.names
+        self.permissions, names = limits, limits.names
         self._opened = ExitStack()
         self._subscriber_counts: dict[Publisher, int] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
@@ -258,14 +258,14 @@ class _Sender:
             if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
                 self._subscriber_counts[publisher] = subscriber_count
                 self.poll_guard()
-            if not self.limits.allows(message.topic):
+            if not self.permissions.allows(message.topic):
                 continue
             publisher.publish_bytes(bytes(message.data), dict(message.extension) or None)
             self.count += 1
 
     def poll_guard(self) -> None:
-        if self.limits.guard is not None:
-            self.limits.guard.poll()
+        if self.permissions.guard is not None:
+            self.permissions.guard.poll()
 
     def __enter__(self) -> Self:
         return self

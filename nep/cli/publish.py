@@ -20,7 +20,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.json_input import decode_text, parse_json
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import MasterOption
-from nep.cli.screen import print_status, size
+from nep.cli.screen import format_size, print_status
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for
@@ -245,7 +245,7 @@ def read_file(file: Path, msg_type: str) -> bytes:
             msg_type,
             "file",
             _("'{file}' is larger than {most}, the maximum message size").format(
-                file=shown_path, most=size(_MAX_FILE_BYTES)
+                file=shown_path, most=format_size(_MAX_FILE_BYTES)
             ),
         )
     return data

@@ -17,7 +17,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.recording_files import TopicsToRecordArgument, clock_text
-from nep.cli.screen import console, print_status, show_json, size
+from nep.cli.screen import console, format_size, print_status, show_json
 from nep.errors import RecordingError
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
@@ -188,7 +188,7 @@ def _status_line(status: writer.RecordingStatus) -> str:
     return _("{time}  {messages} messages, {size}, {lost} lost, {unkept} write errors").format(
         time=clock_text(status.duration_s),
         messages=status.message_count,
-        size=size(status.size_bytes),
+        size=format_size(status.size_bytes),
         lost=lost,
         unkept=status.unkept,
     )
@@ -206,7 +206,7 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
             count=status.message_count,
             topics=topics.format(count=len(status.topics)),
             time=clock_text(status.duration_s),
-            size=size(status.size_bytes),
+            size=format_size(status.size_bytes),
             path=path,
         )
     )

@@ -27,7 +27,7 @@ else:  # imported on use: other commands stay fast and need no extra packages
     reader = lazy_module("nep.recordings.reader")
 
 
-_MAX_COMPARED, _MAX_NAMED = 1_000, 20
+_MAX_COMPARED_TOPICS, _MAX_LISTED_TOPICS = 1_000, 20
 FileArgument = Annotated[
     Path, typer.Argument(metavar=_("FILE"), help=_("Recording file."), show_default=False, dir_okay=False)
 ]
@@ -99,11 +99,11 @@ def selected_topics(recording: reader.Recording, patterns: Sequence[str]) -> lis
     for pattern in patterns:
         matches = [name for name in recording.topics if glob_matches(pattern, name)]
         if not matches:
-            topic_names = [quotable(name) for name in islice(recording.topics, _MAX_COMPARED)]
+            topic_names = [quotable(name) for name in islice(recording.topics, _MAX_COMPARED_TOPICS)]
             if is_glob(pattern):
                 raise typer.BadParameter(_("no topic of the recording matches '{word}'").format(word=pattern))
             if nearest(pattern, topic_names) is None:
-                del topic_names[_MAX_NAMED:]
+                del topic_names[_MAX_LISTED_TOPICS:]
             raise typer.BadParameter(
                 _("the recording has no topic '{word}'; {did_you_mean}").format(
                     word=pattern, did_you_mean=did_you_mean(pattern, topic_names)

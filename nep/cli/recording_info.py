@@ -11,7 +11,16 @@ import typer
 
 from nep.cli.options import JsonOption
 from nep.cli.recording_files import FileArgument, clock_text, exit_if_damaged, progress_bar
-from nep.cli.screen import UNKNOWN, TextColumn, format_rate, print_status, show_json, show_table, size, write
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    format_rate,
+    format_size,
+    print_status,
+    show_json,
+    show_table,
+    write,
+)
 from nep.i18n import _, format_list, lazy, ngettext
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
@@ -49,7 +58,8 @@ _ATTACHMENT_COLUMNS = (
 def info(
     file: FileArgument,
     check_all: Annotated[
-        bool, typer.Option("--check", help=_("Check the whole file for damage, regardless of its size."))
+        bool,
+        typer.Option("--check", help=_("Check the whole file for damage, regardless of its format_size.")),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -82,7 +92,7 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, message_count
     summary = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
-        size=size(recording.size_bytes),
+        size=format_size(recording.size_bytes),
         started=_timestamp_text(recording.start_ns),
     )
     write(f"{summary}\n")
@@ -104,7 +114,7 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, message_count
         write(f"{template.format(count=left_out)}\n")
     if recording.info.attachments:
         rows = [
-            (quotable(each.name), quotable(each.media_type), size(each.size_bytes))
+            (quotable(each.name), quotable(each.media_type), format_size(each.size_bytes))
             for each in recording.info.attachments
         ]
         show_table(_ATTACHMENT_COLUMNS, rows)

@@ -20,7 +20,7 @@ from nep.cli.recording_files import (
     progress_bar,
     selected_topics,
 )
-from nep.cli.screen import UNKNOWN, print_status, show_json, size
+from nep.cli.screen import UNKNOWN, format_size, print_status, show_json
 from nep.cli.typer_texts import TranslatedGroup
 from nep.i18n import _, ngettext, number
 from nep.system.lazy_import import lazy_module
@@ -94,7 +94,9 @@ def repair(
         loss_template = _("lost: {messages} messages, {size}, the last {seconds} s")
         print_status(
             loss_template.format(
-                messages=lost_count, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
+                messages=lost_count,
+                size=format_size(report.discarded_bytes),
+                seconds=number(report.lost_s, ".1f"),
             )
         )
 

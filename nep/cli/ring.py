@@ -19,7 +19,7 @@ from nep.cli.complete import complete_topic
 from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.recording_files import TopicsToRecordArgument, clock_text
-from nep.cli.screen import console, print_status, show_json, size
+from nep.cli.screen import console, format_size, print_status, show_json
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext
 from nep.protocol.graph_view import GraphView
@@ -98,7 +98,9 @@ def ring(
     seconds: Annotated[
         float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("Length of the buffer."))
     ] = 60.0,
-    size_gb: Annotated[float, typer.Option("--size", metavar="GB", help=_("Maximum size on disk."))] = 2.0,
+    size_gb: Annotated[
+        float, typer.Option("--format_size", metavar="GB", help=_("Maximum format_size on disk."))
+    ] = 2.0,
     folder: Annotated[
         Path,
         typer.Option(
@@ -195,7 +197,7 @@ def _run_commands(
                 status = flight_recorder.status
                 template = _("{time} buffered, {size}")
                 status_display.update(
-                    template.format(time=clock_text(status.seconds), size=size(status.size_bytes))
+                    template.format(time=clock_text(status.seconds), size=format_size(status.size_bytes))
                 )
 
 

@@ -238,7 +238,7 @@ def format_rate(value_hz: float | None) -> str:
     return f"{value_hz:.0f} /s" if value_hz >= 100 else f"{value_hz:.1f} /s"
 
 
-def size(value: float | None, per: str = "") -> str:
+def format_size(value: float | None, per: str = "") -> str:
     """Format a number of bytes with a unit, followed by `per`, such as "/s".
 
     Returns `UNKNOWN` if the number is None.
@@ -257,10 +257,10 @@ def format_bandwidth(topic: TopicInfo) -> str:
     """Format a topic's bandwidth; "not subscribed" if messages are not encoded for lack of subscribers."""
     if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
         return _("not subscribed")
-    return size(topic.bandwidth_Bps, "/s")
+    return format_size(topic.bandwidth_Bps, "/s")
 
 
-def duration(seconds: float) -> str:
+def format_rounded_duration(seconds: float) -> str:
     """Format a duration in the largest suitable unit."""
     if seconds < 60:
         return f"{max(seconds, 0):.0f} s"

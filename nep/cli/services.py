@@ -13,7 +13,16 @@ from nep.cli.json_input import decode_text, parse_json
 from nep.cli.network import BackendOption, open_node, query_graph
 from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.publish import read_file
-from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_alerts, show_json, show_table, size, write
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    format_size,
+    print_status,
+    show_alerts,
+    show_json,
+    show_table,
+    write,
+)
 from nep.cli.topic_wait import suggestion
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import convert_ids_to_text, format_payload, service_type_text
@@ -225,7 +234,7 @@ def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
             _("serves"),
             str(each.calls),
             str(each.errors),
-            size(each.bytes),
+            format_size(each.bytes),
             "\n".join(map(escaped, each.endpoints)) or UNKNOWN,
         )
         for each in service.servers

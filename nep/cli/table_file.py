@@ -36,9 +36,9 @@ class FieldExtractor:
         # Raises `NepError` for an invalid field path.
         self.names = tuple(names)
         self._paths: tuple[Path, ...] = tuple(parse_path(name) for name in names)
-        self.missing: Counter[str] = Counter()
-        self.messages = 0
-        self.unreadable = 0
+        self.missing_counts: Counter[str] = Counter()
+        self.message_count = 0
+        self.undecodable_count = 0
 
     def extract(self, message: Message) -> list[object] | None:
         """Return the field values of a message, with `MISSING` for missing fields.
@@ -48,11 +48,13 @@ class FieldExtractor:
         try:
             payload = dict(message.extension) if message.codec == "image" else message.payload
         except DecodeError:
-            self.unreadable += 1
+            self.undecodable_count += 1
             return None
-        self.messages += 1
+        self.message_count += 1
         values = [value_at(payload, path) for path in self._paths]
-        self.missing.update(name for name, value in zip(self.names, values, strict=True) if value is MISSING)
+        self.missing_counts.update(
+            name for name, value in zip(self.names, values, strict=True) if value is MISSING
+        )
         return values
 
     def as_dict(self, values: Sequence[object]) -> dict[str, object]:
@@ -62,19 +64,19 @@ class FieldExtractor:
     def report_missing(self) -> None:
         """Print the counts of missing fields and of undecodable messages to stderr."""
         for name in self.names:
-            if self.missing[name]:
+            if self.missing_counts[name]:
                 print_status(
                     _("'{name}' was missing in {missing} of {messages} messages").format(
-                        name=name, missing=self.missing[name], messages=self.messages
+                        name=name, missing=self.missing_counts[name], messages=self.message_count
                     )
                 )
-        if self.unreadable:
+        if self.undecodable_count:
             template = ngettext(
                 "skipped {count} undecodable message",
                 "skipped {count} undecodable messages",
-                self.unreadable,
+                self.undecodable_count,
             )
-            print_status(template.format(count=self.unreadable))
+            print_status(template.format(count=self.undecodable_count))
 
 
 class CsvMessageWriter:

@@ -22,13 +22,13 @@ from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
     console,
-    duration,
     format_bandwidth,
     format_rate,
+    format_rounded_duration,
+    format_size,
     print_status,
     show_json,
     show_table,
-    size,
     write,
 )
 from nep.cli.values import convert_ids_to_text
@@ -236,7 +236,7 @@ class _GraphPrinter:
             ngettext("{count} node", "{count} nodes", len(graph.nodes)).format(count=len(graph.nodes)),
             ngettext("{count} topic", "{count} topics", len(graph.topics)).format(count=len(graph.topics)),
             format_rate(sum(rates) if rates else None),
-            size(sum(bytes_s) if bytes_s else None, "/s"),
+            format_size(sum(bytes_s) if bytes_s else None, "/s"),
             ngettext("{count} lost", "{count} lost", sum(lost)).format(count=sum(lost)) if lost else "",
         ]
         return " · ".join(part for part in parts if part)
@@ -261,7 +261,7 @@ class _GraphPrinter:
             escaped(node.language) or UNKNOWN,
             UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",
             format_rate(published_hz),
-            duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
+            format_rounded_duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         )
 
 

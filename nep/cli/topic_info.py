@@ -15,11 +15,11 @@ from nep.cli.screen import (
     TextColumn,
     format_bandwidth,
     format_rate,
+    format_size,
     print_status,
     show_alerts,
     show_json,
     show_table,
-    size,
     write,
 )
 from nep.cli.topic_wait import suggestion
@@ -143,7 +143,7 @@ def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
             _("publishes"),
             str(each.count),
             format_rate(each.rate_hz),
-            size(each.bandwidth_Bps, "/s"),
+            format_size(each.bandwidth_Bps, "/s"),
             UNKNOWN,
         )
         for each in topic.publishers

@@ -29,7 +29,7 @@ class TopicMonitor:
         # Raises `BadTopicError` for an invalid topic.
         self._node = node
         self._types = {check_topic(topic): "json" for topic in topics}
-        self._silent: set[str] = set()
+        self._unpublished: set[str] = set()
         self._published_before: set[str] = set()
         self._poll_at = 0.0
 
@@ -38,9 +38,9 @@ class TopicMonitor:
         return self._types[topic]
 
     @property
-    def silent_topics(self) -> frozenset[str]:
+    def unpublished_topics(self) -> frozenset[str]:
         """Topics without publishers."""
-        return frozenset(self._silent)
+        return frozenset(self._unpublished)
 
     def update(self, graph: GraphView) -> None:
         """Report topics that have no publisher, or have lost their last one, and suggest similar names."""
@@ -49,9 +49,9 @@ class TopicMonitor:
             if topic_info is not None and topic_info.publishers:
                 self._types[topic] = topic_info.msg_type
                 self._published_before.add(topic)
-                self._silent.discard(topic)
-            elif topic not in self._silent:
-                self._silent.add(topic)
+                self._unpublished.discard(topic)
+            elif topic not in self._unpublished:
+                self._unpublished.add(topic)
                 other_topics = [
                     name for name, other in graph.topics.items() if name != topic and other.publishers
                 ]
@@ -65,7 +65,7 @@ class TopicMonitor:
     def mark_received(self, topics: Collection[str]) -> None:
         """Record that messages arrived on these topics."""
         self._published_before.update(topics)
-        self._silent.difference_update(topics)
+        self._unpublished.difference_update(topics)
         self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
 
     def wait_slice_s(self, timeout_s: float | None) -> float:

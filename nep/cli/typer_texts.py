@@ -48,12 +48,14 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of typer's usage errors, which has no public name."""
 
 
-def translated(english: str) -> str:
+def translate_usage_error(english: str) -> str:
     """Translate a usage error of typer; an unknown message is returned unchanged."""
     for message, pattern in _usage_error_patterns():
         match = pattern.fullmatch(english)
         if match is not None:
-            return _(message).format(**{name: translated(value) for name, value in match.groupdict().items()})
+            return _(message).format(
+                **{name: translate_usage_error(value) for name, value in match.groupdict().items()}
+            )
     return english
 
 
@@ -71,7 +73,7 @@ def _translate_usage_errors() -> Iterator[None]:
         yield
     except _UsageError as error:
         english = error.format_message()
-        message = escaped(translated(english), lines=True)  # may contain untrusted names
+        message = escaped(translate_usage_error(english), lines=True)  # may contain untrusted names
         if message == english:
             raise
         raise _UsageError(message, ctx=error.ctx) from error

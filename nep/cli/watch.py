@@ -104,7 +104,7 @@ class _EventPrinter:
     def __init__(self) -> None:
         self._console = console()
 
-    def event(self, event: AlarmEvent) -> None:
+    def print_event(self, event: AlarmEvent) -> None:
         text = escaped(event_text(event.rule.condition, event.value))
         if event.kind == "off":
             template = _("resolved after {seconds:.1f} s: {what}")
@@ -115,7 +115,7 @@ class _EventPrinter:
             text = _("{what} (snoozed)").format(what=text)
         self._show(event.kind, event.at_s, text)
 
-    def action(self, _rule: AlarmRule, text: str, at_s: float) -> None:
+    def print_action(self, _rule: AlarmRule, text: str, at_s: float) -> None:
         self._show("", at_s, f"  {escape_for_terminal(text)}")
 
     def _show(self, kind: str, at_s: float, text: str) -> None:
@@ -131,7 +131,7 @@ class _EventPrinter:
 class _JsonEventPrinter:
     """Printer of alarm events as JSON lines."""
 
-    def event(self, event: AlarmEvent) -> None:
+    def print_event(self, event: AlarmEvent) -> None:
         show_json(
             {
                 "alarm": event.rule.id,
@@ -145,7 +145,7 @@ class _JsonEventPrinter:
             }
         )
 
-    def action(self, rule: AlarmRule, text: str, at_s: float) -> None:
+    def print_action(self, rule: AlarmRule, text: str, at_s: float) -> None:
         show_json({"alarm": rule.id, "event": "did", "at_s": at_s, "what": text})
 
 
@@ -163,7 +163,7 @@ class _AlarmRunner:
         guard: MotionGuard,
     ) -> None:
         self._node, self._out, self._guard = node, out, guard
-        self._commands = AlarmCommands(self._rejection_reason)
+        self._commands = AlarmCommands(self._denial_reason)
         self._save_client: Client | None = None
         carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, DoneCallback], None]] = {
             "banner": _do_nothing,  # every alarm is printed anyway
@@ -178,7 +178,7 @@ class _AlarmRunner:
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._view: GraphView | None = None
         self._poll_at = 0.0
-        self._was_away = False
+        self._is_master_down = False
         self._has_reported_unknown = 0
 
     def check_send_actions(self) -> None:
@@ -214,13 +214,13 @@ class _AlarmRunner:
         while True:
             self._poll_graph()
             for event in self.alarms.tick():
-                self._out.event(event)
+                self._out.print_event(event)
                 alarm_count += event.kind == "on"
             self._show_actions()
             if count and alarm_count >= count and not self.alarms.is_busy:
                 return
             # in slices: Ctrl+C does not interrupt a wait on Windows
-            self.alarms.evaluator.came.wait(_EVENT_WAIT_S)
+            self.alarms.evaluator.has_events.wait(_EVENT_WAIT_S)
 
     def close(self) -> None:
         self._commands.close()
@@ -240,13 +240,13 @@ class _AlarmRunner:
             self._subscribe(self._view)
             self._guard.update_graph(self._view)
         except NepError as error:
-            if not self._was_away:
+            if not self._is_master_down:
                 print_status(_("{problem}; waiting").format(problem=error))
-            self._was_away, self._view = True, None
+            self._is_master_down, self._view = True, None
         else:
-            if self._was_away:
+            if self._is_master_down:
                 print_status(_("connected to the master"))
-            self._was_away = False
+            self._is_master_down = False
             self._report_unknown_once(self._view)
         self.alarms.evaluator.update_graph(self._view)
         self._poll_at = time.monotonic() + _GRAPH_POLL_INTERVAL_S
@@ -287,7 +287,7 @@ class _AlarmRunner:
 
     # ---- actions
 
-    def _rejection_reason(self, _node: Node, topic: str, msg_type: str) -> str:
+    def _denial_reason(self, _node: Node, topic: str, msg_type: str) -> str:
         self._guard.poll()  # alarms are rare, and a robot may just have connected
         return self._guard.denial_reason(topic, msg_type)
 
@@ -321,7 +321,7 @@ class _AlarmRunner:
     def _show_actions(self) -> None:
         for rule, text, at_s in self.alarms.take_action_results():
             if text:
-                self._out.action(rule, text, at_s)
+                self._out.print_action(rule, text, at_s)
 
 
 def _report_saved(ended: Future[object], on_done: DoneCallback) -> None:

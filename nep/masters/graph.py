@@ -64,7 +64,7 @@ from nep.protocol.requests import (
     SubscriberRecord,
     TopicPublishers,
     is_proven,
-    node_of,
+    node_id_of,
 )
 
 _MAX_WAITING_REQUESTS = 10_000
@@ -133,7 +133,7 @@ class Graph:
         self._registry = Registry()
         self.clocks = Clocks(self._registry, computer)
         """Clocks of the nodes."""
-        self._viewer = GraphSnapshotBuilder(self._registry)
+        self._snapshot_builder = GraphSnapshotBuilder(self._registry)
         self._leases = Leases(self._registry, lease_s)
         self._learning_until = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
@@ -226,7 +226,7 @@ class Graph:
 
     def view(self) -> GraphView:
         """Return a snapshot of the graph."""
-        return self._viewer.view(self.epoch)
+        return self._snapshot_builder.view(self.epoch)
 
     def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
         """Handle a renewal of the usual form; return the newest sequence numbers by publisher id.
@@ -249,7 +249,7 @@ class Graph:
 
     def node_at(self, route: str) -> RegisteredNode | None:
         """Return the node that registered over the connection `route`, or None."""
-        return self._registry.speaking.get(route)
+        return self._registry.members_by_route.get(route)
 
     # ---- authorization
 
@@ -263,7 +263,7 @@ class Graph:
                 self._authorize_record(request.node, record, out)
             self._check_limits(request, len(records))
             return
-        node_id = node_of(request)
+        node_id = node_id_of(request)
         member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
             raise WireError(_("a node can only send requests for itself"), code="speaker")
@@ -277,7 +277,7 @@ class Graph:
                 _("a node needs a key that proves its id, or its id as routing id; update nep"),
                 code="node-unproven",
             )
-        other = self._registry.speaking.get(sender)
+        other = self._registry.members_by_route.get(sender)
         if other is not None and other.node.id != node.id:
             reason = _("this connection already belongs to the node '{id}'").format(id=other.node.id)
             raise WireError(reason, code="connection")

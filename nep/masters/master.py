@@ -21,7 +21,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import GraphReply, Listen, QueryGraph, RejectedReply, Reply, Request
 from nep.system.addresses import master_address
 from nep.system.computer import computer_id
-from nep.system.forks import close_in_child, watch
+from nep.system.forks import close_in_child, notify_after_fork
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -78,7 +78,7 @@ class Master:
         self._server: MasterServer | None = None
         self._lock = threading.Lock()
         self._is_forked = False
-        watch(self)
+        notify_after_fork(self)
 
     def start(self) -> Self:
         """Bind the address, start the attachments and serve requests. Return self.

@@ -133,7 +133,7 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
     try:
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        endpoint, body = endpoint_of(name.known), encode_request(request, 1)
+        endpoint, body = endpoint_of(name.address), encode_request(request, 1)
         socket.connect(endpoint)
         _send(socket, endpoint, body)
         deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_INTERVAL_S

@@ -137,7 +137,7 @@ class Registry:
 
     def __init__(self) -> None:
         self.members: dict[str, RegisteredNode] = {}
-        self.speaking: dict[str, RegisteredNode] = {}
+        self.members_by_route: dict[str, RegisteredNode] = {}
         """Node by the connection that speaks for the node."""
         self.publisher_owners: dict[int, RegisteredNode] = {}
         """Node by the id of its publisher."""
@@ -154,7 +154,7 @@ class Registry:
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, RegisteredNode]] = {}
         self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
-        self._reported: dict[str, tuple[Alert, ...]] = {}
+        self._alerts_by_source: dict[str, tuple[Alert, ...]] = {}
         self.patterns: PatternIndex[RegisteredNode] = PatternIndex()
         self.departed: DepartedPublishers[RegisteredPublisher] = DepartedPublishers()
 
@@ -294,11 +294,11 @@ class Registry:
             self._unbind_route(member)
             member.route = route
         if route:
-            self.speaking[route] = member
+            self.members_by_route[route] = member
 
     def _unbind_route(self, member: RegisteredNode) -> None:
-        if self.speaking.get(member.route) is member:
-            del self.speaking[member.route]
+        if self.members_by_route.get(member.route) is member:
+            del self.members_by_route[member.route]
 
     def add_publisher(self, member: RegisteredNode, record: PublisherRecord) -> bool:
         """Register a publisher; return False if it was already registered identically."""
@@ -486,14 +486,14 @@ class Registry:
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
         """Replace the alerts that the attachment `source` reports."""
-        if self._reported.get(source, ()) != alerts:
-            self._reported[source] = alerts
+        if self._alerts_by_source.get(source, ()) != alerts:
+            self._alerts_by_source[source] = alerts
             self.revision += 1
 
     @property
     def reported_alerts(self) -> tuple[Alert, ...]:
         """Alerts of all attachments."""
-        return tuple(alert for alerts in self._reported.values() for alert in alerts)
+        return tuple(alert for alerts in self._alerts_by_source.values() for alert in alerts)
 
     def _bump_revision(self, topic: str) -> None:
         self.touched.add(topic)

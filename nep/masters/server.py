@@ -35,7 +35,7 @@ from nep.protocol.requests import (
     Request,
 )
 from nep.system.addresses import endpoint_of
-from nep.system.forks import watch
+from nep.system.forks import notify_after_fork
 from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
@@ -88,12 +88,12 @@ class MasterServer:
         self._graph = graph
         self._listeners = listeners
         self._owner = owner
-        self._port = MasterRouter(address)
-        self.address = self._port.address
+        self._router = MasterRouter(address)
+        self.address = self._router.address
         self._waker = Waker()
         self._submitted: deque[Submission] = deque()
         self._pending: dict[int, Submission] = {}
-        self._calls = 0
+        self._last_call = 0
         self._encoder = ReplyEncoder()
         self._bad_requests = BadRequestCounter()
         self._renewals: list[tuple[bytes, bytes, int]] = []
@@ -104,11 +104,11 @@ class MasterServer:
         self._notified_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
-        self._listening = ListenAddresses(self._port.socket, int(self.address.rpartition(":")[2]))
-        self._follow_at = 0.0
+        self._listen_addresses = ListenAddresses(self._router.socket, int(self.address.rpartition(":")[2]))
+        self._address_check_at = 0.0
         self._failures = 0
         self._ticked_at = time.monotonic()
-        watch(self)
+        notify_after_fork(self)
 
     # ---- other threads
 
@@ -131,7 +131,7 @@ class MasterServer:
     @property
     def endpoints(self) -> tuple[str, ...]:
         """Bound endpoints."""
-        return (endpoint_of(self.address), *self._listening.endpoints)
+        return (endpoint_of(self.address), *self._listen_addresses.endpoints)
 
     def forked(self) -> None:
         """Stop in a forked child process without touching sockets. See `nep.system.forks`."""
@@ -157,7 +157,7 @@ class MasterServer:
         try:
             while not self._closing:
                 if self._is_open and len(polled) == 1:
-                    polled.append((self._port.socket, int(zmq.POLLIN)))
+                    polled.append((self._router.socket, int(zmq.POLLIN)))
                 zmq.zmq_poll(polled, self._poll_timeout_ms(tick_at))
                 self._waker.clear()
                 now = time.monotonic()
@@ -215,17 +215,19 @@ class MasterServer:
         if not was_away:  # otherwise this thread was late itself: renewals may still be queued
             self._send(self._graph.tick(now))
             self._send(self._graph.probes_for_overdue(now))
-        ended = (self._graph.node_at(_route_of(sender)) for sender in self._port.take_ended_senders(now))
+        ended = (self._graph.node_at(_route_of(sender)) for sender in self._router.take_ended_senders(now))
         self._send(self._graph.probes_for([each.node.id for each in ended if each is not None]))
         self._graph.apply(ReportAlerts("requests", self._bad_requests.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
-        if self._listening.hosts and now >= self._follow_at:
-            self._follow_at = now + _ADDRESS_CHECK_INTERVAL_S
+        if self._listen_addresses.hosts and now >= self._address_check_at:
+            self._address_check_at = now + _ADDRESS_CHECK_INTERVAL_S
             self._report_lost_addresses()
 
     def _report_lost_addresses(self) -> None:
-        self._graph.apply(ReportAlerts("listening", self._listening.refresh()), 0, time.monotonic(), "")
+        self._graph.apply(
+            ReportAlerts("listening", self._listen_addresses.refresh()), 0, time.monotonic(), ""
+        )
 
     def _is_needed(self) -> bool:
         # True if a node is registered that belongs neither to the owner's process nor to this one.
@@ -235,9 +237,9 @@ class MasterServer:
     def _serve_submissions(self) -> None:
         while self._submitted:
             submission = self._submitted.popleft()
-            self._calls -= 1  # negative numbers are distinct from calls of nodes
-            self._pending[self._calls] = submission
-            self._apply_request(ReceivedRequest(self._calls, submission.request), "")
+            self._last_call -= 1  # negative numbers are distinct from calls of nodes
+            self._pending[self._last_call] = submission
+            self._apply_request(ReceivedRequest(self._last_call, submission.request), "")
 
     def _serve_router(self) -> None:
         enough_at = time.monotonic() + _TICK_INTERVAL_S
@@ -245,7 +247,7 @@ class MasterServer:
             if time.monotonic() > enough_at:
                 return
             try:
-                sender, *body = self._port.receive()
+                sender, *body = self._router.receive()
             except zmq.Again:
                 return
             except zmq.ZMQError:
@@ -255,7 +257,7 @@ class MasterServer:
                 self._renewals.append((sender, body[0], time.time_ns()))
             else:
                 self._reply_to_renewals()  # in order of arrival
-                self._serve_request(sender, body, self._port.peer_address())
+                self._serve_request(sender, body, self._router.peer_address())
 
     def _reply_to_renewals(self) -> None:
         # All replies are sent together, so that libzmq's thread wakes once.
@@ -264,7 +266,7 @@ class MasterServer:
         for (sender, body, _came_ns), reply in zip(renewals, replies, strict=True):
             if reply is None:
                 self._serve_request(sender, [body], "")
-            elif not self._port.send(sender, reply):
+            elif not self._router.send(sender, reply):
                 self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
 
     def _try_renew(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
@@ -293,7 +295,7 @@ class MasterServer:
             graph.epoch,
             graph.revision,
             last_seqs,
-            self._listening.hosts,
+            self._listen_addresses.hosts,
             member.renew_interval_s,
             times=times,
             clocks=clocks,
@@ -301,7 +303,7 @@ class MasterServer:
 
     def _serve_request(self, sender: bytes, body: list[bytes], peer: str) -> None:
         received = decode_request(body[-1] if len(body) == 1 else b"")
-        if isinstance(received.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
+        if isinstance(received.request, Listen) and self._listen_addresses.hosts and peer != "127.0.0.1":
             reason = _("this setting can be changed only on the master's own computer")
             received = ReceivedRequest(received.call, WireError(reason, code="listen"))
         name = _route_of(sender)
@@ -347,7 +349,7 @@ class MasterServer:
 
     def _listen(self, request: Listen) -> Reply:
         try:
-            self._listening.serve(request.hosts)
+            self._listen_addresses.serve(request.hosts)
         except NepError as error:
             return RejectedReply(self._graph.epoch, self._graph.revision, str(error), "listen")
         self._report_lost_addresses()
@@ -367,7 +369,7 @@ class MasterServer:
     def _reply_to_submission(self, message: OutgoingMessage) -> None:
         submission = self._pending.pop(message.call or 0, None)
         if submission is not None:
-            submission.reply = with_hosts(message.body, self._listening.hosts)  # type: ignore[assignment]
+            submission.reply = with_hosts(message.body, self._listen_addresses.hosts)  # type: ignore[assignment]
             submission.done.set()
 
     def _deliver(self, message: OutgoingMessage, dead: frozenset[str]) -> bool:
@@ -378,7 +380,7 @@ class MasterServer:
             if member is None:
                 return True
             route = member.route
-        reply = with_hosts(without_nodes(message.body, dead), self._listening.hosts)
+        reply = with_hosts(without_nodes(message.body, dead), self._listen_addresses.hosts)
         try:
             body = self._encoder.encode(reply, message.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
@@ -386,7 +388,7 @@ class MasterServer:
             if message.call is None:
                 return True
             body = self._encoder.encode(self._create_rejection(), message.call)
-        return self._port.send(route.encode("utf-8", "surrogateescape"), body)
+        return self._router.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _node_ids_at(self, route: str) -> tuple[str, ...]:
         member = self._graph.node_at(route)
@@ -402,7 +404,7 @@ class MasterServer:
         # Rate-limited, so that notifying takes at most a quarter of the time when many nodes join.
         if self._listeners and self._graph.revision != self._notified_revision and now >= self._notify_at:
             self._notified_revision = self._graph.revision
-            view = replace(self._graph.view(), listens=self._listening.hosts)
+            view = replace(self._graph.view(), listens=self._listen_addresses.hosts)
             for changed in self._listeners:
                 try:
                     changed(view)
@@ -411,7 +413,7 @@ class MasterServer:
             self._notify_at = 4.0 * time.monotonic() - 3.0 * now  # pause for three times the duration
 
     def _release(self) -> None:
-        self._port.close()
+        self._router.close()
         self._waker.close()
 
 

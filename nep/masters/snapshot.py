@@ -94,7 +94,7 @@ class GraphSnapshotBuilder:
         yield from _name_alerts(self._registry)
         for name in sorted(self._alerts):
             yield from self._alerts[name]
-        yield from _missing_alerts(self._registry)
+        yield from _unconnected_alerts(self._registry)
 
 
 def _node_info(member: RegisteredNode) -> NodeInfo:
@@ -272,7 +272,7 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
             )
 
 
-def _missing_alerts(registry: Registry) -> Iterator[Alert]:
+def _unconnected_alerts(registry: Registry) -> Iterator[Alert]:
     for member in registry.members.values():
         if member.unconnected_node_ids:
             yield Alert(

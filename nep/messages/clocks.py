@@ -57,7 +57,7 @@ class PublisherClock:
         self.difference = difference
         """Difference to this computer's clock, or None if unknown."""
 
-    def seconds(self) -> tuple[float, float] | None:
+    def difference_s(self) -> tuple[float, float] | None:
         """Return (offset, uncertainty) of the clock in seconds, or None if unknown.
 
         The offset is to be added to a time of the publisher; the error is at most the uncertainty in

@@ -291,7 +291,7 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
     try:
         layout = raw_layout(extension.get("encoding"))
         if layout is None:
-            return read_file(parse_header(data))
+            return decode_file(parse_header(data))
         frame = raw_array(data, layout, extension.get("shape"))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
@@ -300,7 +300,7 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
         raise DecodeError("image", data.nbytes, _(_INSTALL_HINT)) from error
 
 
-def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
+def decode_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
     """Decode the pixels of a file, rotated upright.
 
     Args:

@@ -163,7 +163,7 @@ class Message:
         0.0 on one computer. None if the two clocks have not been compared (yet); `latency_s` is not corrected
         then, and may be wrong by any amount.
         """
-        difference_s = self.kind.clock.seconds()
+        difference_s = self.kind.clock.difference_s()
         return None if self.stamp_ns is None or difference_s is None else difference_s[1]
 
     @property

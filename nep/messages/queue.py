@@ -101,18 +101,18 @@ class ReadAhead:
 
     def __init__(self, max_messages: int) -> None:
         self._max_messages = max(1, min(MAX_READ_AHEAD, max_messages))
-        self.now = 1
+        self.message_count = 1
         """Current number of messages per read."""
-        self.span_s = _FAST_READ_INTERVAL_S
+        self.max_interval_s = _FAST_READ_INTERVAL_S
         """Maximum time in seconds between two reads for the reader to count as fast."""
 
     def increase(self) -> int:
         """Increase the number of messages for a fast reader, and return it."""
-        self.now = min(2 * self.now, self._max_messages)
-        self.span_s = self.now * _FAST_READ_INTERVAL_S
-        return self.now
+        self.message_count = min(2 * self.message_count, self._max_messages)
+        self.max_interval_s = self.message_count * _FAST_READ_INTERVAL_S
+        return self.message_count
 
     def reset(self) -> None:
         """Reset to one message, because the reader is slow or fewer messages were available."""
-        self.now = 1
-        self.span_s = _FAST_READ_INTERVAL_S
+        self.message_count = 1
+        self.max_interval_s = _FAST_READ_INTERVAL_S

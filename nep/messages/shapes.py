@@ -358,7 +358,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
         describe=lambda: format_list([each.expected for each in (*others, *nones)], "or"),
     )
 
-    def first(value: object, converters: Sequence[Callable[[Any], Any]]) -> object:
+    def convert(value: object, converters: Sequence[Callable[[Any], Any]]) -> object:
         mismatch = None
         for converter in converters:
             try:
@@ -370,8 +370,8 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
         raise wrong_type_error(value, shape.expected)
 
     # looked up at use: a dataclass may be filled later
-    shape.read = lambda value: first(value, [each.read for each in ordered])
-    shape.write = lambda value: first(value, [each.write for each in ordered])
+    shape.read = lambda value: convert(value, [each.read for each in ordered])
+    shape.write = lambda value: convert(value, [each.write for each in ordered])
     return shape
 
 

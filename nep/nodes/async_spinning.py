@@ -53,7 +53,7 @@ async def _run_once(work: Work) -> bool:
     # One turn: every due timer, one call per server, one message per callback. Returns False if idle.
     has_called = work.run_servers()
     for timer in work.timers:
-        if timer.take_turn():
+        if timer.claim_tick():
             has_called = True
             await _await_result(timer.callback())
         if not work.is_running:

@@ -24,7 +24,7 @@ from typing import Protocol
 
 from nep.errors import ClosedError, NepError
 from nep.i18n import _, ngettext, number
-from nep.system.forks import watch
+from nep.system.forks import notify_after_fork
 from nep.text import bounded_str, shortened
 
 LOG_TOPIC = "/nep/log"
@@ -203,7 +203,7 @@ class LogHandler(logging.Handler):
         self._has_work = threading.Condition()
         self._thread: threading.Thread | None = None
         self._is_closed = False
-        watch(self)
+        notify_after_fork(self)
 
     @property
     def unreported_drops(self) -> int:

@@ -31,7 +31,7 @@ _LOOP_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for detecting a loop that was closed without the shutdown of `asyncio.run`."""
 _JOIN_TIMEOUT_S = 5.0
 
-Call = Callable[[], None]
+ReadyCallback = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
 """`LoopWait` of each event loop by the loop's id; a reference to the loop would keep it alive."""
@@ -83,7 +83,7 @@ class LoopWait:
         self._loop = weakref.ref(loop)
         self._id = id(loop)
         self._shared_wait = SharedWait()
-        self._calls: dict[SubscriberTransport, list[Call]] = {}
+        self._calls: dict[SubscriberTransport, list[ReadyCallback]] = {}
         self._requests: deque[tuple[bool, SubscriberTransport]] = deque()
         self._is_stopped = False
         self._thread = threading.Thread(target=self._run, name="nep-async", daemon=True)
@@ -102,14 +102,14 @@ class LoopWait:
         """Return True if this object belongs to `loop` and its thread is running."""
         return self._loop() is loop and not self._is_stopped
 
-    def watch(self, subscriber: SubscriberTransport, call: Call) -> None:
+    def watch(self, subscriber: SubscriberTransport, call: ReadyCallback) -> None:
         """Call `call` once when the subscriber may have a message or is closed."""
         calls = self._calls.setdefault(subscriber, [])
         calls.append(call)
         if len(calls) == 1:
             self._request(True, subscriber)
 
-    def unwatch(self, subscriber: SubscriberTransport, call: Call) -> None:
+    def unwatch(self, subscriber: SubscriberTransport, call: ReadyCallback) -> None:
         """Cancel a `watch`. Has no effect if `call` was already called."""
         calls = self._calls.get(subscriber)
         if calls is not None and call in calls:

@@ -168,7 +168,7 @@ class Node(ServiceNode):
         self._work = Work(name, self._transport, time.monotonic, self._services)
         _open_nodes.add(self)
         _register_worker_close()
-        forks.watch(self)
+        forks.notify_after_fork(self)
 
     # ---- configurations
 
@@ -598,7 +598,7 @@ class Node(ServiceNode):
         _open_nodes.discard(self)
         self._work.close()
         for publisher in publishers:
-            publisher.node_closes()
+            publisher.on_node_close()
         self._transport.begin_close()
         with self._lock:
             self._publishers.clear()

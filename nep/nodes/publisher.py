@@ -320,7 +320,7 @@ class Publisher:
                 if self._on_close is not None:
                     self._on_close(self)
 
-    def node_closes(self) -> None:
+    def on_node_close(self) -> None:
         """Mark the publisher as closed because its node is being closed."""
         self.is_closed = True
 

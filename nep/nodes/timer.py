@@ -54,12 +54,12 @@ class Timer:
 
     def run_if_due(self) -> bool:
         """Call the function if the timer is due; return True if it was. Exceptions propagate."""
-        is_due = self.take_turn()
+        is_due = self.claim_tick()
         if is_due:
             self._callback()
         return is_due
 
-    def take_turn(self) -> bool:
+    def claim_tick(self) -> bool:
         """Claim the current tick; return True if the timer is due and this thread must run the callback.
 
         If several threads call this at the same time, only one gets True. The next due time is set
@@ -80,7 +80,7 @@ class Timer:
         if self._on_cancel is not None:
             self._on_cancel(self)
 
-    def node_closes(self) -> None:
+    def on_node_close(self) -> None:
         """Cancel the timer because its node is closed or the process was forked. Acquires no lock."""
         self._is_cancelled = True
 

@@ -83,7 +83,7 @@ class Work:
         timer = Timer(period_s, callback, self.clock, self._remove_timer)
         with self._lock:
             if self.is_closed:
-                timer.node_closes()
+                timer.on_node_close()
             else:
                 self.timers = (*self.timers, timer)
                 if is_coroutine_function(callback):
@@ -143,7 +143,7 @@ class Work:
             timers, self.timers = self.timers, ()
         self._is_stopped.set()
         for timer in timers:
-            timer.node_closes()
+            timer.on_node_close()
         for watcher in self._watchers:
             watcher.wake()
 
@@ -153,7 +153,7 @@ class Work:
         self._lock = threading.Lock()
         self._is_stopped = threading.Event()
         for timer in self.timers:
-            timer.node_closes()
+            timer.on_node_close()
         self.callbacks, self.timers, self._watchers = (), (), ()
 
     def check_not_forked(self) -> None:

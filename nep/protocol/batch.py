@@ -15,7 +15,7 @@ from typing import NamedTuple
 from nep.errors import WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_by_number
-from nep.protocol.wire import BATCH, Header, Parts, pack_header, split
+from nep.protocol.wire import BATCH, Header, ParsedMessage, pack_header, split
 
 __all__ = [
     "BATCH",
@@ -124,7 +124,7 @@ def check_batch(header: Header, body: bytes) -> None:
         )
 
 
-def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
+def read_parts(parts: Sequence[bytes | memoryview]) -> list[ParsedMessage]:
     """Parse a message or batch; return its messages.
 
     Raises:
@@ -137,7 +137,7 @@ def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
     return messages
 
 
-def _split_batch(message: Parts) -> list[Parts]:
+def _split_batch(message: ParsedMessage) -> list[ParsedMessage]:
     body = bytes(message.payload)
     check_batch(message.header, body)
     return [

@@ -104,7 +104,7 @@ class ReceivedRequest(NamedTuple):
 
 def encode_request(request: Request, call: int) -> bytes:
     """Encode a request."""
-    return pack_saturated({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
+    return pack_saturated({"do": _REQUEST_NAMES[type(request)], "call": call, "what": to_plain(request)})
 
 
 def decode_request(body: bytes) -> ReceivedRequest:
@@ -112,9 +112,9 @@ def decode_request(body: bytes) -> ReceivedRequest:
     call = 0
     try:
         if len(body) < _SMALL_BODY_BYTES:
-            envelope = _envelope(body, unpack)
+            envelope = _unpack_envelope(body, unpack)
         else:
-            envelope = _envelope(body, lambda body: unpack_bounded(body, _MAX_LISTS, _MAX_LIST_LENGTH))
+            envelope = _unpack_envelope(body, lambda body: unpack_bounded(body, _MAX_LISTS, _MAX_LIST_LENGTH))
         number = envelope.get("call", 0)
         # negative numbers are reserved for calls inside the master's process
         call = number if type(number) is int and number >= 0 else 0
@@ -122,7 +122,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:
             raise WireError(_("unknown request '{name}'").format(name=name), code="request")
-        return ReceivedRequest(call, read(kind, envelope.get("what", {})))
+        return ReceivedRequest(call, from_plain(kind, envelope.get("what", {})))
     except WireError as error:
         return ReceivedRequest(call, error)
 
@@ -137,22 +137,22 @@ class ReplyEncoder:
     def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
         """Encode a reply to `call`, or a push."""
         if isinstance(answer, GraphReply):
-            return self._encode_view(answer, call)
-        return pack_saturated({"is": _REPLY_NAMES[type(answer)], "re": call, "what": write(answer)})
+            return self._encode_graph_reply(answer, call)
+        return pack_saturated({"is": _REPLY_NAMES[type(answer)], "re": call, "what": to_plain(answer)})
 
-    def _encode_view(self, reply: GraphReply, call: int) -> bytes:
+    def _encode_graph_reply(self, reply: GraphReply, call: int) -> bytes:
         view = reply.view
         header = msgpack.Packer().pack_map_header
         other_fields: dict[str, object] = {
             "epoch": view.epoch,
             "revision": view.revision,
-            "alerts": write(view.alerts),
+            "alerts": to_plain(view.alerts),
             "listens": view.listens,
         }
         if view.services:  # unknown to older nodes
-            other_fields["services"] = write(view.services)
+            other_fields["services"] = to_plain(view.services)
         if view.patterns:
-            other_fields["patterns"] = write(view.patterns)
+            other_fields["patterns"] = to_plain(view.patterns)
         nodes = [self._encode_entry(f"n{key}", key, node) for key, node in view.nodes.items()]
         topics = [self._encode_entry(f"t{key}", key, topic) for key, topic in view.topics.items()]
         if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:
@@ -220,15 +220,15 @@ def decode_reply(body: bytes) -> tuple[int, Reply | Push]:
 
 
 def _decode_reply(body: bytes) -> tuple[int, Reply | Push]:
-    envelope = _envelope(body, unpack)
+    envelope = _unpack_envelope(body, unpack)
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _REPLIES.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
         raise WireError(_("unknown reply '{name}'").format(name=name), code="answer")
-    return call, read(kind, envelope.get("what", {}))
+    return call, from_plain(kind, envelope.get("what", {}))
 
 
-def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str, object]:
+def _unpack_envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str, object]:
     try:
         value = unpack_it(body)
     except ValueError as error:
@@ -257,7 +257,7 @@ def gc_disabled() -> Iterator[None]:
 # ---- frozen dataclasses to maps and back; the classes have neither `__post_init__` nor slots
 
 
-def write(value: object) -> object:
+def to_plain(value: object) -> object:
     """Convert a value to maps, lists and scalars. Fields with their default value are omitted."""
     if type(value) in _PLAIN_TYPES:
         return value
@@ -266,12 +266,12 @@ def write(value: object) -> object:
         for name, default in _fields_of(type(value)):
             item = getattr(value, name)
             if default is MISSING or item != default:
-                out[name] = item if type(item) in _PLAIN_TYPES else write(item)
+                out[name] = item if type(item) in _PLAIN_TYPES else to_plain(item)
         return out
     if isinstance(value, Mapping):
-        return {key: write(item) for key, item in value.items()}
+        return {key: to_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [write(item) for item in value]
+        return [to_plain(item) for item in value]
     return value
 
 
@@ -283,7 +283,7 @@ def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
     )
 
 
-def read(kind: type[T], value: object) -> T:
+def from_plain(kind: type[T], value: object) -> T:
     """Parse a value of type `kind` from the result of `to_plain`.
 
     Unknown fields are ignored, because newer peers may send more fields.
@@ -296,8 +296,8 @@ def read(kind: type[T], value: object) -> T:
         return cast("T", _reader(hint)(value))
     except _MismatchError as mismatch:
         field_path = ".".join((kind.__name__, *reversed(mismatch.path)))
-        code = "field-missing" if mismatch.words == _MISSING_FIELD_MESSAGE else "field-type"
-        raise WireError(_(mismatch.words).format(field=field_path, **mismatch.values), code=code) from None
+        code = "field-missing" if mismatch.template == _MISSING_FIELD_MESSAGE else "field-type"
+        raise WireError(_(mismatch.template).format(field=field_path, **mismatch.values), code=code) from None
 
 
 class _MismatchError(Exception):
@@ -311,7 +311,7 @@ class _MismatchError(Exception):
 
     def __init__(self, template: str, **values: str) -> None:
         super().__init__(template)
-        self.words, self.values = template, values
+        self.template, self.values = template, values
         self.path: list[str] = []
 
 

@@ -514,7 +514,7 @@ class Probe(_MasterMessage):
 Push = PublisherAdded | PublisherRemoved | Probe
 
 
-def node_of(request: Request) -> str | None:
+def node_id_of(request: Request) -> str | None:
     """Return the id of the node on whose behalf a request is sent, or None if there is none."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id

@@ -67,7 +67,7 @@ class Reply(NamedTuple):
     codec: int = _JSON_CODEC
 
 
-class CallHeader(NamedTuple):
+class ReceivedCall(NamedTuple):
     """Parsed call, as a server receives it.
 
     Attributes:
@@ -102,7 +102,7 @@ class Framing(Protocol):
     def is_in_order(self) -> bool:
         """True if replies have no numbers and arrive in the order of the calls."""
 
-    def call(
+    def encode_call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
         """Encode a call.
@@ -114,10 +114,10 @@ class Framing(Protocol):
             data: Encoded request.
         """
 
-    def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
+    def read_call(self, parts: Sequence[bytes | memoryview]) -> ReceivedCall:
         """Parse a call. Raises `WireError`."""
 
-    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
+    def encode_reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
         """Encode a reply to the call with this number."""
 
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
@@ -127,20 +127,20 @@ class Framing(Protocol):
 class _NativeFraming:
     is_in_order = False
 
-    def call(
+    def encode_call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
         # 0 means no limit, so shorter limits are rounded up to 1 ms
         limit_ms = 0 if timeout_s is None else max(1, min(_MAX_TIMEOUT_MS, round(timeout_s * 1000)))
         return [_HEADER.pack(_VERSION, CallKind.CALL, codec, limit_ms, number), data]
 
-    def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
+    def read_call(self, parts: Sequence[bytes | memoryview]) -> ReceivedCall:
         kind, codec, limit_ms, number, data = _read_frame(parts)
         if kind != CallKind.CALL:
             raise WireError(_("not a service call"), code="call-kind")
-        return CallHeader(number, codec, limit_ms / 1000 if limit_ms else None, data)
+        return ReceivedCall(number, codec, limit_ms / 1000 if limit_ms else None, data)
 
-    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
+    def encode_reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
         return [_HEADER.pack(_VERSION, reply.kind, reply.codec, 0, number), reply.data]
 
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
@@ -166,7 +166,7 @@ def _read_frame(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int
 class _OriginalFraming:
     is_in_order = True
 
-    def call(
+    def encode_call(
         self,
         number: int,  # noqa: ARG002 - not in this format
         codec: int,  # noqa: ARG002 - always JSON
@@ -175,11 +175,11 @@ class _OriginalFraming:
     ) -> list[bytes | memoryview]:
         return [b"", data]
 
-    def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
-        return CallHeader(0, _JSON_CODEC, None, _single_part(parts))
+    def read_call(self, parts: Sequence[bytes | memoryview]) -> ReceivedCall:
+        return ReceivedCall(0, _JSON_CODEC, None, _single_part(parts))
 
     # not in this format
-    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
+    def encode_reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
         return [b"", reply.data]
 
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:

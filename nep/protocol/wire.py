@@ -361,7 +361,7 @@ def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
     return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
 
 
-class Parts(NamedTuple):
+class ParsedMessage(NamedTuple):
     """Parsed message: its topic, header, payload and extension."""
 
     topic: str
@@ -370,7 +370,7 @@ class Parts(NamedTuple):
     extension: Mapping[str, object]
 
 
-def split(parts: Sequence[bytes | memoryview]) -> Parts:
+def split(parts: Sequence[bytes | memoryview]) -> ParsedMessage:
     """Parse a message. The payload of a batch is its body, which `nep.protocol.batch.read_parts` splits.
 
     Raises:
@@ -382,7 +382,7 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
     first, *rest = split_single_part(bytes(parts[0])) if len(parts) == 1 else parts
     topic = _parse_topic(bytes(first))
     header, payload, extension = parse_remaining_parts(rest, is_one_part=len(parts) == 1)
-    return Parts(topic, header, payload, extension)
+    return ParsedMessage(topic, header, payload, extension)
 
 
 def parse_remaining_parts(

@@ -15,7 +15,7 @@ from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.formats.channels import ChannelDecoder, encoding_of, recorder_channel
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
-from nep.recordings.formats.message_counts import TopicCounter, changed
+from nep.recordings.formats.message_counts import TopicCounter, changed_counters
 from nep.recordings.formats.records import RawMessage
 from nep.recordings.reader import Recording
 
@@ -72,7 +72,7 @@ class _PartCopier:
             if role in _COPIED_ROLES:
                 self._roles[channel] = role
             elif role is None and definition.topic in topics:
-                self._numbers[channel] = self._channel_number(channel)
+                self._numbers[channel] = self._channel_id(channel)
         self.channels = frozenset((*self._roles, *self._numbers))
         writer.write_channels(dict.fromkeys(self._numbers.values()))
         self._stats_counter = _StatsCounter(recording) if recording.stats() else None
@@ -81,8 +81,8 @@ class _PartCopier:
         self._chunk_ns: int | None = None
         self._last_ns = 0
 
-    def _channel_number(self, channel: int) -> int:
-        number = self._writer.table.number(self._recording.info.channels[channel])
+    def _channel_id(self, channel: int) -> int:
+        number = self._writer.table.channel_id(self._recording.info.channels[channel])
         if number is None:
             raise RecordingError(str(self._path), _("the recording has too many channels"))
         return number
@@ -121,11 +121,11 @@ class _PartCopier:
             self._last_entries[role, id] = value
         if self._entry_count < _MAX_ENTRIES:
             self._entry_count += 1
-            self._write_message(self._channel_number(raw.channel), raw)
+            self._write_message(self._channel_id(raw.channel), raw)
 
     def _write_stats(self, at_ns: int, *, is_final: bool = False) -> None:
         record = None if self._stats_counter is None else self._stats_counter.record(at_ns, is_final=is_final)
-        number = None if record is None else self._writer.table.number(recorder_channel("figures"))
+        number = None if record is None else self._writer.table.channel_id(recorder_channel("figures"))
         if record is not None and number is not None:
             self._writer.add(number, (at_ns, at_ns), 0, b"", record)
 
@@ -171,7 +171,7 @@ class _StatsCounter:
         if not is_final and at_ns < self._next_ns:
             return None
         self._next_ns = at_ns + _STATS_INTERVAL_NS
-        counters = dict(self._counters) if is_final else dict(changed(self._counters))
+        counters = dict(self._counters) if is_final else dict(changed_counters(self._counters))
         stats_by_topic = {topic: counter.stats().to_plain() for topic, counter in counters.items()}
         for counter in counters.values():
             counter.is_changed = False

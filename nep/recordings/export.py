@@ -114,7 +114,7 @@ def export(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if kind == "mp4":
-            container = available_container(_opencv(), folder)
+            container = available_container(_import_opencv(), folder)
             make, suffix = partial(_write_video, container=container), container.suffix
         else:
             make, suffix = (
@@ -133,7 +133,7 @@ def export(
             except BaseException:
                 _remove(unfinished)
                 raise
-            exported.append(ExportedFile(topic, path, count, source.unreadable))
+            exported.append(ExportedFile(topic, path, count, source.undecodable_count))
     except OSError as error:
         raise disk_error(folder, error) from error
     return exported
@@ -170,7 +170,7 @@ def _exportable_topics(
     if kind != "mcap" and len(topics) > MAX_FILES:
         template = _("the recording has {count} suitable topics; choose at most {most}")
         raise RecordingError(str(recording.path), template.format(count=len(topics), most=MAX_FILES))
-    counts = _counts(recording, topics, part)
+    counts = _estimate_counts(recording, topics, part)
     if kind != "mcap":
         topics = [name for name in topics if counts.get(name)]
     if not any(counts.values()):
@@ -180,7 +180,7 @@ def _exportable_topics(
     return topics, _Progress(sum(counts.values()), progress)
 
 
-def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, int]:
+def _estimate_counts(recording: Recording, topics: list[str], part: Part) -> dict[str, int]:
     # Estimated from indexes, without reading messages; at least 1 for a topic with messages.
     if part.start_ns is None and part.end_ns is None:
         return {name: recording.topics[name].message_count for name in topics}
@@ -232,7 +232,7 @@ class _Source:
 
     def __init__(self, recording: Recording, topic: str, part: Part, counted: _Progress) -> None:
         self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
-        self.unreadable = 0
+        self.undecodable_count = 0
 
     def messages(self, *, is_counted: bool = True) -> Iterator[RecordedMessage]:
         for record in self._recording.read(self._part.start_ns, self._part.end_ns, (self.topic,)):
@@ -242,12 +242,12 @@ class _Source:
 
     def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
         # Flat values with the times first; a field of the payload with the same name becomes "payload.seq".
-        self.unreadable = 0
+        self.undecodable_count = 0
         for record in self.messages(is_counted=is_counted):
             try:
                 values = flatten(record.message.payload)
             except (DecodeError, RecursionError):
-                self.unreadable += 1
+                self.undecodable_count += 1
                 continue
             row = _time_columns(record)
             for name, value in values.items():
@@ -370,7 +370,7 @@ def _write_parquet(source: _Source, path: Path, _fps: float) -> int:
     except ImportError as error:
         raise RecordingsUnavailableError("pip install 'nep-studio[parquet]'") from error
     columns = _columns(source)
-    kinds = {name: _kind_of(name, types) for name, types in columns.items()}
+    kinds = {name: _column_type(name, types) for name, types in columns.items()}
     arrow = {
         "bool": pa.bool_(),
         "int": pa.int64(),
@@ -398,7 +398,7 @@ def _write_parquet(source: _Source, path: Path, _fps: float) -> int:
     return count
 
 
-def _kind_of(name: str, types: set[type]) -> str:
+def _column_type(name: str, types: set[type]) -> str:
     if name == "seq":
         return "uint"
     if types == {bool}:
@@ -435,7 +435,7 @@ def _write_pictures(source: _Source, path: Path, _fps: float) -> int:
     for record in source.messages():
         picture = _picture_file(record.message)
         if picture is None:
-            source.unreadable += 1
+            source.undecodable_count += 1
             continue
         suffix, data = picture
         count += 1
@@ -453,7 +453,7 @@ def _picture_file(message: Message) -> tuple[str, bytes] | None:
         frame: Any = message.payload
     except DecodeError:
         return None
-    opencv = _opencv()
+    opencv = _import_opencv()
     try:
         is_made, buffer = opencv.imencode(".png", frame)
     except opencv.error:
@@ -461,7 +461,7 @@ def _picture_file(message: Message) -> tuple[str, bytes] | None:
     return ("png", buffer.tobytes()) if is_made else ("raw", data)
 
 
-def _opencv() -> Any:  # noqa: ANN401 - a module
+def _import_opencv() -> Any:  # noqa: ANN401 - a module
     try:
         import cv2  # noqa: PLC0415 - optional and heavy
     except ImportError as error:
@@ -471,14 +471,14 @@ def _opencv() -> Any:  # noqa: ANN401 - a module
 
 def _write_video(source: _Source, path: Path, fps: float, container: Container) -> int:
     # Constant frame rate in recording time: each frame is the newest image.
-    opencv = _opencv()
+    opencv = _import_opencv()
     film = VideoFile(opencv, path, fps, container)
     count = 0
     try:
         for record in source.messages():
             frame = decode_frame(opencv, record.message)
             if frame is None:
-                source.unreadable += 1
+                source.undecodable_count += 1
                 continue
             film.add(record.log_ns, frame)
             count += 1

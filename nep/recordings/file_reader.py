@@ -30,7 +30,7 @@ from nep.recordings.formats.index import (
     read_index,
 )
 from nep.recordings.formats.limits import ReadBudget
-from nep.recordings.formats.records import ChunkInfo, RawMessage, messages_in
+from nep.recordings.formats.records import ChunkInfo, RawMessage, records_in
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -150,7 +150,7 @@ class _LoadedChunk:
     def messages(self, info: ChunkInfo, channels: Collection[int]) -> Iterator[RawMessage]:
         # Indexed at the first search for few channels among many.
         if self._offsets is None and all(each in channels for each in info.channels):
-            for record in messages_in(self.data):
+            for record in records_in(self.data):
                 if isinstance(record, RawMessage) and record.channel in channels:
                     yield record
             return
@@ -161,13 +161,13 @@ class _LoadedChunk:
             if len(channel_offsets) == 1
             else sorted(each for offset_group in channel_offsets for each in offset_group)
         ):
-            found_there = next(messages_in(self.data, offset), None)
+            found_there = next(records_in(self.data, offset), None)
             if isinstance(found_there, RawMessage):
                 yield found_there
 
     def _index(self) -> dict[int, array[int]]:
         offsets: dict[int, array[int]] = {}
-        for record in messages_in(self.data):
+        for record in records_in(self.data):
             if isinstance(record, RawMessage):
                 if record.channel not in offsets:
                     offsets[record.channel] = array("Q")
@@ -396,7 +396,7 @@ class FileReader:
         chunk = self._chunk(number)
         if chunk is None:
             return None
-        record = next(messages_in(chunk.data, offset), None)
+        record = next(records_in(chunk.data, offset), None)
         if not isinstance(record, RawMessage) or record.channel != channel:
             return None
         return self._detach(record, chunk)

@@ -35,11 +35,11 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    messages_in,
     pack_message_index,
     read_chunk_head,
     read_message_index,
     read_record,
+    records_in,
 )
 from nep.recordings.formats.walk import RecordLocation
 from nep.system.replace_file import replace_file
@@ -175,7 +175,7 @@ def _verify(path: Path, writer: FileWriter) -> tuple[int, int]:
                 chunk = read_chunk(file, info)
             except ValueError as error:
                 raise RecordingError(str(path), _("the recovered messages can't be read back")) from error
-            for record in messages_in(chunk):
+            for record in records_in(chunk):
                 if isinstance(record, RawMessage):
                     counts[record.channel] = counts.get(record.channel, 0) + 1
     if counts != writer.counts:
@@ -226,7 +226,7 @@ class _Repair:
                 continue
             offset = self._skip_corruption(offset)
         else:
-            self._discard_bytes(max(0, self._size - offset))
+            self._count_discarded_bytes(max(0, self._size - offset))
         self._finish()
         self._progress(self._size, self._size)
         return self._counts
@@ -256,7 +256,7 @@ class _Repair:
             self._copy_metadata(self._read_content(location))
         elif location.opcode == Opcode.MESSAGE:
             self._file.seek(location.offset)
-            for record in messages_in(self._file.read(end - location.offset)):
+            for record in records_in(self._file.read(end - location.offset)):
                 self._copy_record(record)
         return self._is_record_at(end)
 
@@ -272,7 +272,7 @@ class _Repair:
 
     def _define(self, opcode: int, content: bytes | memoryview) -> None:
         for number in self._definitions.add(opcode, content):
-            self._table.add_numbered(number, self._definitions.channels[number])
+            self._table.add_with_id(number, self._definitions.channels[number])
 
     def _copy_metadata(self, content: bytes) -> None:
         try:
@@ -307,7 +307,7 @@ class _Repair:
             self._counts.corrupt_range_count += 1
             self._counts.is_unknown = True  # until its message indexes are read
             self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
-            self._discard_bytes(HEAD_BYTES + location.length)
+            self._count_discarded_bytes(HEAD_BYTES + location.length)
             return True
         self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
         self._copy_chunk(record, header, chunk)
@@ -317,14 +317,14 @@ class _Repair:
         # Copied unchanged if it contains only messages of known channels.
         indexes: dict[int, list[int]] = {}
         is_plain = True
-        for item in messages_in(chunk):
+        for item in records_in(chunk):
             if not isinstance(item, RawMessage) or item.channel not in self._definitions.channels:
                 is_plain = False
                 break
             indexes.setdefault(item.channel, []).extend((item.log_ns, item.offset))
             self._read_entry(item)
         if not is_plain or not indexes:
-            for item in messages_in(chunk):
+            for item in records_in(chunk):
                 self._copy_record(item)
             return
         info = ChunkInfo(
@@ -388,7 +388,7 @@ class _Repair:
 
     # ---- damage
 
-    def _discard_bytes(self, count: int) -> None:
+    def _count_discarded_bytes(self, count: int) -> None:
         self._counts.discarded_bytes += count
 
     def _skip_corruption(self, offset: int) -> int:
@@ -398,9 +398,9 @@ class _Repair:
         self._counts.is_unknown = True
         if chunk_offset is None:
             copied = self._copy_truncated_chunk(offset)
-            self._discard_bytes(self._size - offset - copied)
+            self._count_discarded_bytes(self._size - offset - copied)
             return self._size
-        self._discard_bytes(chunk_offset - offset)
+        self._count_discarded_bytes(chunk_offset - offset)
         return chunk_offset
 
     def _has_chunk_after(self, offset: int) -> bool:
@@ -452,7 +452,7 @@ class _Repair:
         record = memoryview(self._file.read(HEAD_BYTES + length))
         self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
         before = self._counts.recovered
-        for item in messages_in(decompress_partial(record[header.data_offset :], header)):
+        for item in records_in(decompress_partial(record[header.data_offset :], header)):
             if isinstance(item, RawMessage):
                 is_plausible = header.start_ns <= item.log_ns <= header.end_ns
                 if not is_plausible or item.channel not in self._definitions.channels:

@@ -32,8 +32,8 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    messages_in,
     read_chunk_head,
+    records_in,
 )
 from nep.recordings.writer import LogClock, RecordingWriter
 
@@ -410,7 +410,7 @@ class _ChunkStats:
         return any(self._role(each) == "figures" for each in chunk.channels)
 
     def read(self, records: bytes | memoryview) -> None:
-        for record in messages_in(records):
+        for record in records_in(records):
             if not isinstance(record, RawMessage) or self._role(record.channel) != "figures":
                 continue
             for topic, fields in orjson.loads(record.data)["topics"].items():

@@ -38,7 +38,7 @@ from nep.recordings.formats.destination import (
     disk_error,
 )
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
-from nep.recordings.formats.message_counts import MAX_TOPICS, TopicCounter, TopicStats, changed
+from nep.recordings.formats.message_counts import MAX_TOPICS, TopicCounter, TopicStats, changed_counters
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -93,7 +93,7 @@ class RecordingStatus:
 
 
 @dataclass
-class _KindCache:
+class _CachedKind:
     """Counter and channels of the messages with the same `MessageKind` and publisher, looked up once."""
 
     kind: MessageKind
@@ -213,7 +213,7 @@ class RecordingWriter:
         self._problem = ""
         self._last_ns = 0
         self._counters: dict[str, TopicCounter] = {}
-        self._kind_cache: dict[int, _KindCache] = {}
+        self._kind_cache: dict[int, _CachedKind] = {}
         self._stats: dict[str, TopicStats] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
@@ -456,7 +456,7 @@ class RecordingWriter:
         if channel is None:
             channel, encoding = self._channel(message, encoding, log_ns)
             if channel is None:
-                cached.counter.count_skipped(message.publisher, 1, message.size_bytes)
+                cached.counter.count_dropped(message.publisher, 1, message.size_bytes)
                 return
             if not encoding.is_self_contained:
                 cached.channels[key] = channel
@@ -470,10 +470,10 @@ class RecordingWriter:
         if file.pending_bytes >= CHUNK_BYTES:
             self._flush()
 
-    def _cache_kind(self, message: Message) -> _KindCache:
+    def _cache_kind(self, message: Message) -> _CachedKind:
         if len(self._kind_cache) >= _MAX_CACHED_KINDS:
             self._kind_cache.clear()
-        cached = _KindCache(message.kind, message.publisher, self._counter(message.topic))
+        cached = _CachedKind(message.kind, message.publisher, self._counter(message.topic))
         self._kind_cache[id(message.kind)] = cached  # `cached` keeps the kind alive, so its id stays unique
         return cached
 
@@ -487,15 +487,15 @@ class RecordingWriter:
         table = self._destination.file.table
         definition = definition_of(message, encoding)
         if len(table.definitions) < MAX_PUBLISHER_CHANNELS or table.has(definition):
-            return table.number(definition), encoding
+            return table.channel_id(definition), encoding
         encoding = encoding_of(message, log_ns, is_self_contained=True)
-        return table.number(definition_of(message, encoding)), encoding
+        return table.channel_id(definition_of(message, encoding)), encoding
 
     def _write_recorder_entry(self, role: Role, text: bytes) -> None:
         self._own_sequence += 1
         now = self._last_ns = max(self._last_ns, self._clock())
         file = self._destination.file
-        number = file.table.number(recorder_channel(role))
+        number = file.table.channel_id(recorder_channel(role))
         if number is not None:
             self._own_numbers.add(number)
             file.add(number, (now, now), self._own_sequence & 0xFFFFFFFF, b"", text)
@@ -528,8 +528,8 @@ class RecordingWriter:
         with self._lock:
             dropped, self._dropped_counts = self._dropped_counts, {}
         for (topic, publisher), (count, size) in dropped.items():
-            self._counter(topic).count_skipped(publisher, count, size)
-        counters = dict(self._counters) if all_of_them else dict(changed(self._counters))
+            self._counter(topic).count_dropped(publisher, count, size)
+        counters = dict(self._counters) if all_of_them else dict(changed_counters(self._counters))
         if not counters:
             return
         stats_by_topic = {topic: counter.stats() for topic, counter in counters.items()}

@@ -243,7 +243,7 @@ class MasterNameResolver:
     def __init__(
         self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = resolve_host
     ) -> None:
-        self.known = ""
+        self.address = ""
         """Address with a numeric host, or "" until the name is resolved."""
         self._host, self._port = host_of(address), address.rpartition(":")[2]
         self._on_change = on_change
@@ -254,7 +254,7 @@ class MasterNameResolver:
         self._resolved = threading.Event()
         host = "127.0.0.1" if self._host in _LOCAL_NAMES else self._host
         if _is_numeric(host):
-            self.known = f"{host}:{self._port}"
+            self.address = f"{host}:{self._port}"
             self._resolved.set()
 
     def resolve(self, now: float) -> None:
@@ -299,8 +299,8 @@ class MasterNameResolver:
                 )
             return
         self._is_failure_logged = False
-        if address != self.known:
-            self.known = address
+        if address != self.address:
+            self.address = address
             self._on_change(address)
         self._resolved.set()
 

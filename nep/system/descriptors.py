@@ -102,13 +102,13 @@ def has_free_descriptors(needed: int) -> bool:
     return _descriptor_check.has_free(needed)
 
 
-def _forked() -> None:
+def _reset_after_fork() -> None:
     # In a forked child the lock may be held for ever.
     global _descriptor_check  # noqa: PLW0603 - one per process
     _descriptor_check = _DescriptorCheck()
 
 
-call_in_child(_forked)
+call_in_child(_reset_after_fork)
 
 
 def raise_open_file_limit() -> None:

@@ -35,7 +35,7 @@ _DESCRIPTOR_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
 _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
-def watch(owner: ForkAware) -> None:
+def notify_after_fork(owner: ForkAware) -> None:
     """Register an object whose `forked` is called in every child process. Only a weak reference is stored."""
     _fork_aware_objects.add(owner)
 

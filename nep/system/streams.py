@@ -105,7 +105,7 @@ def _write_error_reason(error: OSError) -> str:
     return "" if error.errno in _READER_GONE_ERRNOS else (error.strerror or str(error)).lower()
 
 
-def close_streams() -> None:
+def flush_streams() -> None:
     """Flush the standard streams. Text that can't be written is discarded; it would fail again at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:

@@ -14,7 +14,7 @@ from collections import deque
 from typing import TYPE_CHECKING, TextIO
 
 from nep.i18n import ngettext
-from nep.system.forks import watch
+from nep.system.forks import notify_after_fork
 from nep.text import escaped
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Terminal(io.TextIOBase):
         self._is_writing = False
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
-        watch(self)
+        notify_after_fork(self)
 
     @property
     def encoding(self) -> str:  # type: ignore[override]

@@ -11,7 +11,7 @@ import threading
 from nep.errors import TooManyFilesError
 from nep.i18n import _
 from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
-from nep.system.forks import watch
+from nep.system.forks import notify_after_fork
 
 _HAS_EVENTFD = sys.platform == "linux" and hasattr(os, "eventfd")
 
@@ -42,7 +42,7 @@ class Waker:
             end.setblocking(False)
         self.fd = self._sockets[0].fileno() if self._sockets else self._event
         """File descriptor to poll for reading."""
-        watch(self)
+        notify_after_fork(self)
 
     def wake(self) -> None:
         """Make `fd` readable. Never blocks; several wakes before a `clear` count as one."""

@@ -73,7 +73,7 @@ def test_dropped_records_are_counted() -> None:
         "newest",
         "1 log record was dropped: too many at once",
     ]
-    assert console.left_out == 745
+    assert console.dropped_count == 745
 
 
 def test_records_of_a_local_program_are_not_duplicated() -> None:

@@ -161,7 +161,7 @@ if IS_THERE:  # optional: not dependencies of the library
     )
     def answers_of_rize(data: bytes) -> None:
         value = value_of(data)
-        rize.ready(value)
+        rize.announced_name(value)
         rize.from_reply(value)
 
     @TARGETS.add(

@@ -108,20 +108,20 @@ def batch_entries(data: bytes) -> None:
 
 def calls() -> Iterator[bytes]:
     native = service_wire.NATIVE
-    yield joined(native.call(7, 1, 2.5, b'{"a":1}'))
-    yield joined(native.call(2**64 - 1, 4, None, b""))
+    yield joined(native.encode_call(7, 1, 2.5, b'{"a":1}'))
+    yield joined(native.encode_call(2**64 - 1, 4, None, b""))
     for kind in (service_wire.CallKind.ERROR, service_wire.CallKind.REJECTED):
         failed = service_wire.error_reply(kind, "ValueError", "no \ud800")
-        yield joined(native.reply(9, failed))
-        yield joined(service_wire.ORIGINAL.reply(9, failed))
-    yield joined(service_wire.ORIGINAL.call(7, 1, 2.5, b'{"a":1}'))
+        yield joined(native.encode_reply(9, failed))
+        yield joined(service_wire.ORIGINAL.encode_reply(9, failed))
+    yield joined(service_wire.ORIGINAL.encode_call(7, 1, 2.5, b'{"a":1}'))
 
 
 @TARGETS.add(WireError, seeds=calls, words=(SEPARATOR, b'{"nep_error":', b"\x01\x01\x01\0"))
 def native_calls(data: bytes) -> None:
     call = service_wire.NATIVE.read_call(parts_of(data))
     assert call.timeout_s is None or 0 < call.timeout_s < 2**32
-    made = service_wire.NATIVE.call(call.number, call.codec, call.timeout_s, call.data)
+    made = service_wire.NATIVE.encode_call(call.number, call.codec, call.timeout_s, call.data)
     assert joined(made) == data
 
 
@@ -141,7 +141,7 @@ def answers_of_services(data: bytes) -> None:
 
 
 def streams() -> Iterator[bytes]:
-    pairs = [joined_pair(service_wire.NATIVE.call(7, 1, 2.5, b"x" * size)) for size in (0, 3, 1000)]
+    pairs = [joined_pair(service_wire.NATIVE.encode_call(7, 1, 2.5, b"x" * size)) for size in (0, 3, 1000)]
     yield pairs[0] + pairs[1]
     yield b"".join(pairs)
     yield pairs[2][:-1]

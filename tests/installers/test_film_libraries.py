@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from installers.context import Context
-from installers.linux.film_libraries import FILMS, leave_out_films
+from installers.linux.film_libraries import FFMPEG_LIBRARIES, remove_ffmpeg
 
 found = importlib.util.find_spec("cv2")
 SITE = Path(found.origin or "").parents[1] if found is not None else Path()
@@ -48,9 +48,9 @@ def test_opencv_without_ffmpeg_handles_images_and_rejects_videos(tmp_path: Path)
     shutil.copytree(SITE / "cv2", inside / "cv2", ignore=shutil.ignore_patterns("data", "*.pyi"))
     shutil.copytree(LIBRARIES, inside / LIBRARIES.name)
     (inside / "libvpx.so.11").symlink_to(next(LIBRARIES.glob("libvpx*")))
-    saved = leave_out_films(context)
+    saved = remove_ffmpeg(context)
     assert saved > 20_000_000
-    films = [path for path in (inside / LIBRARIES.name).iterdir() if FILMS.match(path.name)]
+    films = [path for path in (inside / LIBRARIES.name).iterdir() if FFMPEG_LIBRARIES.match(path.name)]
     assert films
     assert sum(path.stat().st_size for path in films) < 100_000
     environ = {**os.environ, "PYTHONPATH": str(inside), "OPENCV_VIDEOIO_PRIORITY_FFMPEG": "0"}

@@ -13,10 +13,10 @@ import pytest
 
 from installers.context import Context, PackageError
 from installers.windows.icon import SIDES, ico
-from installers.windows.nsis import REG_FILE, association, entries
-from installers.windows.packer import give_one_time, make_zip, refuse_files_of_wine
+from installers.windows.nsis import REG_FILE, association_macros, entry_macros
+from installers.windows.packer import make_zip, reject_wine_files, set_timestamps
 from installers.windows.version import version_numbers, version_resource
-from installers.windows.wine import for_windows
+from installers.windows.wine import windows_requirements
 from tests.installers.small_setup import frozen_program, setup_of
 
 LATER = 1_800_000_000
@@ -46,7 +46,7 @@ def test_pinned_packages_are_selected_by_their_markers_for_windows() -> None:
         "rich==15.0.0 \\",
         "    --hash=sha256:ff",
     ]
-    assert for_windows(lines) == [
+    assert windows_requirements(lines) == [
         "colorama==0.4.6 --hash=sha256:aa --hash=sha256:bb",
         "iceoryx2==0.10.0 --hash=sha256:ee",
         "rich==15.0.0 --hash=sha256:ff",
@@ -55,7 +55,7 @@ def test_pinned_packages_are_selected_by_their_markers_for_windows() -> None:
 
 def test_every_package_for_windows_has_a_hash() -> None:
     pinned = (Path(__file__).parents[2] / "requirements" / "package.txt").read_text("utf-8")
-    wanted = for_windows(pinned.splitlines())
+    wanted = windows_requirements(pinned.splitlines())
     assert {"pefile", "pywin32-ctypes", "pyinstaller", "pyside6"} <= {line.split("==")[0] for line in wanted}
     assert all("==" in line and "--hash=sha256:" in line for line in wanted)
 
@@ -104,7 +104,7 @@ def test_ico_file_holds_each_image_at_its_offset() -> None:
 
 
 def test_installer_script_unpacks_every_file_into_its_folder(context: Context) -> None:
-    told = entries(context.frozen)
+    told = entry_macros(context.frozen)
     unpacked = [line.strip() for line in told.partition("!macroend")[0].splitlines()[1:]]
     frozen = context.frozen
     assert unpacked == [
@@ -121,7 +121,7 @@ def test_installer_script_unpacks_every_file_into_its_folder(context: Context) -
 
 
 def test_file_association_is_registered_and_unregistered() -> None:
-    put, take = association(REG_FILE.read_text("utf-8")).split("!macro Dissociate")
+    put, take = association_macros(REG_FILE.read_text("utf-8")).split("!macro Dissociate")
     command = '"Software\\Classes\\NEPStudio.Behaviour\\shell\\open\\command" ""'
     assert f'WriteRegStr HKCU {command} "$\\"$INSTDIR\\nep-studio.exe$\\" $\\"%1$\\""' in put
     assert 'DeleteRegKey HKCU "Software\\Classes\\NEPStudio.Behaviour"\n' in take
@@ -144,7 +144,7 @@ def test_setup_texts_exist_in_each_language() -> None:
 
 @pytest.mark.skipif(shutil.which("makensis") is None, reason="needs nsis")
 def test_setup_is_reproducible(context: Context) -> None:
-    give_one_time(context.frozen, context.epoch)
+    set_timestamps(context.frozen, context.epoch)
     made = setup_of(context)
     assert made.name == "NEP-Studio-1.2.3-setup.exe"
     first = made.read_bytes()
@@ -171,7 +171,7 @@ def test_zip_is_sorted_and_reproducible(context: Context) -> None:
 
 
 def test_wine_dll_is_rejected(context: Context) -> None:
-    refuse_files_of_wine(context.frozen)
+    reject_wine_files(context.frozen)
     (context.frozen / "_internal" / "version.dll").write_bytes(b"MZ" + bytes(62) + b"Wine builtin DLL\0")
     with pytest.raises(PackageError, match=r"files of Wine: version\.dll"):
-        refuse_files_of_wine(context.frozen)
+        reject_wine_files(context.frozen)

@@ -141,7 +141,7 @@ def prepare(name: str, widget: PanelWidget) -> None:
         widget.show_topic("/blackboard")
         widget.session.send("/blackboard", blackboard())  # type: ignore[attr-defined]
         widget.refresh()
-        widget.tree.setCurrentIndex(widget.model.reveal(("robots", "Pepper", "pose", "y")))
+        widget.tree.setCurrentIndex(widget.model.index_of_path(("robots", "Pepper", "pose", "y")))
     if name == "nodes" and isinstance(widget, nodes.NodesPanel) and len(widget.session.nodes):
         widget.refresh()
         widget.table.opened.emit(widget.model.key_of(widget.model.row_at(widget.model.index(1, 0))))  # type: ignore[arg-type]

@@ -133,7 +133,7 @@ def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands:
     order = []
     for _ in range(4):
         QTest.keyClick(window, Qt.Key.Key_F6)
-        dock = window.panel_focus.dock()
+        dock = window.panel_focus.focused_dock()
         assert dock is not None
         order.append(dock.mapTo(window, QPoint(0, 0)))
     start = order.index(min(order, key=lambda place: (place.x(), place.y())))

@@ -17,7 +17,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 def drive(qtbot, window: MainWindow, commands: Commands, folder: Path, steps: list[Step]) -> SelfDrive:
     window.show()
     done: list[str] = []
-    window.on_shut = lambda: done.append("shut")
+    window.on_closed = lambda: done.append("shut")
     driver = SelfDrive(window, folder, steps)
     qtbot.waitUntil(lambda: bool(done))
     return driver
@@ -44,7 +44,7 @@ def test_every_tour_step_waits_for_its_condition_before_its_screenshot(
         Step("nothing to keep", lambda: None, lambda: True, settle_s=0),
     ]
     driver = drive(qtbot, window, commands, tmp_path / "tour", steps)
-    assert driver.well
+    assert driver.has_succeeded
     assert [path.name for path in driver.pictures] == ["dark.png", "developer.png"]
     assert len(looks) == 4
     shot = QImage(str(driver.pictures[1]))
@@ -61,6 +61,6 @@ def test_unmet_tour_condition_is_reported(
         Step("never", lambda: None, lambda: True),
     ]
     driver = drive(qtbot, window, commands, tmp_path, steps)
-    assert not driver.well
+    assert not driver.has_succeeded
     assert (tmp_path / "failed.png").is_file()
     assert capsys.readouterr().err == "step not completed within 0.2 s: a robot\n"

@@ -14,7 +14,7 @@ from app.blocks.model.robot_keywords import (
     bilingual_search_words,
     sensor_search_words,
 )
-from app.blocks.model.robot_text import BlockTemplate, about, block_type_of, field_of, input_of
+from app.blocks.model.robot_text import BlockTemplate, block_type_of, field_of, format_limits, input_of
 from app.robots.description.description import Action, Event, Robot, Sensor
 from app.robots.description.json_access import display_text, names
 from nep.i18n import _, pgettext, translate
@@ -111,7 +111,7 @@ def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
-        about={argument.name: (parameter.title, about(parameter)) for parameter, argument in inputs},
+        about={argument.name: (parameter.title, format_limits(parameter)) for parameter, argument in inputs},
         search_words=", ".join((keywords.words, translate("category", _group_title(action)))),
         english_search_words=keywords.english,
     )

@@ -128,19 +128,19 @@ class _Compiler:
         self._catalogue = catalogue
         self._name = name
         self._names = PythonNames(RESERVED_NAMES)
-        self._shaping = Lowering(workspace, catalogue, self._names)
-        self._workspace = workspace = self._shaping.workspace
+        self._lowering = Lowering(workspace, catalogue, self._names)
+        self._workspace = workspace = self._lowering.workspace
         self._function: Function | None = None  # the function being compiled
         self._calls: set[str] = set()  # blocks that call a function
         self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
-        self._marks: dict[ast.AST, str] = {}
+        self._block_ids: dict[ast.AST, str] = {}
         self._problems = ProblemCollector(catalogue, workspace)
-        self._readings: dict[str, str] = {}
+        self._block_texts: dict[str, str] = {}
         self._labels: dict[str, str] = {}
         self._breakpoints: dict[str, None] = {}
         self._uses = _UsedResources()
-        self._loose_ends = NameUsage()
-        self._in_message = False
+        self._name_usage = NameUsage()
+        self._has_message = False
         self._numbers: set[str] = set()  # blocks that must return a number
 
     def program(self) -> Program:
@@ -149,11 +149,11 @@ class _Compiler:
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
         self._problems.check_starts(len(functions))
-        self._loose_ends.report(self._problems, self._workspace)
+        self._name_usage.report(self._problems, self._workspace)
         self._problems.check_unknown()
         self._problems.check_names()
         for conflict in ConflictFinder(
-            self._workspace, self._catalogue, self._shaping.called_function
+            self._workspace, self._catalogue, self._lowering.called_function
         ).conflicts():
             self._problems.report_conflict(conflict)
         body: list[ast.stmt] = [
@@ -163,12 +163,12 @@ class _Compiler:
         ]
         actions = invoked_actions(body)  # before `render_instrumented` changes the trees
         source, lines = render_source(
-            [*import_statements(body), *body, *run_statements(self._name)], self._marks
+            [*import_statements(body), *body, *run_statements(self._name)], self._block_ids
         )
         return Program(
             name=self._name,
             source=source,
-            runnable=render_instrumented(body, self._marks, self._numbers, self._calls),
+            runnable=render_instrumented(body, self._block_ids, self._numbers, self._calls),
             lines=lines,
             robots=tuple(self._uses.robots),
             sensors=tuple(self._uses.sensors),
@@ -177,7 +177,7 @@ class _Compiler:
             listens=tuple(self._uses.listens),
             moves=tuple(self._uses.moves),
             actions=actions,
-            readings=self._readings,
+            readings=self._block_texts,
             labels=self._labels,
             variables=self._all_variables(),
             breakpoints=tuple(self._breakpoints),
@@ -187,7 +187,7 @@ class _Compiler:
         )
 
     def _all_variables(self) -> tuple[Variable, ...]:
-        function_variables, workspace_variables = self._shaping.variables, self._workspace.variables
+        function_variables, workspace_variables = self._lowering.variables, self._workspace.variables
         names = dict(function_variables) | {id: workspace_variables.get(id, id) for id in self._variables}
         return tuple(Variable(id, name, self._variables.get(id, "")) for id, name in names.items())
 
@@ -205,14 +205,14 @@ class _Compiler:
             return None
         if self._problems.report_empty_slot(first, block) is not None:
             return None
-        self._in_message = bool(block.parameters)
+        self._has_message = bool(block.parameters)
         try:
             expressions = self._expressions(first, block)
         except _SkippedBlock:
             return None
         decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
         self._uses.add(first, block)
-        self._loose_ends.add(first, block)
+        self._name_usage.add(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
@@ -222,20 +222,20 @@ class _Compiler:
         if isinstance(function, ast.FunctionDef):
             function.name = self._names.new_name(self._store_block_text(first), "script")
             self._declare_globals(function)
-        self._marks[function] = first.id
+        self._block_ids[function] = first.id
         return function
 
     def _definitions(self) -> list[ast.stmt]:
         definitions: list[ast.stmt] = []
         for script in self._workspace.scripts:
-            self._function = self._shaping.function(script[0])
+            self._function = self._lowering.function(script[0])
             if self._function is not None and self._usable_block(script[0]) is not None:
                 definitions.append(self._definition(script[0], self._function))
         self._function = None
         return definitions
 
     def _definition(self, placed_block: PlacedBlock, function: Function) -> ast.stmt:
-        self._in_message = False
+        self._has_message = False
         self._store_block_text(placed_block)
         body = self._statements(placed_block.inputs.get("BODY", ()) if placed_block.enabled else ())
         if function.has_result:
@@ -245,7 +245,7 @@ class _Compiler:
             definition.name = function.python_name
             definition.args.args = [ast.arg(name) for name in function.parameters.values()]
             self._declare_globals(definition)
-        self._marks[definition] = placed_block.id
+        self._block_ids[definition] = placed_block.id
         return definition
 
     def _declare_globals(self, function: ast.FunctionDef) -> None:
@@ -285,7 +285,7 @@ class _Compiler:
         except _SkippedBlock:
             return []
         self._uses.add(placed_block, block)
-        self._loose_ends.add(placed_block, block)
+        self._name_usage.add(placed_block, block)
         self._problems.report_hints(placed_block, block)
         if block.publishes:
             self._record_moved_robots(placed_block, block)
@@ -297,7 +297,7 @@ class _Compiler:
         text = self._template(block, placed_block)
         compiled = statements(text, expressions, bodies, keywords(block, expressions))
         if block.calls_function and isinstance(compiled[0], ast.Expr):
-            self._marks[compiled[0].value] = placed_block.id
+            self._block_ids[compiled[0].value] = placed_block.id
             self._calls.add(placed_block.id)
         return self._record_block_id(compiled, placed_block)
 
@@ -315,7 +315,7 @@ class _Compiler:
         return self._function is not None and self._function.has_result == (block.needs_function == "result")
 
     def _record_block_id(self, compiled: list[ast.stmt], placed_block: PlacedBlock) -> list[ast.stmt]:
-        self._marks[compiled[0]] = placed_block.id
+        self._block_ids[compiled[0]] = placed_block.id
         return compiled
 
     # ---- values
@@ -342,7 +342,7 @@ class _Compiler:
         if block.shape not in ("value", "boolean"):
             self._problems.report_misplaced(placed_block, block)
             raise _SkippedBlock
-        if block.needs_message and not self._in_message:
+        if block.needs_message and not self._has_message:
             self._problems.report_no_message(placed_block, block)
             return literal(None)
         self._store_block_text(placed_block)
@@ -352,12 +352,12 @@ class _Compiler:
             compiled = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
             self._uses.add(placed_block, block)
-            self._loose_ends.add(placed_block, block)
+            self._name_usage.add(placed_block, block)
             compiled = expression(
                 self._template(block, placed_block), expressions, keywords(block, expressions)
             )
         if block.can_fail or missing is not None:
-            self._marks[compiled] = placed_block.id
+            self._block_ids[compiled] = placed_block.id
             if block.check == "Number" and missing is None:
                 self._numbers.add(placed_block.id)
             if block.calls_function:
@@ -408,7 +408,7 @@ class _Compiler:
 
     def _store_block_text(self, placed_block: PlacedBlock) -> str:
         text = block_text(placed_block, self._catalogue.blocks, self._workspace.variables)
-        self._readings[placed_block.id] = text
+        self._block_texts[placed_block.id] = text
         block = self._catalogue.blocks.get(placed_block.type)
         self._labels[placed_block.id] = self._problems.label(placed_block, block)
         return text

@@ -77,12 +77,12 @@ class _Instrumenter(ast.NodeTransformer):
     """
 
     def __init__(self, marks: BlockIdByNode, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
-        self._marks = marks
+        self._block_ids = marks
         self._numbers = numbers
         self._calls = calls
 
     def instrument_statement(self, node: ast.stmt) -> list[ast.stmt]:
-        id = self._marks.get(node)
+        id = self._block_ids.get(node)
         instrumented = node
         self.generic_visit(instrumented)
         for name in ("body", "orelse"):
@@ -109,7 +109,7 @@ class _Instrumenter(ast.NodeTransformer):
 
     def visit(self, node: ast.AST) -> ast.AST:
         visited = self.generic_visit(node)
-        id = self._marks.get(node)
+        id = self._block_ids.get(node)
         if id is None or not isinstance(visited, ast.expr):
             return visited
         empty = ast.arguments([], [], None, [], [], None, [])

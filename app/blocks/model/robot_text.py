@@ -117,7 +117,7 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
     return TextField(name, default if isinstance(default, str) else "hello")
 
 
-def about(parameter: Parameter) -> str:
+def format_limits(parameter: Parameter) -> str:
     """Format the limits and the unit of a parameter, such as "from 0 to 100 %"; "" if there are none."""
     unit = f" {display_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else format_number(parameter.minimum)

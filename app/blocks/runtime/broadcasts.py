@@ -42,20 +42,20 @@ class Receiver:
 
     def __init__(self, name: str, script: Callable[[], None]) -> None:
         self.name, self.script = name, script
-        self.waiting: Delivery | None = None
+        self.pending: Delivery | None = None
         self.runs_in: Script | None = None
 
     def serve(self, scheduler: Scheduler) -> None:
         """Run the script for each broadcast until the program ends."""
         self.runs_in = scheduler.current_script()
         while True:
-            scheduler.wait_for(lambda: self.waiting is not None, idle=True)
+            scheduler.wait_for(lambda: self.pending is not None, idle=True)
             delivery: Delivery | None = None
             try:
                 with suppress(EndScript):
                     scheduler.start_run()
                     # Read after getting the turn: the broadcast may have been sent again meanwhile.
-                    delivery, self.waiting = self.waiting, None
+                    delivery, self.pending = self.pending, None
                     self.script()
             finally:
                 if delivery is not None:
@@ -90,9 +90,9 @@ class Broadcasts:
     def _deliver(self, receiver: Receiver) -> Delivery:
         self._on_begin()
         delivery = Delivery(self._on_end)
-        if receiver.waiting is not None:
-            receiver.waiting.finish()
-        receiver.waiting = delivery
+        if receiver.pending is not None:
+            receiver.pending.finish()
+        receiver.pending = delivery
         if receiver.runs_in is not None:
             self._scheduler.end_run(receiver.runs_in)
         self._scheduler.wake_scripts()

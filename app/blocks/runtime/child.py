@@ -63,7 +63,7 @@ class RunnerOutput:
         self._lock = threading.Lock()
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
         self._remaining_lines = MAX_LINES
-        self.told: Callable[[str], object] = lambda _line: None
+        self.on_print: Callable[[str], object] = lambda _line: None
         """Called with each line that the program prints."""
         self._dropped = 0
 
@@ -92,7 +92,7 @@ class RunnerOutput:
                 self._printed.put_nowait(line[:MAX_LINE_LENGTH])
             except queue.Full:
                 self._dropped += 1
-            self.told(line[:MAX_LINE_LENGTH])
+            self.on_print(line[:MAX_LINE_LENGTH])
 
     def send_printed(self) -> None:
         """Send the queued lines, at most `MAX_LINES` in total."""
@@ -162,13 +162,13 @@ class Run:
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
         self._started_at = time.monotonic()
-        self._stop_answer_s = STOP_REPLY_TIMEOUT_S
+        self._stop_reply_timeout_s = STOP_REPLY_TIMEOUT_S
         self.set_pace(order)
         self._begins_paused = order.get("paused") is True
         if self._begins_paused:
             self._runtime.scheduler.pause()
 
-    def commands(self) -> dict[str, Callable[[], None]]:
+    def command_handlers(self) -> dict[str, Callable[[], None]]:
         """Return the handlers of commands without arguments, by name of the command."""
         scheduler = self._runtime.scheduler
         return {
@@ -221,14 +221,14 @@ class Run:
 
         The runner waits for these replies.
         """
-        self._stop_answer_s = 0.0
+        self._stop_reply_timeout_s = 0.0
         self._runtime.scheduler.stop()
         self._runtime.finished.set()
 
     def run(self) -> bool:
         """Run the program until it ends, then stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
-            self._out.told = partial(node.log.info, "%s")
+            self._out.on_print = partial(node.log.info, "%s")
             silent = self._run_with_node(node)
             error = self._runtime.error
             if error is not None:
@@ -239,7 +239,7 @@ class Run:
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._started_at, 3)
             self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
-            node.close(FLUSH_TIMEOUT_S if self._stop_answer_s == 0.0 else 2 * STOP_REPLY_TIMEOUT_S)
+            node.close(FLUSH_TIMEOUT_S if self._stop_reply_timeout_s == 0.0 else 2 * STOP_REPLY_TIMEOUT_S)
         return error is None
 
     def _run_with_node(self, node: nep.Node) -> tuple[str, ...]:
@@ -262,9 +262,9 @@ class Run:
             self._report_until_finished()
         finally:
             self._runtime.scheduler.stop()
-            silent = network.stop_robots(self._stop_answer_s)
+            silent = network.stop_robots(self._stop_reply_timeout_s)
             network.close()
-        return silent if self._stop_answer_s else ()
+        return silent if self._stop_reply_timeout_s else ()
 
     def _start_scripts(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}
@@ -380,7 +380,7 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
 
 
 def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
-    obeyed = run.commands()
+    obeyed = run.command_handlers()
     order_handlers: dict[str, Callable[[Mapping[str, object]], None]] = {
         "pace": run.set_pace,
         "robots": run.update_robots,

@@ -46,8 +46,8 @@ class Motions:
         self._unanswered: dict[str, _Motion] = {}  # by command id, until it is answered
         self._motions: dict[tuple[str, str], _Motion] = {}  # by robot and action
         self._paused = False
-        self._slow: set[int] = set()  # scripts waiting at a block
-        self._acting_for = threading.local()
+        self._delayed_scripts: set[int] = set()  # scripts waiting at a block
+        self._script_override = threading.local()
 
     def record_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
         """Record a new command, which ends earlier motions that use the same resources.
@@ -84,7 +84,7 @@ class Motions:
             motion = self._unanswered.pop(call.id, None)
             if motion is None:
                 return
-            slow = motion.script in self._slow
+            slow = motion.script in self._delayed_scripts
             if call.state != "succeeded" and not (slow and call.state == "canceled"):
                 return
             self._motions[motion.robot.name, motion.action] = motion
@@ -109,7 +109,7 @@ class Motions:
             if not self._paused:
                 return
             self._paused = False
-            motions = [each for each in self._motions.values() if each.script not in self._slow]
+            motions = [each for each in self._motions.values() if each.script not in self._delayed_scripts]
         self._resume(motions)
 
     @contextmanager
@@ -122,7 +122,7 @@ class Motions:
                 for motion in (*self._motions.values(), *self._unanswered.values())
                 if motion.script == script
             }
-            self._slow.add(script)
+            self._delayed_scripts.add(script)
             rests = self._paused
         for robot in moving.values():
             if not rests:
@@ -130,7 +130,7 @@ class Motions:
         yield
         # Not reached if the program was stopped, so that nothing starts again.
         with self._lock:
-            self._slow.discard(script)
+            self._delayed_scripts.discard(script)
             rests = self._paused
             motions = [motion for motion in self._motions.values() if motion.script == script]
         if moving and not rests:
@@ -138,12 +138,12 @@ class Motions:
 
     def _resume(self, motions: list[_Motion]) -> None:
         for motion in motions:
-            self._acting_for.script = motion.script
+            self._script_override.script = motion.script
             try:
                 self._invoke(motion.robot.name, motion.action, motion.input)
             finally:
-                del self._acting_for.script
+                del self._script_override.script
 
     def _script_id(self) -> int:
         # Another script than the thread's own while motions are resumed.
-        return getattr(self._acting_for, "script", None) or threading.get_ident()
+        return getattr(self._script_override, "script", None) or threading.get_ident()

@@ -158,7 +158,7 @@ class Network:
         self._errors = SuppressedErrors(_log, "a message or answer of a robot")
         self._ending = False
         self._motions = Motions(self._stop_for_pause, self._stop_motion, self.invoke)
-        self._alive = Heartbeat(program, "program alive")
+        self._heartbeat = Heartbeat(program, "program alive")
         self._open((*sensors, *events), publishes, listens)
 
     def _open(
@@ -176,7 +176,7 @@ class Network:
             self._resolve_senders()
         for robot in self._robots.values():
             if robot.dialect != "rize":
-                self._alive.start(robot.name, self._publishers[robot.topics.command].publish)
+                self._heartbeat.start(robot.name, self._publishers[robot.topics.command].publish)
 
     def _open_robot(self, robot: Robot) -> None:
         self._get_publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
@@ -194,7 +194,7 @@ class Network:
         """
         self._closed.set()
         self._lookup_requested.set()
-        self._alive.close()
+        self._heartbeat.close()
         if self._lookup_thread is not None:
             self._lookup_thread.join(timeout=3.0)
 

@@ -30,7 +30,7 @@ DEFAULT_TIMEOUT_S = 60.0
 TIMEOUT_MARGIN_S = 2.0
 COMMAND_CHECK_INTERVAL_S = 0.25
 """Interval in seconds at which a pending command is checked for time limits and a silent robot."""
-BEATS_MISSED, MIN_SILENCE_S = 4, 2.0
+MAX_MISSED_HEARTBEATS, MIN_SILENCE_S = 4, 2.0
 PAUSE_TIMEOUT_S = 3.0
 """Timeout in seconds for an action cancelled by a pause; robots built with the kit reply within 1 s."""
 MAX_STORED_COMMANDS = 64
@@ -53,9 +53,9 @@ class StatusText:
     """
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:
-        self._block, self._readings = block, readings
+        self._block, self._block_texts = block, readings
         self._status_by_block: dict[str | None, str] = {}
-        self._warned: dict[str | None, str] = {}
+        self._warning_by_block: dict[str | None, str] = {}
 
     def set_text(self, status: str) -> None:
         """Set the activity of a robot at the current block of the calling script; "" removes it."""
@@ -63,7 +63,7 @@ class StatusText:
 
     def set_warning(self, warning: str) -> None:
         """Set a warning at the current block of the calling script; "" removes it."""
-        _set_or_remove(self._warned, self._block(), warning)
+        _set_or_remove(self._warning_by_block, self._block(), warning)
 
     def text(self, blocks: Sequence[str]) -> str:
         """Return the text for the run bar: the activity of a robot at these blocks, or the first block.
@@ -74,11 +74,11 @@ class StatusText:
 
     def warning(self, blocks: Sequence[str]) -> str:
         """Return the warning at one of these blocks; "" if there is none."""
-        return _first_text(self._warned, blocks)
+        return _first_text(self._warning_by_block, blocks)
 
     def block_text(self, block: str | None) -> str:
         """Return a block as text; "" for None and unknown blocks."""
-        return self._readings.get(block or "", "")
+        return self._block_texts.get(block or "", "")
 
 
 def _set_or_remove(texts: dict[str | None, str], block: str | None, status: str) -> None:
@@ -394,7 +394,7 @@ class RobotHandle:
         if robot.heartbeat_interval_s is None:
             return None
         silence = time.monotonic() - call.last_reply_s
-        if silence <= max(MIN_SILENCE_S, BEATS_MISSED * robot.heartbeat_interval_s):
+        if silence <= max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 

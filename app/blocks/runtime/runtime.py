@@ -118,7 +118,7 @@ class Runtime:
         self._link: ProgramLink | None = None
         self._robots: Mapping[str, Robot] = {}
         self._starts: list[Script] = []
-        self._hats: list[tuple[ScriptTrigger, Script]] = []
+        self._triggers: list[tuple[ScriptTrigger, Script]] = []
         self._subscriptions: list[Callable[[ProgramLink], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
@@ -157,7 +157,7 @@ class Runtime:
         link.set_callbacks(self.scheduler.wake_scripts, self._on_external_stop)
         for subscribe in self._subscriptions:
             subscribe(link)
-        self._running = len(self._starts) + len(self._hats)
+        self._running = len(self._starts) + len(self._triggers)
         if not self._running:
             self.finished.set()
         with self.scheduler.defer_turns():
@@ -172,7 +172,7 @@ class Runtime:
         for script in self._starts:
             body = self._with_error_reporting(partial(self._run_once, script), on_end=self._remove_running)
             self.scheduler.start(script.__name__, body, idle=False)
-        for hat, script in self._hats:
+        for hat, script in self._triggers:
             body = self._with_error_reporting(
                 partial(self._run_for_events, hat, script), on_end=self._remove_running
             )
@@ -390,7 +390,7 @@ class Runtime:
         def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.enqueue((payload,)))
 
-        return self._hat_decorator(
+        return self._trigger_decorator(
             _("when a message arrives on {topic}").format(topic=topic), prepare, MAX_QUEUED_MESSAGES
         )
 
@@ -410,7 +410,7 @@ class Runtime:
         """Return a decorator for scripts that run each time the condition becomes true."""
 
         def decorate(script: Script) -> Script:
-            self._hats.append(
+            self._triggers.append(
                 (ScriptTrigger(_("when … becomes true"), condition=lambda: _is_true(condition)), script)
             )
             return script
@@ -436,7 +436,7 @@ class Runtime:
 
             link.on_event(robot, event, on_data)
 
-        return self._hat_decorator(
+        return self._trigger_decorator(
             _("when {robot} {event}").format(robot=robot, event=event), prepare, MAX_QUEUED_EVENTS
         )
 
@@ -446,7 +446,7 @@ class Runtime:
         def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, change_detector(lambda: hat.enqueue(())))
 
-        return self._hat_decorator(
+        return self._trigger_decorator(
             _("when {robot} {sensor} changes").format(robot=robot, sensor=sensor), prepare, MAX_QUEUED_EVENTS
         )
 
@@ -459,7 +459,7 @@ class Runtime:
         def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: hat.enqueue(())))
 
-        return self._hat_decorator(
+        return self._trigger_decorator(
             _("when {robot} {sensor} goes {side} {limit}").format(
                 robot=robot, sensor=sensor, side=translate("choice", side), limit=f"{limit:g}"
             ),
@@ -467,12 +467,12 @@ class Runtime:
             MAX_QUEUED_EVENTS,
         )
 
-    def _hat_decorator(
+    def _trigger_decorator(
         self, title: str, prepare: Callable[[ScriptTrigger, ProgramLink], None], waiting: int
     ) -> Decorator:
         def decorate(script: Script) -> Script:
             hat = ScriptTrigger(title, max_waiting=waiting)
-            self._hats.append((hat, script))
+            self._triggers.append((hat, script))
             self._subscriptions.append(lambda link: prepare(hat, link))
             return script
 

@@ -77,7 +77,7 @@ class Scheduler:
         self._owner: Script | None = None
         self._parked: deque[Script] = deque()  # waiting before a block
         self._resuming: deque[Script] = deque()  # continuing a block after a wait
-        self._opening = False  # no script gets the turn while scripts are being started
+        self._turns_deferred = False  # no script gets the turn while scripts are being started
         self._paused = False
         self._paused_since_s = 0.0
         self._paused_total_s = 0.0  # total duration of earlier pauses
@@ -118,10 +118,10 @@ class Scheduler:
     def defer_turns(self) -> Iterator[None]:
         """Return a context manager for starting several scripts, in which no script runs yet."""
         with self._lock:
-            self._opening = True
+            self._turns_deferred = True
         yield
         with self._lock:
-            self._opening = False
+            self._turns_deferred = False
             self._grant_turn_locked()
 
     def start_run(self) -> None:
@@ -402,7 +402,7 @@ class Scheduler:
         self._raise_if_ended(script)
 
     def _grant_turn_locked(self) -> None:
-        if self._owner is not None or self._opening:
+        if self._owner is not None or self._turns_deferred:
             return
         if self._resuming:
             self._owner = self._resuming.popleft()

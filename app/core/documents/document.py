@@ -79,10 +79,10 @@ class Document:
         self.key = f"behaviour-{next(_key_numbers)}"
         self.path: Path | None = None
         self.name = _(DEFAULT_NAME)
-        self.others: Mapping[str, object] = {}
+        self.unknown_fields: Mapping[str, object] = {}
         self._json = WorkspaceJson.from_blocks({})
         self.robots: dict[str, Mapping[str, object]] = {}
-        self._read: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
+        self._parsed_robots: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
         """Cache of parsed robot descriptions: parsing one takes 15 ms, and every edit needs all of them."""
         self.dirty = False
         self.saved_at: float | None = None
@@ -158,7 +158,7 @@ class Document:
 
     def duplicate(self, other: Document, name: str) -> None:
         """Copy the blocks of another behaviour into this one, which is new and unsaved."""
-        self._replace(BehaviourFile(name, {}, other.robots, other.others), None)
+        self._replace(BehaviourFile(name, {}, other.robots, other.unknown_fields), None)
         self.apply_edit(other.workspace)
 
     def recover(self, unsaved: UnsavedWork) -> None:
@@ -192,7 +192,7 @@ class Document:
         if target is None:
             raise DocumentError(None, _("this behaviour isn't saved to a file yet"), _("choose one"))
         name = name_of(target, self.name)
-        write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
+        write_file(target, BehaviourFile(name, self.workspace, self.robots, self.unknown_fields))
         self.path, self.name = target, name
         self.dirty = False
         self.saved_at = self._clock()
@@ -408,7 +408,7 @@ class Document:
         self._journal = self._make_journal()
         self.name = name_of(path, behaviour_file.name) if path is not None else behaviour_file.name
         self.path, self.workspace = path, behaviour_file.workspace
-        self.robots, self.others = dict(behaviour_file.robots), behaviour_file.unknown_fields
+        self.robots, self.unknown_fields = dict(behaviour_file.robots), behaviour_file.unknown_fields
         self._compile_s = self._compiling_key = None
         self.dirty = False
         self.saved_at = self._stamp = None
@@ -417,7 +417,7 @@ class Document:
 
     def _write_journal(self) -> None:
         name, path, robots = self.name, self.path, dict(self.robots)
-        write_job = partial(_write_entry, self._journal, name, path, self._json, robots, self.others)
+        write_job = partial(_write_entry, self._journal, name, path, self._json, robots, self.unknown_fields)
         if self.journal_writer is not None:
             self.journal_writer.submit(self._journal.name, write_job)
         else:
@@ -457,12 +457,14 @@ class Document:
                 self.robots[robot.name] = dict(robot.source)
 
     def _known_robots(self) -> list[Robot]:
-        before, self._read = self._read, {}
+        before, self._parsed_robots = self._parsed_robots, {}
         for name, description in self.robots.items():
             previous = before.get(name)
             is_known = previous is not None and _are_equal(previous[0], description)
-            self._read[name] = previous if previous and is_known else (description, _parse_robot(description))
-        return [robot for _description, robot in self._read.values() if robot is not None]
+            self._parsed_robots[name] = (
+                previous if previous and is_known else (description, _parse_robot(description))
+            )
+        return [robot for _description, robot in self._parsed_robots.values() if robot is not None]
 
 
 def _write_entry(

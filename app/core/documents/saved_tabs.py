@@ -20,7 +20,7 @@ class SavedTabs:
         self, settings: Settings, documents: Documents, report_error: Callable[[str], object]
     ) -> None:
         # `report_error` is called with a message if the tabs can't be saved.
-        self._settings, self._documents, self._complain = settings, documents, report_error
+        self._settings, self._documents, self._report_error = settings, documents, report_error
         self.active = False
         """True if the tabs of this window are saved; False in a second window."""
         self._last_session: dict[str, object] = {}
@@ -81,4 +81,4 @@ class SavedTabs:
         try:
             self._settings.set(SETTING_KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
         except SettingsError as error:
-            self._complain(str(error))
+            self._report_error(str(error))

@@ -39,7 +39,7 @@ MAX_AVOIDING_ROUTES = 400
 
 With more routes, all routes are straight lines, because routing would take many seconds.
 """
-WIDEST, ASPECT = 3.0, 1.6
+MAX_ASPECT_RATIO, TARGET_ASPECT_RATIO = 3.0, 1.6
 """Maximum ratio of width to height of a row of groups, and the ratio to which a wider row is broken."""
 
 
@@ -275,13 +275,15 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
     middles = {block: _parse_point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
     width = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
     height = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
-    return middles if width <= WIDEST * height or len(boxes) < 4 else _shelf_positions(boxes, middles)
+    return (
+        middles if width <= MAX_ASPECT_RATIO * height or len(boxes) < 4 else _shelf_positions(boxes, middles)
+    )
 
 
 def _shelf_positions(boxes: Mapping[str, Box], middles: Mapping[str, Position]) -> dict[str, Position]:
     # Breaks one long row of groups into several, in the same order.
     area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
-    room = max(math.sqrt(area * ASPECT), *(box[2] for box in boxes.values()))
+    room = max(math.sqrt(area * TARGET_ASPECT_RATIO), *(box[2] for box in boxes.values()))
     positions: dict[str, Position] = {}
     left = top = row_height = 0.0
     for block in sorted(boxes, key=lambda each: (middles[each], each)):

@@ -18,7 +18,7 @@ from app.core.own_process import module_command
 from nep.masters.process import NO_CONSOLE
 
 TIMEOUT_S = 60.0
-MAX_HERE, MAX_LINES_HERE = 40, 60
+MAX_INLINE_NODES, MAX_INLINE_LINES = 40, 60
 """Maximum number of nodes and lines laid out in this process, which takes a few milliseconds."""
 
 
@@ -68,7 +68,7 @@ class LayoutProcess:
 def is_large(graph: NodeGraph) -> bool:
     """Return True if a graph should be laid out in a child process."""
     lines = sum(len(line.sources) * len(line.targets) for line in graph.lines)
-    return len(graph.nodes) > MAX_HERE or lines > MAX_LINES_HERE
+    return len(graph.nodes) > MAX_INLINE_NODES or lines > MAX_INLINE_LINES
 
 
 def main() -> None:

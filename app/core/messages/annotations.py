@@ -80,7 +80,7 @@ class _Frame:
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
-        self.left = MAX_POINTS
+        self.remaining_points = MAX_POINTS
 
     def point(self, value: object) -> Point | None:
         if not isinstance(value, Mapping):
@@ -88,22 +88,22 @@ class _Frame:
         x, y = _number(value.get("x")), _number(value.get("y"))
         if x is None or y is None:
             return None
-        self.left -= 1
+        self.remaining_points -= 1
         return x / self.width, y / self.height
 
 
 def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
-    makers = (("circles", _circle), ("points", _points), ("texts", _text))
+    makers = (("circles", _parse_circle), ("points", _parse_points), ("texts", _parse_text))
     for name, maker in makers:
         for item in _items(payload.get(name)):
-            if isinstance(item, Mapping) and frame.left > 0:
+            if isinstance(item, Mapping) and frame.remaining_points > 0:
                 yield from maker(item, frame)
     face = _parse_face(payload)
     if face is not None:
         yield from face
 
 
-def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
+def _parse_circle(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     centre, diameter = frame.point(item.get("position")), _number(item.get("diameter"))
     if centre is None or diameter is None or diameter <= 0:
         return
@@ -112,9 +112,11 @@ def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationSha
     yield AnnotationShape("circle", (centre,), outline, fill, _thickness(item), size)
 
 
-def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
+def _parse_points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     kind = _number(item.get("type")) or 0
-    parsed_points = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
+    parsed_points = (
+        frame.point(value) for value in islice(_items(item.get("points")), frame.remaining_points)
+    )
     points, thickness = tuple(point for point in parsed_points if point is not None), _thickness(item)
     outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
     each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
@@ -133,7 +135,7 @@ def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationSha
             yield AnnotationShape("line", points[index : index + 2], point_colour, None, thickness)
 
 
-def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
+def _parse_text(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     position, text, height = (
         frame.point(item.get("position")),
         item.get("text"),

@@ -26,7 +26,7 @@ class MessageHistory:
         self.size_bytes = 0
         self.first = 0
         """Number of the oldest stored message; equals the number of evicted ones."""
-        self.missed = 0
+        self.dropped_count = 0
         """Number of messages dropped before they reached this history."""
 
     def __len__(self) -> int:
@@ -68,11 +68,11 @@ class MessageHistory:
 
     def process(self, batch: Batch, _now_ns: int) -> None:
         """Append the messages received since the last tick. Implements `SeriesReceiver`."""
-        self.missed += batch.dropped
+        self.dropped_count += batch.dropped
         for message in batch.messages:
             self.add(message)
 
     def reset(self) -> None:
         """Remove all messages. Called when the source seeks to another time."""
         self._messages.clear()
-        self.size_bytes = self.first = self.missed = 0
+        self.size_bytes = self.first = self.dropped_count = 0

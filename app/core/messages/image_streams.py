@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
-from app.core.messages.image_style import PLAIN, PictureLook
+from app.core.messages.image_style import PLAIN, PictureStyle
 from app.core.messages.picture import Picture, Size, decode, reuse_picture
 from app.core.network.watches import WatchHandle
 from nep.i18n import _
@@ -70,7 +70,7 @@ class ImageStream:
 
     This and the next three attributes are used by `Images` under its lock.
     """
-    look: PictureLook = PLAIN
+    style: PictureStyle = PLAIN
     """Requested display style."""
     pending: tuple[Message, float] | None = None
     """Newest message that is not decoded yet, and its arrival time (monotonic seconds)."""
@@ -124,9 +124,9 @@ class ImageStream:
         """
         self._images.set_size(self, size)
 
-    def set_look(self, style: PictureLook) -> None:
+    def set_style(self, style: PictureStyle) -> None:
         """Set the display style, and decode the current image again, even while it is frozen."""
-        self._images.set_look(self, style)
+        self._images.set_style(self, style)
 
     def set_frozen(self, frozen: bool) -> None:
         """Freeze the current image, or show the newest image again.
@@ -180,7 +180,7 @@ class Images:
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
         self._closing = False
-        self._times = 0
+        self._reset_count = 0
         self._thread: threading.Thread | None = None
 
     def stream(self, topic: str) -> ImageStream:
@@ -236,7 +236,7 @@ class Images:
             topics: Keys of the topics whose images remain visible until their next image arrives.
         """
         with self.lock:
-            self._times += 1
+            self._reset_count += 1
             for topic, streams in self._streams.items():
                 for stream in streams:
                     if stream.is_frozen:
@@ -276,12 +276,12 @@ class Images:
                 stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def set_look(self, stream: ImageStream, style: PictureLook) -> None:
+    def set_style(self, stream: ImageStream, style: PictureStyle) -> None:
         """Set a stream's style; see `ImageStream.set_style`."""
         with self.lock:
-            if stream.look == style:
+            if stream.style == style:
                 return
-            stream.look = style
+            stream.style = style
             picture = stream.picture
             if picture is not None and picture.message is not None and stream.pending is None:
                 stream.pending = (picture.message, picture.received_s)
@@ -320,7 +320,7 @@ class Images:
     def decode_pending(self) -> None:
         """Decode the newest pending image of each stream. Called in the decoding thread."""
         with self.lock:
-            pending_work, times = self._take_pending(), self._times
+            pending_work, times = self._take_pending(), self._reset_count
         for streams, message, arrived_s, size, style in pending_work:
             try:
                 picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, style), None
@@ -334,26 +334,26 @@ class Images:
                     ),
                 )
             with self.lock:
-                for stream in streams if times == self._times else ():
+                for stream in streams if times == self._reset_count else ():
                     _deliver(stream, message, picture, error)
 
     def _has_pending(self) -> bool:
         all_streams = (stream for streams in self._streams.values() for stream in streams)
         return any(stream.pending is not None for stream in all_streams)
 
-    def _take_pending(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureLook]]:
+    def _take_pending(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureStyle]]:
         pending_work = []
         for streams in self._streams.values():
             waiting = [stream for stream in streams if stream.pending is not None]
             if not waiting:
                 continue
-            of_message: dict[tuple[int, PictureLook], list[ImageStream]] = {}
+            of_message: dict[tuple[int, PictureStyle], list[ImageStream]] = {}
             for stream in waiting:  # a held stream decodes its own image again
-                image_key = (id(stream.pending[0]), stream.look)  # type: ignore[index]
+                image_key = (id(stream.pending[0]), stream.style)  # type: ignore[index]
                 of_message.setdefault(image_key, []).append(stream)
             for together in of_message.values():
                 message, arrived_s = together[0].pending  # type: ignore[misc]
-                pending_work.append((together, message, arrived_s, _largest(together), together[0].look))
+                pending_work.append((together, message, arrived_s, _largest(together), together[0].style))
             for stream in waiting:
                 stream.pending = None
         return pending_work
@@ -367,7 +367,7 @@ def _deliver(stream: ImageStream, message: Message, picture: Picture | None, err
         return  # decoded while the user held the previous image
     stream.error = error
     if picture is not None:
-        if picture.look != stream.look and stream.pending is None:  # changed while it was decoded
+        if picture.style != stream.style and stream.pending is None:  # changed while it was decoded
             stream.pending = (message, picture.received_s)
         stream.picture = picture
         stream.is_awaiting_image = (

@@ -20,7 +20,7 @@ DEFAULT_COLOUR_MAP = "viridis"
 
 
 @dataclass(frozen=True, slots=True)
-class PictureLook:
+class PictureStyle:
     """Display style of an image; equal styles give equal images.
 
     Attributes:
@@ -48,17 +48,17 @@ class PictureLook:
         }
 
 
-PLAIN = PictureLook()
+PLAIN = PictureStyle()
 
 
-def parse_look(saved: object) -> PictureLook:
+def parse_style(saved: object) -> PictureStyle:
     """Parse the result of `PictureStyle.to_json`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
     saved_numbers = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
     brightness, contrast, low, high = saved_numbers.values()
     colours = saved.get("colours")
-    style = PictureLook(
+    style = PictureStyle(
         min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
         min(max(contrast, MIN_CONTRAST), MAX_CONTRAST) if contrast is not None else 1.0,
         colours if isinstance(colours, str) and colours in COLOUR_MAPS else "",
@@ -91,7 +91,7 @@ class ColourScale:
     colours: NDArray[np.uint8]
 
 
-def apply_tones(style: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def apply_tones(style: PictureStyle, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return 8-bit values with the brightness and the contrast of a display style applied."""
     if (style.brightness, style.contrast) == (0.0, 1.0):
         return picture
@@ -101,7 +101,7 @@ def apply_tones(style: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.ui
     return np.asarray(cv2.LUT(picture, _tones(style)), np.uint8)
 
 
-def apply_colour_map(style: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
+def apply_colour_map(style: PictureStyle, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
     """Apply the colour map to an image with one channel.
 
     Args:
@@ -127,7 +127,7 @@ def apply_colour_map(style: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray
     return np.asarray(bgra, np.uint8), ColourScale(low, high, colours)
 
 
-def _value_range(style: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
+def _value_range(style: PictureStyle, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
     # In ascending order.
     default_range = (
         (0.0, 255.0)
@@ -166,7 +166,7 @@ def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: f
     return result
 
 
-def _tones(style: PictureLook) -> NDArray[np.uint8]:
+def _tones(style: PictureStyle) -> NDArray[np.uint8]:
     # Lookup table of the 256 values.
     import numpy as np  # noqa: PLC0415
 

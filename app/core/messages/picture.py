@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from app.core.messages.image_style import (
     PLAIN,
     ColourScale,
-    PictureLook,
+    PictureStyle,
     apply_colour_map,
     apply_tones,
     scaled,
@@ -54,7 +54,7 @@ class Picture:
     received_s: float
     message: Message | None = None
     numbers: NDArray[Any] | None = None
-    look: PictureLook = PLAIN
+    style: PictureStyle = PLAIN
     """Display style with which the image was decoded."""
     scale: ColourScale | None = None
     """Colour scale of an image that shows numbers as colours, else None."""
@@ -81,7 +81,7 @@ class Picture:
 
 
 def decode(
-    message: Message, received_s: float, fit: Size | None = None, style: PictureLook = PLAIN
+    message: Message, received_s: float, fit: Size | None = None, style: PictureStyle = PLAIN
 ) -> tuple[Picture | None, str | None]:
     """Decode a message to an image.
 
@@ -125,7 +125,7 @@ def reuse_picture(
     message: Message,
     received_s: float,
     fit: Size | None,
-    style: PictureLook = PLAIN,
+    style: PictureStyle = PLAIN,
 ) -> Picture | None:
     """Return the shown image for a new message without decoding, if both messages contain equal bytes.
 
@@ -136,7 +136,7 @@ def reuse_picture(
         displayed is None
         or displayed.message is None
         or displayed.message is message
-        or displayed.look != style
+        or displayed.style != style
     ):
         return None
     displayed_message, factor = displayed.message, _reduction_factor((displayed.width, displayed.height), fit)
@@ -207,8 +207,8 @@ def _decode_frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Siz
     size = (file.width, file.height)
     factor = _reduction_factor(size, fit)
     if file.kind == "jpeg":
-        return image_codec.read_file(file, factor), size
-    return _reduce(image_codec.read_file(file), factor), size
+        return image_codec.decode_file(file, factor), size
+    return _reduce(image_codec.decode_file(file), factor), size
 
 
 def _reduce(frame: NDArray[Any], factor: int) -> NDArray[Any]:
@@ -232,7 +232,7 @@ def _reduction_factor(size: Size, fit: Size | None) -> int:
 
 
 def _to_bgra(
-    frame: NDArray[Any], style: PictureLook
+    frame: NDArray[Any], style: PictureStyle
 ) -> tuple[Any, NDArray[Any] | None, ColourScale | None] | None:
     # In QImage's layout, the numbers of one channel, and the meaning of their colours; None if unsupported.
     import cv2  # noqa: PLC0415

@@ -26,7 +26,7 @@ CLOCK_READ_INTERVAL_S = 0.0002
 
 Reading the clock takes as long as decoding a small message.
 """
-SOME, SOME_BYTES = 256, 64_000
+MAX_BATCH, MAX_BATCH_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ class DecodeChecker:
         self._lock = threading.Lock()
         self._results: dict[str, CheckResult] = {}
         self._suspects: dict[str, float] = {}
-        self._advance_s = MAX_BUDGET_S
+        self._budget_s = MAX_BUDGET_S
         self._refilled = clock()
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
@@ -88,7 +88,7 @@ class DecodeChecker:
 
     def _refill_budget(self) -> None:
         now = self._clock()
-        self._advance_s = min(MAX_BUDGET_S, self._advance_s + max(0.0, now - self._refilled) * MAX_CPU_SHARE)
+        self._budget_s = min(MAX_BUDGET_S, self._budget_s + max(0.0, now - self._refilled) * MAX_CPU_SHARE)
         self._refilled = now
 
     def _check(self, topic: str, messages: Sequence[Message], result: CheckResult) -> None:
@@ -105,7 +105,7 @@ class DecodeChecker:
 
     def _check_older(self, topic: str, messages: Sequence[Message], result: CheckResult, now: float) -> None:
         started_s = self._cpu_clock()
-        budget_s = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
+        budget_s = self._budget_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
         index, batch_size, worked, older = 0, 1, 0.0, len(messages) - 1
         while index < older and worked < budget_s:
             was_well, before = not result.bad_count, worked
@@ -113,15 +113,15 @@ class DecodeChecker:
             index = _check_batch(messages, index, end, result)
             if was_well and result.bad_count:
                 self._suspects[topic] = now
-                budget_s = self._advance_s
+                budget_s = self._budget_s
             worked = self._cpu_clock() - started_s
             batch_size = (
-                min(2 * batch_size, SOME)
+                min(2 * batch_size, MAX_BATCH)
                 if worked - before < CLOCK_READ_INTERVAL_S
                 else max(1, batch_size // 2)
             )
         result.unchecked_count = len(messages) - result.checked
-        self._advance_s -= worked
+        self._budget_s -= worked
 
     def _is_suspect(self, topic: str, now: float) -> bool:
         last_suspected_s = self._suspects.get(topic)
@@ -134,7 +134,7 @@ class DecodeChecker:
 def _check_batch(messages: Sequence[Message], index: int, end: int, result: CheckResult) -> int:
     # Returns the index of the first message that was not decoded (fewer are decoded when they are large).
     size_bytes = 0
-    while index < end and size_bytes < SOME_BYTES:
+    while index < end and size_bytes < MAX_BATCH_BYTES:
         message = messages[index]
         problem = _decode_error(message, keep_decoded=False)
         result.checked += 1

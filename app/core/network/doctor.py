@@ -32,12 +32,12 @@ class Doctor:
         # all).
         self._diagnose, self._clock = diagnose, clock
         self._thread: threading.Thread | None = None
-        self._missed = self._checked_topic = ""
+        self._expected_topic = self._checked_topic = ""
         self._findings: tuple[doctor.Finding, ...] = ()
-        self._so_far: tuple[doctor.Finding, ...] | None = None
-        self.looked_at = self.things = 0
+        self._partial_findings: tuple[doctor.Finding, ...] | None = None
+        self.check_count = self.total_checks = 0
         """Number of checks done in the current or last run; `total_checks` is the total number of checks."""
-        self._looked_s: float | None = None
+        self._finished_s: float | None = None
         self.revision = 0
 
     @property
@@ -53,17 +53,17 @@ class Doctor:
     @property
     def partial_findings(self) -> Sequence[doctor.Finding] | None:
         """Findings of the current run up to now, worst first; None if no run is in progress."""
-        return self._so_far
+        return self._partial_findings
 
     @property
     def finished_s(self) -> float | None:
         """Time of the last completed run in seconds since 1970; None before the first run."""
-        return self._looked_s
+        return self._finished_s
 
     @property
     def expected_topic(self) -> str:
         """Topic on which the user expects messages that don't arrive; "" if none is selected."""
-        return self._missed
+        return self._expected_topic
 
     @property
     def checked_topic(self) -> str:
@@ -72,7 +72,7 @@ class Doctor:
 
     def expect_topic(self, topic: str) -> None:
         """Set the topic on which the user expects messages ("" for none), and run the checks."""
-        self._missed = topic
+        self._expected_topic = topic
         self.start()
 
     def start(self) -> None:
@@ -101,16 +101,16 @@ class Doctor:
 
     def _run_checks(self) -> None:
         while True:  # repeats when another topic was set meanwhile
-            expected_topic, self._so_far = self._missed, None
+            expected_topic, self._partial_findings = self._expected_topic, None
             findings = self._find(expected_topic)
-            if expected_topic == self._missed:
+            if expected_topic == self._expected_topic:
                 break
-        self._findings, self._looked_s, self._checked_topic = findings, self._clock(), expected_topic
-        self._so_far = None
+        self._findings, self._finished_s, self._checked_topic = findings, self._clock(), expected_topic
+        self._partial_findings = None
         self.revision += 1
 
     def _report(self, findings: tuple[doctor.Finding, ...], check_count: int, total_checks: int) -> None:
-        self._so_far, self.looked_at, self.things = findings, check_count, total_checks
+        self._partial_findings, self.check_count, self.total_checks = findings, check_count, total_checks
         self.revision += 1
 
     def _find(self, expected_topic: str) -> tuple[doctor.Finding, ...]:

@@ -28,7 +28,7 @@ DISCOVERY_TIMEOUT_S = 1.5
 
 A master waits one second for nodes to register again.
 """
-AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
+RETRY_S, MAX_RETRY_S = 2.0, 30.0
 """Initial and maximum pause before another attempt to start a master; the pause doubles with each failure."""
 START_TIMEOUT_S = 50.0
 """Time limit in seconds for a started master to reply while its process is alive.
@@ -95,8 +95,8 @@ class MasterStarter:
         self._address, self._failed, self._clock = address, failed, clock
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
-        self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
-        self.first = False
+        self._wait_s, self._retry_at, self._last_reason = RETRY_S, 0.0, ""
+        self.is_first_master = False
         """True if no master was running before this one was started, so that no other node can be registered
         yet.
         """
@@ -113,7 +113,7 @@ class MasterStarter:
         self._thread = threading.Thread(target=self._start, name="studio-launcher", daemon=True)
         self._thread.start()
 
-    def ensure_running(self) -> None:
+    def ensure_with_backoff(self) -> None:
         """Call `ensure`, unless a failed start was too recent. Call this method repeatedly."""
         if self._clock() >= self._retry_at:
             self.ensure()
@@ -126,10 +126,10 @@ class MasterStarter:
     def _start(self) -> None:
         error_text = self._try_start()
         if not error_text:
-            self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
+            self._wait_s, self._retry_at, self._last_reason = RETRY_S, 0.0, ""
             return
         self._retry_at = self._clock() + self._wait_s
-        self._wait_s = min(2 * self._wait_s, AGAIN_AT_MOST_S)
+        self._wait_s = min(2 * self._wait_s, MAX_RETRY_S)
         if error_text != self._last_reason:
             self._last_reason = error_text
             self._failed(error_text)
@@ -140,7 +140,7 @@ class MasterStarter:
         hindered = doctor.start_blocker(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.fix}"
-        self.first = True
+        self.is_first_master = True
         self._log_crash()
         try:
             self._process = start_process(

@@ -16,7 +16,7 @@ from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 
 SETTING_KEY = "listen_at"
-ALERT, NOT_KEPT = "reach", "reach:kept"
+ALERT, NOT_SAVED_ALERT = "reach", "reach:kept"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class RemoteAccess:
             local_addresses,
         )
         self._epoch = 0
-        self._asking: threading.Thread | None = None
+        self._request_thread: threading.Thread | None = None
         self.hosts: tuple[str, ...] = ()
         """Addresses on which the master listens for other computers."""
 
@@ -99,7 +99,7 @@ class RemoteAccess:
                 else _("Can't save this change: other computers can connect after the next start ({error}).")
             )
             self._alerts.raise_alert(
-                NOT_KEPT,
+                NOT_SAVED_ALERT,
                 "warn",
                 _("The list of allowed connections can't be saved."),
                 template.format(error=error),
@@ -108,7 +108,7 @@ class RemoteAccess:
                 count=0,
             )
         else:
-            self._alerts.resolve(NOT_KEPT)
+            self._alerts.resolve(NOT_SAVED_ALERT)
 
     def update_graph(self, view: GraphView) -> None:
         """Apply a new graph.
@@ -124,7 +124,7 @@ class RemoteAccess:
             if saved_hosts and self.is_local and set(saved_hosts) - set(self.hosts):
                 self._request(saved_hosts)
 
-    def changed(self, event: RemoteAccessChanged) -> None:
+    def on_changed(self, event: RemoteAccessChanged) -> None:
         """Apply the master's reply: update `hosts`, or raise an alert if the request failed."""
         if not event.message:
             self.hosts = event.hosts
@@ -141,11 +141,11 @@ class RemoteAccess:
 
     def close(self) -> None:
         """Wait at most three seconds for the request thread."""
-        if self._asking is not None:
-            self._asking.join(3.0)
+        if self._request_thread is not None:
+            self._request_thread.join(3.0)
 
     def _request(self, hosts: tuple[str, ...]) -> None:
-        before = self._asking
+        before = self._request_thread
 
         def work() -> None:
             if before is not None:
@@ -157,8 +157,8 @@ class RemoteAccess:
             else:
                 self._post_event(RemoteAccessChanged(hosts))
 
-        self._asking = threading.Thread(target=work, name="studio-reach", daemon=True)
-        self._asking.start()
+        self._request_thread = threading.Thread(target=work, name="studio-reach", daemon=True)
+        self._request_thread.start()
 
 
 def access_status(access: RemoteAccess) -> tuple[str, str, str | None]:

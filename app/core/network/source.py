@@ -157,7 +157,7 @@ class LiveSource:
         self._thread = threading.Thread(target=self._run, name=thread, daemon=True)
         self._node: Node | None = None
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
-        self._missed_before: Counter[str] = Counter()
+        self._lost_offsets: Counter[str] = Counter()
         self._is_connected: bool | None = None
         self._view: GraphView | None = None
 
@@ -170,14 +170,14 @@ class LiveSource:
         with self._lock:
             self._watched_topics.add(topic)
             existing = self._subscribers.get(topic)
-            self._missed_before[topic] = -(existing[1].lost or 0) if existing is not None else 0
-        self.submit("", _ignore_wake_job)
+            self._lost_offsets[topic] = -(existing[1].lost or 0) if existing is not None else 0
+        self.submit("", _no_op_job)
 
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from ``topic``."""
         with self._lock:
             self._watched_topics.discard(topic)
-        self.submit("", _ignore_wake_job)
+        self.submit("", _no_op_job)
 
     def submit(self, error_template: str, job: Job) -> None:
         """Queue a job. Jobs run in order and wait until a master replies.
@@ -192,7 +192,7 @@ class LiveSource:
         """Return the number of messages lost on each topic since its watch began."""
         with self._lock:
             subscribers = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
-            before = dict(self._missed_before)
+            before = dict(self._lost_offsets)
         return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in subscribers.items()}
 
     def request_stop(self) -> None:
@@ -325,7 +325,7 @@ class LiveSource:
             watched = {*self._watched_topics, *self._always}
         for topic in [topic for topic in self._subscribers if topic not in watched]:
             self._unsubscribe(topic)
-            self._missed_before.pop(topic, None)
+            self._lost_offsets.pop(topic, None)
         for topic in watched:
             info = view.topics.get(topic)
             msg_type = self._always.get(topic) if info is None else info.msg_type
@@ -333,7 +333,7 @@ class LiveSource:
                 continue
             existing = self._subscribers.get(topic)
             if existing is not None and existing[0] != msg_type:
-                self._missed_before[topic] += self._unsubscribe(topic)
+                self._lost_offsets[topic] += self._unsubscribe(topic)
                 existing = None
             if existing is None:
                 self._subscribe(topic, msg_type)
@@ -370,4 +370,4 @@ def _free_name(view: GraphView) -> str:
     )
 
 
-def _ignore_wake_job(_node: Node) -> None: ...
+def _no_op_job(_node: Node) -> None: ...

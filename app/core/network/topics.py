@@ -236,7 +236,9 @@ class Topics:
                     topic.rate_hz = topic.bandwidth_Bps = None
                 self.revision += 1
 
-    def count(self, passed_s: float, before: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    def measure_rates(
+        self, passed_s: float, before: Mapping[str, tuple[int, int]]
+    ) -> dict[str, tuple[int, int]]:
         """Measure the rates of watched topics whose publishers report no rate.
 
         Args:

@@ -20,7 +20,7 @@ class RecentLosses:
 
     def __init__(self) -> None:
         # The first total is the baseline.
-        self._grew: deque[tuple[float, int]] = deque()
+        self._increases: deque[tuple[float, int]] = deque()
         self._before: int | None = None
 
     def count(self, total: int, now: float) -> int:
@@ -31,11 +31,11 @@ class RecentLosses:
             now: Monotonic seconds.
         """
         if self._before is not None and total > self._before:
-            self._grew.append((now, total - self._before))
+            self._increases.append((now, total - self._before))
         self._before = total
-        while self._grew and now - self._grew[0][0] > WINDOW_S:
-            self._grew.popleft()
-        return sum(lost for _, lost in self._grew)
+        while self._increases and now - self._increases[0][0] > WINDOW_S:
+            self._increases.popleft()
+        return sum(lost for _, lost in self._increases)
 
 
 class Traffic:

@@ -36,23 +36,23 @@ class Watch:
     def __init__(self, topics: Iterable[str], watches: Watches) -> None:
         self.topics = tuple(topics)
         self._watches: Watches | None = watches
-        self._resting = False
+        self._is_suspended = False
 
     @property
     def is_suspended(self) -> bool:
         """True if the watch is suspended."""
-        return self._resting
+        return self._is_suspended
 
     def suspend(self) -> None:
         """Suspend the watch until `resume`."""
-        if self._watches is not None and not self._resting:
-            self._resting = True
+        if self._watches is not None and not self._is_suspended:
+            self._is_suspended = True
             self._watches.deactivate(self.topics)
 
     def resume(self) -> None:
         """Resume the watch after `suspend`."""
-        if self._watches is not None and self._resting:
-            self._resting = False
+        if self._watches is not None and self._is_suspended:
+            self._is_suspended = False
             self._watches.activate(self.topics)
 
     def close(self) -> None:
@@ -83,7 +83,7 @@ class Watches:
     ) -> None:
         # `begin` is called at a topic's first active watch, `end` when the last one is suspended or closed,
         # `forgotten` when the last one is closed.
-        self._begin, self._end, self._forgotten = begin, end, forgotten
+        self._begin, self._end, self._on_released = begin, end, forgotten
         self._active_counts: Counter[str] = Counter()
         self._open_counts: Counter[str] = Counter()
 
@@ -119,4 +119,4 @@ class Watches:
             self._open_counts[topic] -= 1
             if self._open_counts[topic] == 0:
                 del self._open_counts[topic]
-                self._forgotten(topic)
+                self._on_released(topic)

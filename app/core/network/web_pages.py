@@ -125,7 +125,7 @@ class WebPages:
         origins: Allowed origins of pages from other computers.
         robots: Names of the robots that pages may move.
         protocols: Protocols that are switched on. All share the port, the origins and the token.
-        kept_out: Blocked pages, by id. The user disconnected them, and their further connections are
+        blocked_pages: Blocked pages, by id. The user disconnected them, and their further connections are
             rejected.
     """
 
@@ -153,15 +153,15 @@ class WebPages:
         self._last_started: RunningServer | None = None
         self._thread: threading.Thread | None = None
         self._number = 0
-        self._list = PageList()
+        self._page_list = PageList()
         self.port, self.host, self.token = DEFAULT_PORT, "", ""
         self.origins: tuple[str, ...] = ()
         self.robots: tuple[str, ...] = ()
         self.protocols: frozenset[WebProtocol] = frozenset()
-        self.kept_out: dict[int, context.ConnectedPage] = {}
+        self.blocked_pages: dict[int, context.ConnectedPage] = {}
         self.state: WebState = "off"
         self.sentence, self.free_port = "", 0
-        self._failed: frozenset[WebProtocol] = frozenset()
+        self._failed_protocols: frozenset[WebProtocol] = frozenset()
 
     # ---- what is known
 
@@ -199,27 +199,27 @@ class WebPages:
     @property
     def connected(self) -> tuple[context.ConnectedPage, ...]:
         """Pages that were connected at the last `refresh`."""
-        return self._list.connected
+        return self._page_list.connected
 
     @property
     def revision(self) -> int:
         """Counter that increases when `connected` changes."""
-        return self._list.revision
+        return self._page_list.revision
 
     @property
     def listed_pages(self) -> tuple[ListedPage, ...]:
         """Pages that were connected at the last `refresh`, and pages that left recently."""
-        return self._list.listed_pages
+        return self._page_list.listed_pages
 
     @property
     def slow_topics(self) -> tuple[SlowTopic, ...]:
         """Topics that pages read too slowly, so that messages are dropped."""
-        return tuple(self._list.slow_topics())
+        return tuple(self._page_list.slow_topics())
 
     @property
     def bytes_per_s(self) -> float:
         """Total bandwidth of all connected pages in bytes per second."""
-        return self._list.bytes_per_s
+        return self._page_list.bytes_per_s
 
     @property
     def rejections(self) -> tuple[context.Rejection, ...]:
@@ -255,8 +255,8 @@ class WebPages:
         self._number += 1
         self.state, self.sentence, self.free_port = "off", "", 0
         self.protocols = frozenset()
-        self.kept_out.clear()
-        self._list.clear(self._clock())
+        self.blocked_pages.clear()
+        self._page_list.clear(self._clock())
         ended, self._server = self._server, None
         self._run_in_thread(lambda: ended.close() if ended is not None else None)
 
@@ -266,7 +266,7 @@ class WebPages:
         Has no effect unless `is_port_taken` is True.
         """
         if self.free_port:
-            self.port, self.protocols = self.free_port, self._failed
+            self.port, self.protocols = self.free_port, self._failed_protocols
             self._start_server()
 
     # ---- settings
@@ -319,11 +319,11 @@ class WebPages:
         """
         if self._server is not None:
             self._server.block_page(page.id)
-            self.kept_out[page.id] = page
+            self.blocked_pages[page.id] = page
 
     def unblock_page(self, page_id: int) -> None:
         """Unblock a page that was blocked with `block_page`."""
-        self.kept_out.pop(page_id, None)
+        self.blocked_pages.pop(page_id, None)
         if self._server is not None:
             self._server.unblock_page(page_id)
 
@@ -342,7 +342,7 @@ class WebPages:
 
     # ---- following the server
 
-    def started(self, event: WebServerStarted) -> None:
+    def on_started(self, event: WebServerStarted) -> None:
         """Apply the result of a start. An outdated server (switched off or restarted meanwhile) is closed."""
         if event.number != self._number:
             if event.server is not None:
@@ -350,20 +350,20 @@ class WebPages:
             return
         self._server, self.sentence, self.free_port = event.server, event.message, event.free_port
         if event.server is None:
-            self.state, self._failed, self.protocols = "off", self.protocols, frozenset()
+            self.state, self._failed_protocols, self.protocols = "off", self.protocols, frozenset()
         else:
             self.state = "on"
             self._apply_settings()  # apply changes made during the start
 
     def refresh(self) -> None:
         """Update `connected` and `listed_pages` from the running server."""
-        self._list.update(self.pages, self._clock())
+        self._page_list.update(self.pages, self._clock())
 
     def check(self) -> None:
         """Detect that the server stopped unexpectedly, and call `refresh`. Called once a second."""
         if self._server is not None and self._server.wait(0):
             self._server, self.state, self.protocols = None, "off", frozenset()
-            self.kept_out.clear()
+            self.blocked_pages.clear()
             self.sentence = _("The web server stopped because of an error. See the log for details.")
         self.refresh()
 

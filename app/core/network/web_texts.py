@@ -168,7 +168,7 @@ def _rejection_notices(web: WebPages) -> Iterator[WebNotice]:
 
 
 def _blocked_notices(web: WebPages, rejection: Rejection) -> Iterator[WebNotice]:
-    for page in web.kept_out.values():
+    for page in web.blocked_pages.values():
         if rejection.client in {page.origin, page.address}:
             message = _("{page} tried to connect again at {time} and was rejected.").format(
                 page=page_name(page), time=_clock_text(rejection.time_s)

@@ -130,7 +130,7 @@ class OtherNetwork:
         self.nodes.update_ages(now)
         if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
             passed_s = 0.0 if self._counted_at is None else now - self._counted_at
-            self._arrived, self._counted_at = self.topics.count(passed_s, self._arrived), now
+            self._arrived, self._counted_at = self.topics.measure_rates(passed_s, self._arrived), now
 
 
 class Networks:

@@ -124,13 +124,13 @@ class NodeParameters:
         self.node: NodeEntry | None = None
         self.all: tuple[ReportedParameter, ...] = ()
         self.changed: dict[str, float] = {}
-        self.heard = False
+        self.has_received = False
         """True if the node has reported its parameters since it was selected."""
         self.problem = ""
         """Why the message with the parameters can't be read, or ""."""
         self.setting = ""
         """Name of the parameter that is being set, or ""."""
-        self.refusal = ""
+        self.rejection_reason = ""
         """Why the last request to set a parameter was rejected, or ""."""
         self.revision = 0
         self._applied_message: Message | None = None
@@ -150,8 +150,8 @@ class NodeParameters:
         if self.watching is not None:
             self.watching.close()
         self.watching = self.node = self._applied_message = None
-        self.all, self.changed, self.heard = (), {}, False
-        self.problem = self.setting = self.refusal = ""
+        self.all, self.changed, self.has_received = (), {}, False
+        self.problem = self.setting = self.rejection_reason = ""
         self.revision += 1
 
     def find(self, name: str) -> ReportedParameter | None:
@@ -185,7 +185,7 @@ class NodeParameters:
             self.problem = str(error)
             return
         before = {each.name: each.value for each in self.all}
-        if self.heard:
+        if self.has_received:
             self.changed.update(
                 {
                     each.name: now
@@ -193,13 +193,13 @@ class NodeParameters:
                     if each.name not in before or not _are_equal(before[each.name], each.value)
                 }
             )
-        self.all, self.heard, self.problem = parameters, True, ""
+        self.all, self.has_received, self.problem = parameters, True, ""
 
     def _check_result(self, node: NodeEntry) -> None:
         try:
             is_done = self._setter.has_been_set(node.id, self.setting)
         except NepError as error:
-            self.refusal, self.setting = str(error), ""
+            self.rejection_reason, self.setting = str(error), ""
             self.revision += 1
         else:
             if is_done:
@@ -209,22 +209,22 @@ class NodeParameters:
     def set(self, name: str, text: str) -> None:
         """Parse a text and start to set the parameter to the resulting value.
 
-        If that fails, `refusal` contains the reason.
+        If that fails, `rejection_reason` contains the reason.
         """
         node, parameter = self.node, self.find(name)
         self.revision += 1
-        self.refusal = ""
+        self.rejection_reason = ""
         if node is None or parameter is None:
             return
-        self.refusal = read_only_reason(node, parameter)
-        if not self.refusal and not self._has_master():
-            self.refusal = _("no master responds, so the node can't be queried; try again later")
-        if self.refusal:
+        self.rejection_reason = read_only_reason(node, parameter)
+        if not self.rejection_reason and not self._has_master():
+            self.rejection_reason = _("no master responds, so the node can't be queried; try again later")
+        if self.rejection_reason:
             return
         try:
             value = parse_value(text, parameter.kind)
         except ValueError as error:
-            self.refusal = str(error)
+            self.rejection_reason = str(error)
             return
         self.setting = name
         self._setter.set(node.id, name, value)

@@ -17,14 +17,14 @@ from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
-REQUEST_TIMEOUT_S = 1.0
-POLL_INTERVAL_S = 2.0
+QUERY_INTERVAL_S = 1.0
+RESPONSE_TIMEOUT_S = 2.0
 
 
 class OtherSource(LiveSource):
     """Source of another network. Messages are passed to the sinks by topic key (`key_of`)."""
 
-    poll_interval_s = REQUEST_TIMEOUT_S
+    poll_interval_s = QUERY_INTERVAL_S
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class OtherSource(LiveSource):
     def join(self) -> Node:
         """Join the network and return the node. Raises `NepError` if the network does not respond."""
         with _convert_errors():
-            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_INTERVAL_S)
+            return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=RESPONSE_TIMEOUT_S)
 
     def query_graph(self, node: Node) -> GraphView:
         """Return the graph, with the codec that is used to read each topic.
@@ -55,7 +55,7 @@ class OtherSource(LiveSource):
         does not count revisions.
         """
         with _convert_errors():
-            view = node.graph(timeout_s=POLL_INTERVAL_S)
+            view = node.graph(timeout_s=RESPONSE_TIMEOUT_S)
         topics = {
             name: info if (codec := self._kind.codec_of(info)) == info.codec else replace(info, codec=codec)
             for name, info in view.topics.items()
@@ -104,7 +104,7 @@ def _convert_errors() -> Iterator[None]:
 
 
 def _keyed_sink(network: str, sink: Sink) -> Sink:
-    def take(topic: str, messages: Sequence[Message]) -> None:
+    def forward(topic: str, messages: Sequence[Message]) -> None:
         sink(key_of(network, topic), messages)
 
-    return take
+    return forward

@@ -28,7 +28,7 @@ from nep.recordings.formats.message_counts import TopicStats, parse_stats
 
 LOW_DISK_BYTES = 1_000_000_000
 """Free disk space in bytes below which the user is warned. The recorder itself stops at 200 MB."""
-AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
+RETRY_S, MAX_RETRY_S = 2.0, 30.0
 """Initial and maximum pause before a flight recorder whose process ended is restarted; doubled each time."""
 EXIT_TIMEOUT_S = 2.0
 MAX_QUEUED_COMMANDS = 1000
@@ -133,14 +133,14 @@ class RecorderProcess:
     def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
         # Starts in a thread; posts `RecorderEvent` events, and finally a `RecorderExited`.
         self._number, self._address, self._post_event = number, address, post_event
-        self._orders: queue.Queue[bytes | None] = queue.Queue(MAX_QUEUED_COMMANDS)
+        self._commands: queue.Queue[bytes | None] = queue.Queue(MAX_QUEUED_COMMANDS)
         self._has_ended = threading.Event()
         threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
 
     def send_command(self, content: Mapping[str, object]) -> bool:
         """Queue a command; return False if the queue is full."""
         try:
-            self._orders.put_nowait(orjson.dumps(content) + b"\n")
+            self._commands.put_nowait(orjson.dumps(content) + b"\n")
         except queue.Full:
             return False
         return True
@@ -148,7 +148,7 @@ class RecorderProcess:
     def close(self, wait_s: float) -> None:
         """Close the input and wait at most ``wait_s`` seconds for the process to exit."""
         with suppress(queue.Full):  # the process does not read its input and will end with this process
-            self._orders.put_nowait(None)
+            self._commands.put_nowait(None)
         self._has_ended.wait(wait_s)
 
     def _run(self) -> None:
@@ -184,7 +184,7 @@ class RecorderProcess:
                         self._post_event(RecorderEvent(self._number, content))
             code = process.wait()
             with suppress(queue.Full):
-                self._orders.put_nowait(None)  # ends the thread that waits for commands
+                self._commands.put_nowait(None)  # ends the thread that waits for commands
             writer.join(EXIT_TIMEOUT_S)
         return (
             ""
@@ -196,7 +196,7 @@ class RecorderProcess:
         if process.stdin is None:
             return
         with suppress(OSError):  # the process has ended, which the other thread reports
-            while (line := self._orders.get()) is not None:
+            while (line := self._commands.get()) is not None:
                 process.stdin.write(line)
                 process.stdin.flush()
         with suppress(OSError):
@@ -232,7 +232,7 @@ class RecorderClient:
         self._process: CommandChannel | None = None
         self._number = 0
         self._ring: RingChoice | None = None
-        self._retry_at, self._backoff_s = 0.0, AGAIN_S
+        self._retry_at, self._backoff_s = 0.0, RETRY_S
         self._handlers: Mapping[str, Callable[[Mapping[str, object]], None]] = {
             "recording": self._on_recording,
             "figures": self._on_stats,
@@ -300,7 +300,7 @@ class RecorderClient:
         if self.state.phase == "recording":
             self._send(op="note", text=text)
 
-    def write_entry(self, role: str, value: Mapping[str, object], to: str = "") -> None:
+    def add_event(self, role: str, value: Mapping[str, object], to: str = "") -> None:
         """Add an event to the recording and to the flight recorder, if they are on.
 
         Args:
@@ -320,7 +320,7 @@ class RecorderClient:
         if choice == self._ring:
             return
         was_on, self._ring = self._ring is not None, choice
-        self._retry_at, self._backoff_s = 0.0, AGAIN_S
+        self._retry_at, self._backoff_s = 0.0, RETRY_S
         self._alerts.resolve("recorder:ring")
         if was_on and self._process is not None:
             self._send(op="end_ring")
@@ -406,7 +406,7 @@ class RecorderClient:
             )
 
     def _on_ring(self, _content: Mapping[str, object]) -> None:
-        self._backoff_s = AGAIN_S
+        self._backoff_s = RETRY_S
         self._alerts.resolve("recorder:ring")
         if self._ring is not None:
             self._set_state(replace(self.state, ring_s=self.state.ring_s or 0.0))
@@ -447,7 +447,7 @@ class RecorderClient:
     def _on_exited(self, detail: str) -> None:
         before, self._process = self.state, None
         self._retry_at = self._clock() + self._backoff_s
-        self._backoff_s = min(2 * self._backoff_s, AGAIN_AT_MOST_S)
+        self._backoff_s = min(2 * self._backoff_s, MAX_RETRY_S)
         self._set_state(
             replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, pending_saves=())
         )

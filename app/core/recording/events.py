@@ -44,7 +44,7 @@ class RecordedEvents:
         # `clock_ns` is ns since 1970, as in the recorder.
         self._send_event, self._clock_ns = send_event, clock_ns
         self._numbers = count(1)
-        self._present: dict[str, tuple[str, Mapping[str, object]]] = {}
+        self._active_events: dict[str, tuple[str, Mapping[str, object]]] = {}
         self._run: RunState | None = None
         self._run_entry: dict[str, object] = {}
 
@@ -54,7 +54,7 @@ class RecordedEvents:
         Args:
             to: Destination: "recording" or "ring" (the flight recorder).
         """
-        for role, content in self._present.values():
+        for role, content in self._active_events.values():
             self._send_event(role, content, to)
 
     # ---- behaviours
@@ -77,7 +77,7 @@ class RecordedEvents:
     def _end_run(self, run: RunState | None) -> None:
         # `run` is None if the end was not observed.
         self._run_entry["until_ns"] = self._clock_ns()
-        self._present.pop(str(self._run_entry.get("id")), None)
+        self._active_events.pop(str(self._run_entry.get("id")), None)
         if run is None:
             self._send_event("runs", dict(self._run_entry))
             self._run_entry = {}
@@ -98,10 +98,10 @@ class RecordedEvents:
     def on_alarm(self, event: AlarmEvent) -> None:
         """Send an alarm event: raised, cleared, or still active."""
         key = f"alarm-{event.rule.id}"
-        active = self._present.get(key)
+        active = self._active_events.get(key)
         if event.kind == "off":
             if active is not None:
-                del self._present[key]
+                del self._active_events[key]
                 self._send_event("alarms", {**active[1], "until_ns": self._clock_ns()})
             return
         if active is not None:
@@ -125,8 +125,8 @@ class RecordedEvents:
 
     def _add(self, role: str, content: Mapping[str, object], key: str = "") -> None:
         self._send_event(role, dict(content))
-        if len(self._present) < MAX_ACTIVE_ALARMS:
-            self._present[key or str(content["id"])] = (role, content)
+        if len(self._active_events) < MAX_ACTIVE_ALARMS:
+            self._active_events[key or str(content["id"])] = (role, content)
 
 
 def _is_unchanged(before: RunState, run: RunState) -> bool:

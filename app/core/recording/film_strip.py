@@ -49,7 +49,9 @@ class FilmStripPreview:
         each = self.message_bytes.get(topic.name)
         return None if each is None else each * topic.message_count
 
-    def about(self, begin_ns: int, end_ns: int, topics: Collection[str]) -> tuple[float, float | None]:
+    def estimate_messages(
+        self, begin_ns: int, end_ns: int, topics: Collection[str]
+    ) -> tuple[float, float | None]:
         """Estimate the number and the total size (bytes) of the messages in a time range.
 
         The estimate is as precise as the intervals of `counts`. The size is None if it is unknown for
@@ -84,7 +86,7 @@ class FilmStripPreview:
         return sum(part * count for part, count in zip(overlaps, counts, strict=True)) / total
 
 
-def film_strip(
+def read_preview(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
 ) -> FilmStripPreview | None:
     """Read the preview of a recording.

@@ -60,7 +60,7 @@ class SessionRecordings:
     """Recordings of a session. Not thread-safe; use it from the main thread, including `on_event`.
 
     Attributes:
-        on_made: Callback for each finished file, with its path and "recorded" or "kept" (flight
+        on_created: Callback for each finished file, with its path and "recorded" or "kept" (flight
             recorder).
     """
 
@@ -80,14 +80,14 @@ class SessionRecordings:
         self._reads_apart = reads_apart
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
-        self.events = RecordedEvents(self.client.write_entry)
+        self.events = RecordedEvents(self.client.add_event)
         self.choice = parse_choice(settings.get(CHOICE_KEY, {}))
-        self.wish = parse_ring_settings(settings.get(RING_KEY, {}))
-        self.on_made: Callable[[Path, str], object] = _ignore_created
+        self.ring_settings = parse_ring_settings(settings.get(RING_KEY, {}))
+        self.on_created: Callable[[Path, str], object] = _ignore_created
         self.recorded = self.choice
         """Selection of the recording in progress."""
         self._started_s: float | None = None
-        self._keeping: dict[Path, DoneCallback | None] = {}
+        self._pending_saves: dict[Path, DoneCallback | None] = {}
 
     # ---- folder
 
@@ -198,12 +198,12 @@ class SessionRecordings:
         A change of the topics, the duration or the size restarts the flight recorder and discards its
         content.
         """
-        self.wish = ring_settings
+        self.ring_settings = ring_settings
         self._save_setting(RING_KEY, ring_settings_to_json(ring_settings))
         self._apply_ring_settings()
 
     def _apply_ring_settings(self) -> None:
-        ring_settings = self.wish
+        ring_settings = self.ring_settings
         if not ring_settings.is_on:
             self.client.set_ring(None)
             return
@@ -229,7 +229,7 @@ class SessionRecordings:
             seconds: Duration to save; default: the whole content.
             on_done: Called with the result when the file is finished.
         """
-        if not self.wish.is_on:
+        if not self.ring_settings.is_on:
             return _("The flight recorder is off.")
         folder = self._prepare_folder()
         if folder is None:
@@ -237,13 +237,13 @@ class SessionRecordings:
         prefix = "alarm" if on_done is not None else "kept"
         path = folders.new_path(folder, self._now(), prefix)
         number = 2
-        while path in self._keeping:
+        while path in self._pending_saves:
             path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
         if not self.client.save_last(
-            path, seconds if seconds is not None else float(self.wish.seconds), note
+            path, seconds if seconds is not None else float(self.ring_settings.seconds), note
         ):
             return _("The last seconds can't be saved now.")
-        self._keeping[path] = on_done
+        self._pending_saves[path] = on_done
         return ""
 
     def save_for_alarm(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
@@ -286,12 +286,12 @@ class SessionRecordings:
         if was.phase and not state.phase:
             self._started_s = None
             if state.last is not None and state.last == was.path:
-                self.on_made(state.last, "recorded")
-        for path in [each for each in self._keeping if each not in state.pending_saves]:
-            on_done = self._keeping.pop(path)
+                self.on_created(state.last, "recorded")
+        for path in [each for each in self._pending_saves if each not in state.pending_saves]:
+            on_done = self._pending_saves.pop(path)
             is_saved = state.last == path
             if is_saved:
-                self.on_made(path, "kept")
+                self.on_created(path, "kept")
             if on_done is not None:
                 template = _("saved {file}") if is_saved else _("nothing saved: see the alerts")
                 on_done(is_saved, template.format(file=path.name))

@@ -18,8 +18,8 @@ else:
     recorder = lazy_module("nep.recordings.recorder")  # loaded lazily, so that no start waits for it
 
 MODES = ("all", "chosen", "pattern")
-MIN_S, MAX_S, USUAL_S = 5, 3_600, 60
-MIN_GB, MAX_GB, USUAL_GB = 0.1, 1_000.0, 2.0
+MIN_S, MAX_S, DEFAULT_S = 5, 3_600, 60
+MIN_GB, MAX_GB, DEFAULT_GB = 0.1, 1_000.0, 2.0
 MIN_MINUTES, MAX_MINUTES = 0.1, 10_080.0
 """Minimum and maximum duration of a recording in minutes."""
 MAX_NAMES = 1_000
@@ -135,8 +135,8 @@ class RingSettings:
     """
 
     is_on: bool = False
-    seconds: int = USUAL_S
-    size_gb: float = USUAL_GB
+    seconds: int = DEFAULT_S
+    size_gb: float = DEFAULT_GB
     patterns: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
 
@@ -153,8 +153,8 @@ def parse_ring_settings(data: object) -> RingSettings:
     seconds, size_gb = data.get("seconds"), data.get("size_gb")
     return RingSettings(
         data.get("is_on") is True,
-        int(seconds) if _is_within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
-        float(size_gb) if _is_within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
+        int(seconds) if _is_within(seconds, MIN_S, MAX_S) else DEFAULT_S,  # type: ignore[arg-type]
+        float(size_gb) if _is_within(size_gb, MIN_GB, MAX_GB) else DEFAULT_GB,  # type: ignore[arg-type]
         _parse_names(data.get("patterns")),
         _parse_names(data.get("left_out")),
     )

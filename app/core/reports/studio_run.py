@@ -107,7 +107,7 @@ class StudioRun:
             CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_text(error), text))
         self.finish()
 
-    def left(self) -> list[Crash]:
+    def pop_crashes(self) -> list[Crash]:
         """Return the crashes of earlier runs, and delete the files of these runs.
 
         If several instances call this, each crash is returned only once. Runs that ended because the

@@ -97,7 +97,7 @@ class Announcements:
         self._parse_budget_s, self._budget_updated_s = MAX_PARSE_BUDGET_S, clock()
         self._waiting: set[str] = set()
         self._topics: dict[str, _Announcement] = {}
-        self.left_out: tuple[str, ...] = ()
+        self.omitted_topics: tuple[str, ...] = ()
         """Description topics of robots beyond `MAX_ROBOTS`."""
 
     def is_announced(self, topic: str) -> bool:
@@ -150,12 +150,12 @@ class Announcements:
                 )
             elif announcement.claim is not None:
                 claims_by_id[topic] = announcement.claim
-        if self.left_out:
+        if self.omitted_topics:
             title = ngettext(
                 "{count} more robot is on the network; Studio shows at most {most}.",
                 "{count} more robots are on the network; Studio shows at most {most}.",
-                len(self.left_out),
-            ).format(count=len(self.left_out), most=MAX_ROBOTS)
+                len(self.omitted_topics),
+            ).format(count=len(self.omitted_topics), most=MAX_ROBOTS)
             claims_by_id["robots"] = Claim(title, _("Find out which program announces them, and close it."))
         return claims_by_id
 
@@ -197,7 +197,7 @@ class Announcements:
                 if id in ids or self._senders.node_of(message) in announcement.owners
             }
             self._waiting.add(topic)
-        self.left_out = tuple(left_out)
+        self.omitted_topics = tuple(left_out)
         self._parse_pending()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:

@@ -85,8 +85,8 @@ class Fleet:
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own_filter.other_programs)
         """Robots that may move, and so must be named by a Stop."""
-        self._tries = ManualInvocations(self._send, self._heartbeat.stop, clock)
-        self._messages = RobotMessages(self._own_filter, self._tries, self.moved, clock)
+        self._invocations = ManualInvocations(self._send, self._heartbeat.stop, clock)
+        self._messages = RobotMessages(self._own_filter, self._invocations, self.moved, clock)
         self._selected_name = ""
         self._has_graph = False
         self.revision = 0
@@ -178,7 +178,7 @@ class Fleet:
             [(link.robot, [action])], lambda: self._retry_invoke(name, action, input)
         ):
             raise MayNotMoveError([name])
-        invocation = self._tries.start(link, described, input)
+        invocation = self._invocations.start(link, described, input)
         if invocation.is_running:  # a speed continues after its final reply: only a Stop ends it
             self.moved.record_command(
                 [name], "form", id="" if described.repeat_s is not None else invocation.id
@@ -199,7 +199,7 @@ class Fleet:
         Raises:
             UnknownRobotError: No robot has this name.
         """
-        self._tries.cancel(self._get_link(name), action)
+        self._invocations.cancel(self._get_link(name), action)
 
     def change_world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot, for example touch its head, move the ball or say a word.
@@ -297,7 +297,7 @@ class Fleet:
             link.pending_stop_start_s, link.is_stopping = None, False
             link.has_confirmed_stop |= name in report.stopped_names
             if not link.stop_problem:
-                self._tries.end_all(link, "canceled")
+                self._invocations.end_all(link, "canceled")
             self._heartbeat.stop(name)
 
     def confirm_stopped(self, names: Iterable[str]) -> None:
@@ -326,7 +326,7 @@ class Fleet:
         self._update_announced_robots()
         announcements = self._announcements
         self._unlisted = (
-            *unlisted_targets(view, announcements.left_out),
+            *unlisted_targets(view, announcements.omitted_topics),
             *unlisted_targets(view, announcements.unreadable_topics, is_expected=False),
         )
         self._update_rize(view)
@@ -346,14 +346,14 @@ class Fleet:
             self._evict_disconnected()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
-            name = rize.ready(decode_mapping(message))
+            name = rize.announced_name(decode_mapping(message))
             if name is not None:
                 self._rize_names.add(name)
         for link in self._links.values():
             self._messages.read(link, batches)
             began_s = link.pending_stop_start_s
             link.is_stopping = began_s is not None and self._clock() - began_s >= STOPPING_DISPLAY_DELAY_S
-        self._tries.check_timeouts(self._links.values())
+        self._invocations.check_timeouts(self._links.values())
         self.gate.update()
         for link in self._links.values():
             self._update_motion(link)
@@ -516,7 +516,7 @@ class Fleet:
     def _close_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
         self._heartbeat.stop(link.name)
-        self._tries.end_all(
+        self._invocations.end_all(
             link, "failed", _("The description of {robot} has changed; try again").format(robot=link.name)
         )
         if link.watch is not None:
@@ -542,7 +542,7 @@ class Fleet:
         link.is_unresponsive = False
         if self.permission.question is not None and link.name in self.permission.question.moving_actions:
             self.permission.withdraw()
-        self._tries.end_all(
+        self._invocations.end_all(
             link, "failed", _("{robot} disconnected; check that it is switched on").format(robot=link.name)
         )
         self.revision += 1

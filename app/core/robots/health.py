@@ -184,7 +184,7 @@ class Health:
             count=0,
         )
 
-    def program(self, fate: ExecutableState) -> None:
+    def report_executable_state(self, fate: ExecutableState) -> None:
         """Raise or resolve the alert that Studio's executable file was replaced or removed.
 
         Args:

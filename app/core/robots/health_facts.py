@@ -25,7 +25,7 @@ WARM_MOTOR_C = 60
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = plazy("row of a table", "Stop"), lazy("Camera"), lazy("Sensors")
 REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
-LEFT_ALONE, SIGN_OF_LIFE = lazy("Safety stop"), lazy("Last response")
+SAFETY_STOP, HEARTBEAT = lazy("Safety stop"), lazy("Last response")
 REPORTED_TITLES = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
 FormatAge = Callable[[float], str]
@@ -239,15 +239,15 @@ def _count_items(title: str, count: ReportedCount, now: float) -> Iterable[Healt
 def _watchdog_item(link: RobotLink) -> HealthItem:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
-        return HealthItem(LEFT_ALONE, "off", _("keeps moving; stay near its power switch"))
-    return HealthItem(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
+        return HealthItem(SAFETY_STOP, "off", _("keeps moving; stay near its power switch"))
+    return HealthItem(SAFETY_STOP, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 
 def _heartbeat_items(link: RobotLink) -> Iterable[HealthItem]:
     interval_s = link.robot.heartbeat_interval_s
     if interval_s is not None:
         yield HealthItem(
-            SIGN_OF_LIFE, "ok", _("every {seconds} s during actions").format(seconds=number(interval_s))
+            HEARTBEAT, "ok", _("every {seconds} s during actions").format(seconds=number(interval_s))
         )
     elif link.robot.dialect == "native":
-        yield HealthItem(SIGN_OF_LIFE, "off", _("none during actions"))
+        yield HealthItem(HEARTBEAT, "off", _("none during actions"))

@@ -35,7 +35,7 @@ class ManualInvocations:
         wall: Callable[[], float] = time.time,
     ) -> None:
         # `send` sends a command to a robot; `rest` is called with its name once it is idle.
-        self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
+        self._send, self._on_idle, self._clock, self._wall = send, rest, clock, wall
 
     def start(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
         """Send an invocation and return its state.
@@ -162,7 +162,7 @@ class ManualInvocations:
     def _end(self, link: RobotLink, invocation: Invocation, state: str, error: str | None) -> None:
         invocation.state, invocation.error, invocation.ended_s = state, error, self._clock()
         if not link.running_invocations:
-            self._rest(link.name)
+            self._on_idle(link.name)
 
     def _send_cancel(self, link: RobotLink, invocation: Invocation) -> None:
         if link.robot.dialect == "native":

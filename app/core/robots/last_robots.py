@@ -10,14 +10,14 @@ from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 
-KEPT, COME_BACK = "virtual_robots", "virtual_robots_come_back"
+ROBOTS_SETTING, RESTART_SETTING = "virtual_robots", "virtual_robots_come_back"
 MAX_ROBOTS = 8
 
 
 class RobotStarter(Protocol):
     """Part of the interface of `app.core.robots.launcher.Launcher` that `LastRobots` uses."""
 
-    wanted: dict[str, str]
+    models_by_name: dict[str, str]
 
     def start_virtual_robot(self, name: str = ..., model: str = ...) -> None:
         """Start a virtual robot with this name and model."""
@@ -33,11 +33,11 @@ class LastRobots:
     @property
     def is_restart_enabled(self) -> bool:
         """True if running virtual robots are started again at the next start of Studio."""
-        return self._settings.get(COME_BACK, True)
+        return self._settings.get(RESTART_SETTING, True)
 
     def set_restart_enabled(self, is_enabled: bool) -> None:
         """Set and save `is_restart_enabled`. Raises SettingsError if the settings can't be written."""
-        self._settings.set(COME_BACK, is_enabled)
+        self._settings.set(RESTART_SETTING, is_enabled)
 
     def start(self, launcher: RobotStarter) -> None:
         """Start the robots of the last session if `is_restart_enabled` is set.
@@ -46,7 +46,7 @@ class LastRobots:
         """
         if not self.is_restart_enabled:
             return
-        models_by_name: Mapping[str, object] = self._settings.get(KEPT, {})
+        models_by_name: Mapping[str, object] = self._settings.get(ROBOTS_SETTING, {})
         for name, model in list(models_by_name.items())[:MAX_ROBOTS]:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOT_MODULES:
                 launcher.start_virtual_robot(name, model)
@@ -57,7 +57,7 @@ class LastRobots:
         Called during the session, so that the names survive a crash. The settings report errors
         themselves.
         """
-        if launcher.wanted != self._saved:
-            self._saved = dict(launcher.wanted)
+        if launcher.models_by_name != self._saved:
+            self._saved = dict(launcher.models_by_name)
             with suppress(SettingsError):
-                self._settings.set(KEPT, dict(self._saved))
+                self._settings.set(ROBOTS_SETTING, dict(self._saved))

@@ -26,7 +26,7 @@ from nep.system.addresses import is_loopback
 EXIT_TIMEOUT_S = 2.0
 VIRTUAL_ROBOT_MODULES = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
 """Name of the module that implements a virtual robot, by model."""
-TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
+TAIL_BYTES, TAIL_CHARS = 100_000, 2000
 FIRST_GRAPH_TIMEOUT_S = 3.0
 """Time in seconds that a start request waits for the first graph, which may already contain the robot."""
 STARTUP_TIMEOUT_S = 30.0
@@ -133,7 +133,7 @@ class Launcher:
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
-        self.wanted: dict[str, str] = {}
+        self.models_by_name: dict[str, str] = {}
         """Virtual robots that the user started here and did not stop, with their models."""
         self.ended: frozenset[str] = frozenset()
         """Virtual robots started here whose processes ended unexpectedly."""
@@ -175,9 +175,9 @@ class Launcher:
         """Start a master if none is running. Returns immediately; a failure is posted as `LaunchFailed`."""
         self._master.ensure()
 
-    def ensure_master_running(self) -> None:
+    def ensure_master_with_backoff(self) -> None:
         """Call `ensure_master`, unless a failed start was too recent. Call this method repeatedly."""
-        self._master.ensure_running()
+        self._master.ensure_with_backoff()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Request the start of a virtual robot, unless a robot with this name is listed.
@@ -187,7 +187,7 @@ class Launcher:
         listed, or immediately if this Studio started the master.
         """
         now = self._clock()
-        self.wanted[name] = model
+        self.models_by_name[name] = model
         self._starting[name] = now + STARTUP_TIMEOUT_S
         self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_LIFETIME_S)
         self.start_requested_robots()
@@ -199,7 +199,7 @@ class Launcher:
         now = self._clock()
         for name, request in list(self._requests.items()):
             is_listed = self._is_listed(name)
-            if is_listed is None and (self._master.first or now >= request.known_deadline_s):
+            if is_listed is None and (self._master.is_first_master or now >= request.known_deadline_s):
                 is_listed = False
             if is_listed is False:
                 del self._requests[name]
@@ -237,7 +237,7 @@ class Launcher:
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Restart a virtual robot. The process that this Studio started, if any, is killed."""
-        self.wanted[name] = model
+        self.models_by_name[name] = model
         self._requests.pop(name, None)
         with self._lock:
             process_and_log = self._robots.pop(name, None)
@@ -250,7 +250,7 @@ class Launcher:
 
     def stop_virtual_robot(self, name: str) -> None:
         """Stop a virtual robot that this Studio started, and discard a pending request to start it."""
-        self.wanted.pop(name, None)
+        self.models_by_name.pop(name, None)
         self._stop_robot(name)
 
     def _stop_robot(self, name: str) -> None:
@@ -282,7 +282,7 @@ class Launcher:
                     LaunchFailed(
                         name,
                         _("The virtual robot {robot} stopped unexpectedly.").format(robot=name),
-                        output.strip()[-TAIL_LETTERS:] or _exit_reason(code),
+                        output.strip()[-TAIL_CHARS:] or _exit_reason(code),
                     )
                 )
                 log.close()

@@ -33,7 +33,7 @@ class RobotMessages:
         moved: MovedRobots,
         clock: Callable[[], float],
     ) -> None:
-        self._own_filter, self._tries, self._moved, self._clock = own_filter, tries, moved, clock
+        self._own_filter, self._invocations, self._moved, self._clock = own_filter, tries, moved, clock
         self._pending_messages: dict[str, PendingMessages] = {}
         self._settled: dict[str, None] = {}
 
@@ -85,7 +85,7 @@ class RobotMessages:
         if reply is not None and link.robot.dialect == "rize":
             reply = rize.from_reply(reply)
         if reply is not None:
-            self._tries.apply_reply(link, reply)
+            self._invocations.apply_reply(link, reply)
             if reply.get("op") == "alive":
                 self._apply_heartbeat(link, reply)
             else:

@@ -24,9 +24,9 @@ FINISHED_RATIO = 0.9
 Less than 1, because the voice may be slower than the speech bubble.
 """
 MAX_QUEUED = 4
-PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
+SPEECH_TIMEOUT_S, SPEECH_TIMEOUT_PER_LETTER_S = 10.0, 0.2
 """Time limit of a voice (base, and for each letter), after which the speech engine counts as hung."""
-MAX_NOTES, MAX_S = 32, 10.0
+MAX_NOTES, MAX_NOTES_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
@@ -256,7 +256,9 @@ class RobotVoices:
         self._current = None
         if self._waiting:
             utterance = self._current = self._waiting.popleft()
-            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(utterance.text)
+            self._until_s = (
+                self._clock() + SPEECH_TIMEOUT_S + SPEECH_TIMEOUT_PER_LETTER_S * len(utterance.text)
+            )
             speaker.speak(utterance.text, utterance.language, utterance.volume)
 
     def silence(self) -> None:
@@ -290,7 +292,7 @@ def _notes(value: object) -> Notes:
     if not isinstance(value, list):
         return ()
     notes: list[tuple[float, float]] = []
-    left_s = MAX_S
+    left_s = MAX_NOTES_S
     for note in value[:MAX_NOTES]:
         if not (isinstance(note, list) and len(note) == 2):
             return ()

@@ -28,7 +28,7 @@ class OutputReader:
     ) -> None:
         # `stopped` ends the pauses between floods.
         self._stream, self._stopped, self._clock = stream, stopped, clock
-        self.strange_bytes = 0
+        self.unexpected_bytes = 0
         """Number of bytes that don't belong to the protocol."""
         self._second, self._lines, self._bytes = clock(), 0, 0
 
@@ -39,10 +39,10 @@ class OutputReader:
             complete, end, remainder = (remainder + chunk).rpartition(b"\n")
             yield from self._protocol_lines(complete + end)
             if len(remainder) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
-                self.strange_bytes += len(remainder) - 1
+                self.unexpected_bytes += len(remainder) - 1
                 remainder = b"-"  # placeholder, so that the rest of the line isn't parsed either
             self._throttle(read=len(chunk))
-        self.strange_bytes += len(remainder)
+        self.unexpected_bytes += len(remainder)
 
     def _protocol_lines(self, data: bytes) -> Iterator[bytes]:
         # Other lines are skipped in one piece: a loop over a flood of short lines would keep the interpreter
@@ -55,7 +55,7 @@ class OutputReader:
                     self._throttle(lines=1)
                     yield data[offset:end]
                 else:
-                    self.strange_bytes += end + 1 - offset
+                    self.unexpected_bytes += end + 1 - offset
                 offset = end + 1
                 continue
             next_offset = data.find(b"\n" + PROTOCOL_PREFIX, offset)
@@ -63,7 +63,7 @@ class OutputReader:
             strange = data[offset:end]
             while b"\n\n" in strange:  # skip empty lines
                 strange = strange.replace(b"\n\n", b"\n")
-            self.strange_bytes += len(strange.lstrip(b"\n"))
+            self.unexpected_bytes += len(strange.lstrip(b"\n"))
             offset = end
 
     def _read(self) -> bytes:
@@ -89,7 +89,7 @@ class RateLimiter:
     def __init__(self, per_second: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._per_second, self._clock = per_second, clock
         self._second, self._passed = clock(), 0
-        self.kept_back = 0
+        self.rejected_count = 0
 
     def try_acquire(self) -> bool:
         """Return True if another item may pass now; otherwise count the item as rejected."""
@@ -97,7 +97,7 @@ class RateLimiter:
         if now - self._second >= 1.0:
             self._second, self._passed = now, 0
         if self._passed >= self._per_second:
-            self.kept_back += 1
+            self.rejected_count += 1
             return False
         self._passed += 1
         return True
@@ -106,7 +106,7 @@ class RateLimiter:
         """Return and clear the number of rejected items; 0 while items are still being rejected."""
         if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
             return 0
-        count, self.kept_back = self.kept_back, 0
+        count, self.rejected_count = self.rejected_count, 0
         return count
 
 

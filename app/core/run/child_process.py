@@ -43,7 +43,7 @@ class ChildProcess:
         self._most_bytes, self._clock = most_bytes, clock
         self._family: list[psutil.Process] = []
         self._next_family_s = clock() + CHILD_CHECK_INTERVAL_S
-        self.too_large = False
+        self.exceeds_memory_limit = False
         """True if the process was killed because of its memory use."""
         try:
             self.popen = subprocess.Popen(
@@ -74,7 +74,7 @@ class ChildProcess:
             self._next_family_s = self._clock() + CHILD_CHECK_INTERVAL_S
             self._family = _descendants(self._process)
         if sum(map(_memory_bytes, (self._process, *self._family))) > self._most_bytes:
-            self.too_large = True
+            self.exceeds_memory_limit = True
             self.kill()
 
     def wait(self, timeout_s: float) -> bool:
@@ -111,7 +111,7 @@ def child_command() -> tuple[str, ...]:
     return (sys.executable, "-m", "app.blocks.runtime.child")
 
 
-def home() -> Path | None:
+def source_root() -> Path | None:
     """Return the folder that contains the package ``app``; None in a frozen build."""
     return None if getattr(sys, "frozen", False) else Path(__file__).resolve().parents[3]
 

@@ -81,8 +81,8 @@ class Runs:
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._make_runner = make_runner
-        self.coming: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
-        self.also_stops: Callable[[], object] = tuple  # called by Stop before it stops robots
+        self.starting_robots: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
+        self.before_stop: Callable[[], object] = tuple  # called by Stop before it stops robots
         self.document: Document | None = None  # the run's behaviour
         self._runner: Runner | None = None
         self._current_request: RequestedRun | None = None  # the current run, else the last
@@ -178,7 +178,12 @@ class Runs:
             names = [link.name for link in self._fleet.connected]
             elsewhere = self.document not in {None, current}
             view = view_of(
-                run, names, self._clock(), coming=self.coming(), elsewhere=elsewhere, slow=self.pace_s > 0
+                run,
+                names,
+                self._clock(),
+                coming=self.starting_robots(),
+                elsewhere=elsewhere,
+                slow=self.pace_s > 0,
             )
             self._view = (run, current, view)
         return self._view[2]
@@ -218,7 +223,7 @@ class Runs:
         # A new program would lack the value of the current or last run.
         document = self._documents.current
         value = self.values.get(id) if self.document is document else None
-        self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
+        self._trial.set_value(document, stack, value.text if value is not None else _("no value yet"))
 
     def is_running_or_pending(self, document: Document) -> bool:
         """Return True if this behaviour is running, or will be run when another program has stopped."""
@@ -289,7 +294,7 @@ class Runs:
 
     def stop(self) -> None:
         """Stop the program and all robots. The run bar shows the robots' replies."""
-        self.also_stops()
+        self.before_stop()
         self._stopped_again.clear()
         self._pending_request = None
         self._stop(None)
@@ -303,7 +308,7 @@ class Runs:
         if self.active:
             self.stop()
             return
-        self.also_stops()
+        self.before_stop()
         self._stopped_again.discard(name)
         self._stop_in_thread(name)
 

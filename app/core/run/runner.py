@@ -19,7 +19,7 @@ from app.blocks.runtime.variables import VariableValue
 from app.core.faults import CONSOLE_EXTRA
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
 from app.core.run.child_output import OutputReader, RateLimiter, parse_texts, text_of
-from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, home
+from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, source_root
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
 from app.robots.identity import program_of
@@ -159,7 +159,7 @@ class Runner:
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
-        self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
+        self._child = child = ChildProcess(self._command, source_root(), most_bytes=self._most_bytes)
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
         encoded = program.to_json() | ({} if name is None else {"name": name})
@@ -288,13 +288,13 @@ class Runner:
         for line in output:
             event = self._parse_event(line)
             if event is None:
-                output.strange_bytes += len(line)
+                output.unexpected_bytes += len(line)
             elif event.kind == "ended":
                 self._last = event
                 break
             elif event.kind in ("ready", "variables", "ask") or gate.try_acquire():
                 self._deliver(event, gate)
-        self._report_dropped(gate.kept_back, output.strange_bytes)
+        self._report_dropped(gate.rejected_count, output.unexpected_bytes)
         child.popen.stdout.close()
         self._output_ended.set()
 
@@ -344,7 +344,7 @@ class Runner:
         return round(self._clock() - self._began_s, 3)
 
     def _failure_reason(self, child: ChildProcess, *, hung: bool) -> str:
-        if child.too_large:
+        if child.exceeds_memory_limit:
             return _("The program used more than {size} GB of memory and was stopped.").format(
                 size=number(self._most_bytes / 1e9)
             )

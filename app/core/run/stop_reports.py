@@ -41,7 +41,7 @@ class StopReporter:
         pending = [name for name, robot in report.results_by_robot.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.unconfirmed_names)
         return (
-            *(motion.reason for motion in motions if motion is not None and motion.is_known),
+            *(motion.reason for motion in motions if motion is not None and motion.is_sender_known),
             *(
                 _("Stop will be sent to {robot} as soon as it is connected").format(robot=name)
                 for name in pending

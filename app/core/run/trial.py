@@ -62,10 +62,10 @@ class Trial:
         if request is None or request.stack is None or not request.has_value:
             return None
         text = f"{line} {self._unit}".strip() if line else _("not known yet")
-        self.show(request.document, request.stack, text)
+        self.set_value(request.document, request.stack, text)
         return text
 
-    def show(self, document: Document, stack: Stack, words: str) -> None:
+    def set_value(self, document: Document, stack: Stack, words: str) -> None:
         """Set the value of a tried block.
 
         Args:

@@ -14,7 +14,7 @@ MAX_NAMES_LENGTH = 24
 """Maximum number of characters of robot names on the Stop button; longer names are shown only next to it."""
 APPLIES_LATER_HINT = lazy("Your changes take effect at the next run")
 NOTHING_TO_RUN_HINT = lazy("Drag “when started” from Events and put blocks below it")
-RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
+RUN, RESUME, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 
@@ -269,7 +269,7 @@ def _paused_view(run: RunState, _now: float) -> RunView:
         can_step=True,
         can_restart=True,
         is_edited=run.is_edited,
-        run_label=GO_ON,
+        run_label=RESUME,
         last_stop=run.last_stop_text or None,
         last_stop_status=run.last_stop_status,
     )

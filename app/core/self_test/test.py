@@ -30,7 +30,7 @@ class SelfTest:
 
     def __init__(self, environment: TestEnvironment, info: dict[str, object]) -> None:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
-        self.place = environment
+        self.environment = environment
         self.report = Report(environment.path(REPORT), {**info, "bound_s": timeouts.TOTAL_TIMEOUT_S})
         self._changed = threading.Condition()
         self._all_until = time.monotonic() + timeouts.TOTAL_TIMEOUT_S
@@ -100,13 +100,13 @@ class SelfTest:
         faulthandler.cancel_dump_traceback_later()
         faulthandler.disable()
         self._crash.close()
-        crash = self.place.path(CRASH)
+        crash = self.environment.path(CRASH)
         with suppress(OSError):
             if crash.stat().st_size == 0:
                 crash.unlink()
         if not self.report.failure:
             logging.shutdown()  # the log file is in the folder too, and Windows can't delete an open file
-            remove_home(self.place)
+            remove_home(self.environment)
         self._wait_until(time.monotonic() + timeouts.EXIT_TIMEOUT_S, _("the end of the process"))
 
     # -- processes ----------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from app.core.series.samples import Floats, Samples
 
 MAX_WAIT_S = 0.5
 """Maximum time in seconds, by time stamps, that the newest sample of one input waits for other inputs."""
-HOLDS_S, HOLDS = 1.0, 8.0
+MIN_HOLD_S, MAX_HELD_INTERVALS = 1.0, 8.0
 """Maximum validity of a sample of another input: seconds, and number of usual intervals."""
 BATCH_SIZE = 200_000
 """Maximum number of samples that are calculated in one tick."""
@@ -25,8 +25,8 @@ class CalculatedSamples:
         # Sampled at the times of the first input.
         self.samples = Samples()
         self._inputs = tuple(inputs)
-        self._input_revisions = [each.rewritten for each in inputs]
-        self._next = self._inputs[0].begun  # absolute index in the first input
+        self._input_revisions = [each.rewrite_count for each in inputs]
+        self._next = self._inputs[0].evicted_count  # absolute index in the first input
 
     def advance(self) -> None:
         """Calculate the samples for which all inputs are available, at most `BATCH_SIZE` per call."""
@@ -35,19 +35,21 @@ class CalculatedSamples:
             each.earliest_change_s(revision)
             for each, revision in zip(self._inputs, self._input_revisions, strict=True)
         ]
-        self._input_revisions = [each.rewritten for each in self._inputs]
+        self._input_revisions = [each.rewrite_count for each in self._inputs]
         change_s = min((each for each in changed if each is not None), default=None)
         if change_s is not None:
             self.samples.truncate(change_s)
-            self._next = min(self._next, base.begun + int(np.searchsorted(base.times, change_s, side="left")))
-        if self._next < base.begun:
+            self._next = min(
+                self._next, base.evicted_count + int(np.searchsorted(base.times, change_s, side="left"))
+            )
+        if self._next < base.evicted_count:
             self.samples.break_line()
-        first = max(self._next, base.begun) - base.begun
+        first = max(self._next, base.evicted_count) - base.evicted_count
         end = min(self._ready_count(base), first + BATCH_SIZE)
         if end > first:
             with np.errstate(all="ignore"):  # undefined results become gaps
                 self.samples.extend(*self._compute(base, first, end))
-            self._next = base.begun + end
+            self._next = base.evicted_count + end
 
     def _ready_count(self, base: Samples) -> int:
         # Number of the first input's samples that need not wait for other inputs.
@@ -139,6 +141,6 @@ def held_values(samples: Samples, times: Floats) -> Floats:
     old = np.zeros(len(times), dtype=bool)
     if len(samples) > 1:
         usual_s = float(samples.times[-1] - samples.times[0]) / (len(samples) - 1)
-        old = age_s > max(HOLDS_S, HOLDS * usual_s)
+        old = age_s > max(MIN_HOLD_S, MAX_HELD_INTERVALS * usual_s)
     values[(indexes < 0) | in_gap | old] = np.nan
     return values

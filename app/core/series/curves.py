@@ -194,21 +194,23 @@ class Curves:
         return sum(each.lost for each in self._topics.values())
 
     @property
-    def unread_count(self) -> int:
+    def skipped_count(self) -> int:
         """Number of messages that were skipped: undecodable, too large, or with an invalid time stamp."""
-        return sum(each.unread + each.unplaced for each in self._topics.values())
+        return sum(each.unreadable_count + each.invalid_stamp_count for each in self._topics.values())
 
     @property
     def discarded_count(self) -> int:
         """Number of samples and states that were removed because a clock was set back."""
         fields = [field for topic in self._topics.values() for field in topic.fields]
-        return sum(field.numbers.undone + field.states.undone for field in fields)
+        return sum(field.numbers.removed_count + field.states.removed_count for field in fields)
 
     @property
     def evicted_count(self) -> int:
         """Number of old samples and states that were evicted."""
         states = [each.states for each in self.all if each.states is not None]
-        return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
+        return sum(each.samples.evicted_count for each in self.all) + sum(
+            each.evicted_count for each in states
+        )
 
     @property
     def newest_s(self) -> float | None:

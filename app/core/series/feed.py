@@ -99,7 +99,7 @@ class SeriesFeed:
             for taker in self._takers.get(topic, ()):
                 taker.reset()
 
-    def add(self, batches: Mapping[str, Batch]) -> None:
+    def dispatch(self, batches: Mapping[str, Batch]) -> None:
         """Pass the messages received since the last tick to the receivers."""
         if not self._takers:
             return

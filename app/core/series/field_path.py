@@ -23,7 +23,7 @@ WILDCARD: Final = "*"
 
 A key with this text is written in quotes.
 """
-MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
+MAX_STEPS, MAX_EXPANDED_PATHS, MAX_FIELDS = 32, 65, 2000
 MAX_LENGTH = 400
 BARE_VALUE_KEY = "value"
 _STEP_PATTERN = re.compile(
@@ -130,12 +130,12 @@ class FieldPath:
             return [self]
         index = self.steps.index(ALL)
         above = FieldPath(self.steps[:index]).value_in(payload) if index else payload
-        count = min(len(above), MAX_EVERY) if is_list(above) else 0  # type: ignore[arg-type]
+        count = min(len(above), MAX_EXPANDED_PATHS) if is_list(above) else 0  # type: ignore[arg-type]
         paths: list[FieldPath] = []
         for number in range(count):
             path = FieldPath((*self.steps[:index], number, *self.steps[index + 1 :]))
             paths += path.expanded(payload)
-        return paths[:MAX_EVERY]
+        return paths[:MAX_EXPANDED_PATHS]
 
 
 def _parse_step(match: re.Match[str]) -> Step:

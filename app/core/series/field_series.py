@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 MAX_STAMP_NS = 1 << 63
 """Latest valid time stamp (year 2262). Messages with a later time stamp are skipped and counted."""
-SILENCE_S, SILENCES = 1.0, 8.0
+MIN_SILENCE_S, MIN_SILENCE_INTERVALS = 1.0, 8.0
 """Minimum silence that counts as a gap: seconds, and number of usual intervals."""
-MIN_SILENCES = 3
+MIN_CONSECUTIVE_SILENCES = 3
 """Number of consecutive gaps after which the topic's usual interval is updated to their length."""
 MAX_PUBLISHERS = 64
 UNREADABLE = object()
@@ -111,8 +111,8 @@ class TopicSeries:
 
     Attributes:
         lost: Number of messages that did not arrive.
-        unread: Number of messages that can't be decoded or are too large.
-        unplaced: Number of messages with an invalid time stamp.
+        unreadable_count: Number of messages that can't be decoded or are too large.
+        invalid_stamp_count: Number of messages with an invalid time stamp.
         payload: Payload of the newest decoded message; `MISSING` before the first one.
     """
 
@@ -120,7 +120,7 @@ class TopicSeries:
         # Times are seconds after `origin_ns`.
         self.topic, self._origin_ns = topic, origin_ns
         self.fields: list[FieldSeries] = []
-        self.received = self.lost = self.unread = self.unplaced = 0
+        self.received = self.lost = self.unreadable_count = self.invalid_stamp_count = 0
         self.payload: object = MISSING
         self._gap = False  # messages are missing before the next one
         self._seqs: dict[int | None, int] = {}
@@ -153,7 +153,7 @@ class TopicSeries:
             time_s = self._time_of(message, now_ns)
             pending = pending or jump > 0
             if time_s is None:
-                self.unplaced += 1
+                self.invalid_stamp_count += 1
                 pending = True
                 continue
             times.append(time_s)
@@ -171,7 +171,7 @@ class TopicSeries:
         """Remove all values. Called when the source seeks to another time."""
         self._seqs.clear()
         self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
-        self.received = self.lost = self.unread = self.unplaced = 0
+        self.received = self.lost = self.unreadable_count = self.invalid_stamp_count = 0
         self.payload = MISSING
         for field in self.fields:
             field.reset()
@@ -199,12 +199,12 @@ class TopicSeries:
 
     def _read(self, message: Message) -> object:
         if message.size_bytes > LARGE_BYTES or message.codec == "image":
-            self.unread += 1
+            self.unreadable_count += 1
             return UNREADABLE
         try:
             self.payload = payload = message.payload
         except (NepError, ValueError, RecursionError):
-            self.unread += 1
+            self.unreadable_count += 1
             return UNREADABLE
         return payload
 
@@ -212,15 +212,15 @@ class TopicSeries:
         if self._last_s is None:
             return False
         pause_s, usual_s = time_s - self._last_s, self._usual_s
-        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # the usual case
+        if usual_s is not None and 0 < pause_s <= MIN_SILENCE_S:  # the usual case
             self._silences = 0
             self._usual_s = usual_s + 0.1 * (pause_s - usual_s)
             return False
         if pause_s <= 0 or not isfinite(pause_s):
             return False
-        if usual_s is not None and pause_s > max(SILENCE_S, SILENCES * usual_s):
+        if usual_s is not None and pause_s > max(MIN_SILENCE_S, MIN_SILENCE_INTERVALS * usual_s):
             self._silences += 1
-            if self._silences < MIN_SILENCES:
+            if self._silences < MIN_CONSECUTIVE_SILENCES:
                 return True
             usual_s = None
         self._silences = 0

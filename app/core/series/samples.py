@@ -27,7 +27,7 @@ A later sample means that the clock was set back.
 LEVEL_SHIFTS = (4, 7, 10)
 MAX_SAMPLES_PER_PIXEL = 4
 """Maximum number of samples per pixel for which each sample is drawn."""
-FEW_RANGES, FEW_NUMBERS = 8, 4096
+MAX_DIRECT_RANGES, MAX_DIRECT_SAMPLES = 8, 4096
 """Numbers of ranges and samples up to which a Python loop is faster than a vectorized reduction."""
 _INITIAL_CAPACITY = 1024
 _EVICTION_UNIT = 1 << LEVEL_SHIFTS[-1]
@@ -51,13 +51,13 @@ class Polyline:
     Attributes:
         times: Times in seconds.
         values: Values, NaN at gaps.
-        points: Number of samples in the range.
+        sample_count: Number of samples in the range.
         is_complete: True if the polyline contains all samples of the range.
     """
 
     times: Floats
     values: Floats
-    points: int
+    sample_count: int
     is_complete: bool
 
 
@@ -153,14 +153,14 @@ class Samples:
 
     def __init__(self, limit: int = MAX_SAMPLES) -> None:
         self.limit = limit
-        self.begun = self.undone = 0
+        self.evicted_count = self.removed_count = 0
         self._count = 0
         self._times, self._values = np.empty(_INITIAL_CAPACITY), np.empty(_INITIAL_CAPACITY)
         self._gaps = np.zeros(_INITIAL_CAPACITY, dtype=bool)
         self._levels = tuple(_Level(shift) for shift in LEVEL_SHIFTS)
         self._render_cache = _PixelCache()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_MAX_REWRITES)
-        self.rewritten = 0
+        self.rewrite_count = 0
         self._gap_pending = False
 
     def __len__(self) -> int:
@@ -169,7 +169,7 @@ class Samples:
     @property
     def end(self) -> int:
         """Absolute index of the next sample."""
-        return self.begun + self._count
+        return self.evicted_count + self._count
 
     @property
     def times(self) -> Floats:
@@ -284,7 +284,7 @@ class Samples:
         """
         index = int(np.searchsorted(self.times, time_s, side="left"))
         if index < self._count:
-            self.undone += self._count - index
+            self.removed_count += self._count - index
             self._count = index
             self._record_rewrite(index, time_s)
         self._gap_pending = self._gap_pending and self._count > 0
@@ -292,13 +292,13 @@ class Samples:
     def clear(self) -> None:
         """Remove all samples."""
         self.truncate(-np.inf)
-        self.begun = self.undone = 0
+        self.evicted_count = self.removed_count = 0
 
     def _record_rewrite(self, index: int, time_s: float) -> None:
         for level in self._levels:
             level.built = min(level.built, index >> level.shift)
-        self.rewritten += 1
-        self._rewrites.append((self.rewritten, time_s))
+        self.rewrite_count += 1
+        self._rewrites.append((self.rewrite_count, time_s))
 
     def earliest_change_s(self, revision: int) -> float | None:
         """Return the earliest time at which samples were changed, other than by appending.
@@ -306,9 +306,9 @@ class Samples:
         Returns None if there was no such change, and -inf if the changes are too old to be known.
 
         Args:
-            revision: Value of ``rewritten`` up to which the caller knows the changes.
+            revision: Value of ``rewrite_count`` up to which the caller knows the changes.
         """
-        if revision == self.rewritten:
+        if revision == self.rewrite_count:
             return None
         if not self._rewrites or self._rewrites[0][0] > revision + 1:
             return -np.inf
@@ -346,7 +346,7 @@ class Samples:
             array[:remaining] = array[drop : self._count].copy()
         for level in self._levels:
             level.discard(drop >> level.shift)
-        self._count, self.begun = remaining, self.begun + drop
+        self._count, self.evicted_count = remaining, self.evicted_count + drop
         self._shrink_arrays()
 
     # -- queries -----------------------------------------------------------------------------------
@@ -446,7 +446,7 @@ class Samples:
             first += uses_previous_sample
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
         cacheable = pixels.part(first, max(first, min(sure, end - 1)))
-        self._render_cache = _PixelCache(width, self.rewritten, self.begun, cacheable)
+        self._render_cache = _PixelCache(width, self.rewrite_count, self.evicted_count, cacheable)
         times, values = pixels.times, pixels.values
         broken = 2 * np.flatnonzero(pixels.gaps)
         broken = broken[broken > 0]
@@ -463,7 +463,7 @@ class Samples:
         changed_s = self.earliest_change_s(drawn.rewrite_count)
         if changed_s is not None:
             pixels = pixels.part(-np.inf, float(np.floor(changed_s / width_s)) - 1)
-        if drawn.evicted_count != self.begun:
+        if drawn.evicted_count != self.evicted_count:
             pixels = pixels.part(float(np.floor(self._times[0] / width_s)) + 2, np.inf)
         return pixels
 
@@ -489,7 +489,7 @@ class Samples:
 
     def _min_and_max(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
         # Of each index range; none is empty.
-        if len(starts) > FEW_RANGES or ends[-1] - starts[0] > FEW_NUMBERS:
+        if len(starts) > MAX_DIRECT_RANGES or ends[-1] - starts[0] > MAX_DIRECT_SAMPLES:
             low, high, _total = self._reduce_ranges(starts, ends)
             return low, high
         parts = [self._values[start:end] for start, end in zip(starts, ends, strict=True)]

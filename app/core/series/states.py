@@ -34,7 +34,7 @@ class States:
         self._begins: list[float] = []
         self._values: list[str | None] = []
         self.last_s: float | None = None
-        self.forgotten = self.undone = 0
+        self.evicted_count = self.removed_count = 0
 
     def __len__(self) -> int:
         return len(self._begins)
@@ -68,18 +68,18 @@ class States:
         if len(self._begins) > self._limit:
             drop = len(self._begins) - self._limit * 3 // 4
             del self._begins[:drop], self._values[:drop]
-            self.forgotten += drop
+            self.evicted_count += drop
 
     def clear(self) -> None:
         """Remove all runs."""
         self._begins.clear()
         self._values.clear()
         self.last_s = None
-        self.forgotten = self.undone = 0
+        self.evicted_count = self.removed_count = 0
 
     def _truncate(self, time_s: float) -> None:
         index = bisect_left(self._begins, time_s)
-        self.undone += len(self._begins) - index
+        self.removed_count += len(self._begins) - index
         del self._begins[index:], self._values[index:]
         self.last_s = time_s if self._begins else None
 

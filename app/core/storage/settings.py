@@ -136,7 +136,7 @@ class Settings:
         """Message for the user about the file that was found, or ""."""
         self.are_new = False
         """True if no settings existed, which means that Studio was started for the first time."""
-        self.not_kept: str | None = None
+        self.write_error: str | None = None
         """Reason why the last write failed; None if it succeeded."""
         self._unwritten: dict[str, object] = {}
         self._clock = clock
@@ -168,7 +168,7 @@ class Settings:
             TypeError: The value can't be converted to JSON. Nothing is changed.
             ValueError: The value can't be converted to JSON. Nothing is changed.
         """
-        if key in self._values and self._values[key] == value and self.not_kept is None:
+        if key in self._values and self._values[key] == value and self.write_error is None:
             return
         json.dumps(value)
         self._values[key] = self._unwritten[key] = value
@@ -310,9 +310,9 @@ class Settings:
             write_atomically(self.path, data, durable=False, private=True)
         except OSError as error:
             failed = SettingsError(self.path, error.strerror or str(error))
-            self.not_kept = str(failed)
+            self.write_error = str(failed)
             raise failed from error
-        self.not_kept = None
+        self.write_error = None
         self._unwritten.clear()
 
 

@@ -14,7 +14,7 @@ from app.errors import DescriptionError
 from app.robots.description.inputs import Choice, Parameter, display_unit
 from app.robots.description.json_access import as_object, object_member, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
-from app.robots.description.parser import read
+from app.robots.description.parser import parse_document
 from app.robots.description.validate import validate, without_control_characters
 from nep.i18n import _, number
 from nep.messages.message import Message
@@ -65,7 +65,7 @@ def parse(document: Mapping[str, object]) -> Robot:
         title = as_object(document).get("title")
         raise DescriptionError(title if isinstance(title, str) else _("a robot"), problems)
     document = without_control_characters(document)
-    return read(document, default_topics(str(document["title"])))
+    return parse_document(document, default_topics(str(document["title"])))
 
 
 def parse_announcement(message: Message) -> Robot:

@@ -13,7 +13,7 @@ _TOPIC_SCHEME = "nep:"
 _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
-def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
+def parse_document(document: Mapping[str, object], topics: RobotTopics) -> Robot:
     """Convert a valid document to a robot.
 
     Args:

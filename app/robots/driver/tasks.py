@@ -54,7 +54,7 @@ class Watchdog:
     def __init__(self, patience_s: float | None) -> None:
         self.patience_s = patience_s
         self._heartbeat_times_s: dict[ProgramId, float] = {}
-        self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
+        self._programs_in_motion: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
     def record_heartbeat(self, program: ProgramId, now: float, *, watch: bool) -> None:
         """Record a heartbeat.
@@ -70,7 +70,7 @@ class Watchdog:
     def record_start(self, task: Task) -> None:
         """Record that a task has started, which ends earlier motions that use the same resources."""
         for resource in task.uses:
-            self._going_on.pop(resource, None)
+            self._programs_in_motion.pop(resource, None)
 
     def record_success(self, task: Task) -> None:
         """Record that a task has succeeded, after which its motion may continue.
@@ -78,12 +78,12 @@ class Watchdog:
         See `Task.continues_after_success`.
         """
         if task.continues_after_success and task.program is not None:
-            self._going_on |= dict.fromkeys(task.uses, task.program)
+            self._programs_in_motion |= dict.fromkeys(task.uses, task.program)
 
     def reset(self) -> None:
         """Remove all programs after a stop of the robot."""
         self._heartbeat_times_s.clear()
-        self._going_on.clear()
+        self._programs_in_motion.clear()
 
     def deadlines(self) -> list[float]:
         """Return the times on the clock at which the monitored programs count as silent."""
@@ -109,7 +109,7 @@ class Watchdog:
         ]
         for name in silent:
             del self._heartbeat_times_s[name]
-        return any(name in acting or name in self._going_on.values() for name in silent)
+        return any(name in acting or name in self._programs_in_motion.values() for name in silent)
 
 
 class _PendingStop(NamedTuple):
@@ -150,7 +150,9 @@ class Tasks:
         self._next_beat_s = 0.0
         self._reported_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
-        self._unasked_stop_error: str | None = None  # error of the last failed stop that was not requested
+        self._unrequested_stop_error: str | None = (
+            None  # error of the last failed stop that was not requested
+        )
         self._patience_s = max(STOP_REPLY_TIMEOUT_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._dispatcher = Dispatcher(
@@ -354,7 +356,7 @@ class Tasks:
 
     @property
     def _needs_heartbeat(self) -> bool:
-        return self._is_busy or self._unasked_stop_error is not None
+        return self._is_busy or self._unrequested_stop_error is not None
 
     def _rejection_reason(self) -> str | None:
         stopped = [task for task in self._running if task.is_stopped]
@@ -370,7 +372,9 @@ class Tasks:
         not_ended = self._unfinished_actions()
         if not_ended:
             return not_ended, still_moving_message(self._name, not_ended)
-        return ((STOP_LABEL,) if self._unasked_stop_error is not None else ()), self._unasked_stop_error
+        return (
+            (STOP_LABEL,) if self._unrequested_stop_error is not None else ()
+        ), self._unrequested_stop_error
 
     def _send_heartbeat(self) -> None:
         if self._beat is None:
@@ -420,9 +424,9 @@ class Tasks:
 
     def _record_unrequested_stop(self, reply: TaskReply) -> None:
         if reply.state == "failed":
-            if reply.error != self._unasked_stop_error:  # log repeated failures once
+            if reply.error != self._unrequested_stop_error:  # log repeated failures once
                 _log.error("%s", reply.error)
-            self._unasked_stop_error = reply.error
+            self._unrequested_stop_error = reply.error
 
     def _end_task(self, task: Task, how: TaskReply) -> None:
         # A function that keeps running is reported after `_GRACE_S`.
@@ -543,7 +547,7 @@ class Tasks:
         self._ended_run, self._ended_error = run, error
         self._stop_is_late = False
         if error is None:
-            self._unasked_stop_error = None
+            self._unrequested_stop_error = None
             self._complete_stops()
             return
         failed = TaskReply("failed", error=error)
@@ -553,8 +557,8 @@ class Tasks:
             self._record_unrequested_stop(
                 failed
             )  # the requester already got the answer that it had not ended
-        elif self._unasked_stop_error is not None:
-            self._unasked_stop_error = error
+        elif self._unrequested_stop_error is not None:
+            self._unrequested_stop_error = error
         for pending in waiting:
             self._send_reply(pending.reply, failed)
 

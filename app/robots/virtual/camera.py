@@ -57,7 +57,7 @@ class Camera:
         canvas = Canvas(lens)
         self._paint_shell(canvas, room)
         self._paint_shadows(canvas, room)
-        visible = [drawable for drawable in _things(room) if _is_ahead(drawable, lens)]
+        visible = [drawable for drawable in _drawables(room) if _is_ahead(drawable, lens)]
         for drawable in sorted(visible, key=lambda one: -_distance(one, lens)):
             if isinstance(drawable, Box):
                 _paint_furniture(canvas, drawable)
@@ -139,7 +139,7 @@ class Camera:
 _Drawable: TypeAlias = Box | Person | Ball | Marker | OtherRobot
 
 
-def _things(room: Room) -> list[_Drawable]:
+def _drawables(room: Room) -> list[_Drawable]:
     standing_markers = [card for card in room.markers if card.facing_deg is None]
     return [*room.boxes, *room.people, *room.balls, *standing_markers, *room.other_robots]
 

@@ -229,12 +229,12 @@ class _Painter:
             cv2.LINE_AA,
         )
 
-    def shape(self, points: list[tuple[float, float]], colour: str) -> None:
+    def paint_polygon(self, points: list[tuple[float, float]], colour: str) -> None:
         corners = np.array([self._point(x, y) for x, y in points], dtype=np.int32)
         for target, value in ((self.colour, to_bgr(colour)), (self.alpha, (255,))):
             cv2.fillPoly(target, [corners], value, cv2.LINE_AA)
 
-    def done(self) -> Picture:
+    def render(self) -> Picture:
         both = np.dstack([self.colour, self.alpha])
         size = (self.width // _SUPERSAMPLING, self.height // _SUPERSAMPLING)
         return np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
@@ -244,22 +244,24 @@ def person() -> Texture:
     """Return the texture of a person from head to feet."""
     paint = _Painter(*FIGURE_SIZE_PX)
     for x in (0.40, 0.60):  # legs and shoes
-        paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
+        paint.paint_polygon(
+            [(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658"
+        )
         paint.paint_oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
     for side in (-1, 1):  # arms and hands behind the body
         shoulder, hand = 0.5 + side * 0.27, 0.5 + side * 0.36
-        paint.shape(
+        paint.paint_polygon(
             [(shoulder - 0.07, 0.322), (shoulder + 0.05, 0.322), (hand + 0.06, 0.55), (hand - 0.06, 0.55)],
             "#3972a8",
         )
         paint.paint_oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
         paint.paint_oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
     paint.paint_oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
-    paint.shape([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
-    paint.shape([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
+    paint.paint_polygon([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
+    paint.paint_polygon([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
     paint.paint_oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
     _paint_head(paint)
-    return Texture(paint.done())
+    return Texture(paint.render())
 
 
 def _paint_head(paint: _Painter) -> None:
@@ -268,8 +270,8 @@ def _paint_head(paint: _Painter) -> None:
     paint.paint_oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
     paint.paint_oval((0.5, 0.118), (0.185, 0.092), "#e9b690")
     paint.paint_oval((0.5, 0.075), (0.2, 0.07), "#4b2f24", (180, 360))
-    paint.shape([(0.302, 0.074), (0.31, 0.118), (0.335, 0.085), (0.42, 0.07)], "#4b2f24")
-    paint.shape([(0.698, 0.074), (0.69, 0.118), (0.665, 0.085), (0.58, 0.07)], "#4b2f24")
+    paint.paint_polygon([(0.302, 0.074), (0.31, 0.118), (0.335, 0.085), (0.42, 0.07)], "#4b2f24")
+    paint.paint_polygon([(0.698, 0.074), (0.69, 0.118), (0.665, 0.085), (0.58, 0.07)], "#4b2f24")
     for x in (0.425, 0.575):
         paint.paint_oval((x, 0.116), (0.03, 0.0095), "#fdfbf8")
         paint.paint_oval((x, 0.1165), (0.019, 0.0095), "#33241d")
@@ -290,15 +292,15 @@ def robot(small: bool, *, faces: bool) -> Texture:
     """
     paint = _Painter(*(FIGURE_SIZE_PX if not small else (400, 300)))
     (_paint_small_robot if small else _paint_large_robot)(paint, faces=faces)
-    return Texture(paint.done())
+    return Texture(paint.render())
 
 
 def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
-    paint.shape([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
+    paint.paint_polygon([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
     paint.paint_oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
     for side in (-1, 1):
         shoulder, hand = 0.5 + side * 0.33, 0.5 + side * 0.4
-        paint.shape(
+        paint.paint_polygon(
             [(shoulder - 0.06, 0.33), (shoulder + 0.06, 0.33), (hand + 0.05, 0.6), (hand - 0.05, 0.6)],
             "#dfe4ee",
         )
@@ -306,9 +308,9 @@ def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
     paint.paint_oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
     paint.paint_oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
     if not faces:
-        paint.shape([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
+        paint.paint_polygon([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
         return
-    paint.shape([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
+    paint.paint_polygon([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
     for x in (0.37, 0.63):
         paint.paint_oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
         paint.paint_oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
@@ -319,11 +321,11 @@ def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
 def _paint_small_robot(paint: _Painter, *, faces: bool) -> None:
     for x in (0.1, 0.9):
         paint.paint_oval((x, 0.78), (0.07, 0.2), "#2b2d33")
-    paint.shape([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
+    paint.paint_polygon([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
     paint.paint_oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
     paint.paint_oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
-    paint.shape([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
-    paint.shape([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
+    paint.paint_polygon([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
+    paint.paint_polygon([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
     if faces:
         paint.paint_oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
 

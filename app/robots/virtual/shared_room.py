@@ -53,10 +53,10 @@ class SharedRoom:
         self._map = RoomMap(body.room)
         self._neighbours = Neighbours(link.name, clock)
         self._revision = self._map.revision
-        self._is_new = body.room != Room()
+        self._has_unpublished_changes = body.room != Room()
         self._arrives_until_s = clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
-        self._went_back_with: frozenset[str] = frozenset()
+        self._returning_names: frozenset[str] = frozenset()
         self._publish_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)
         self._publish_position = link.open_shared_topic(ROBOTS_TOPIC, self._receive_robot)
 
@@ -83,7 +83,7 @@ class SharedRoom:
             body.room = replace(body.room, other_robots=others)
         if self._clock.now() < self._arrives_until_s and body.is_still:
             radius = self._like.radius
-            if self._neighbours.must_give_way(body.x, body.y, radius, self._went_back_with):
+            if self._neighbours.must_give_way(body.x, body.y, radius, self._returning_names):
                 body.set_position(*body.room.nearest_free(body.x, body.y, radius))
                 self._start = body.x, body.y
 
@@ -93,11 +93,11 @@ class SharedRoom:
         Call this with the lock held.
         """
         if self._map.update_positions(self._body.room):
-            self._revision, self._is_new = self._map.revision, True
+            self._revision, self._has_unpublished_changes = self._map.revision, True
 
     def move(self, name: str, x: float, y: float) -> None:
         """Move an object for the user. Call this with the lock held."""
-        self._is_new = self._map.move(name, x, y) or self._is_new
+        self._has_unpublished_changes = self._map.move(name, x, y) or self._has_unpublished_changes
         self.update_body()
 
     def return_to_start(self, together: object) -> None:
@@ -111,7 +111,7 @@ class SharedRoom:
         self.update_body()
         names = together if isinstance(together, list) else []
         body, leaving = self._body, frozenset(name for name in names if isinstance(name, str))
-        self._went_back_with = leaving  # their reported positions may still be the old ones
+        self._returning_names = leaving  # their reported positions may still be the old ones
         body.reset(body.room)
         staying = tuple(other for other in body.room.other_robots if other.name not in leaving)
         room = replace(body.room, other_robots=staying)
@@ -120,7 +120,7 @@ class SharedRoom:
     def reset(self) -> Room:
         """Reset the room to its initial state and return it. Call this with the lock held."""
         self._map.reset()
-        self._is_new = True
+        self._has_unpublished_changes = True
         self.update_body()
         return self._body.room
 
@@ -139,7 +139,10 @@ class SharedRoom:
                 y=round(body.y, 3),
                 theta_deg=round(body.theta_deg, 1),
             )
-            map_message, self._is_new = self._map.message() if self._is_new else None, False
+            map_message, self._has_unpublished_changes = (
+                self._map.message() if self._has_unpublished_changes else None,
+                False,
+            )
         if map_message is not None:
             self._publish_room(map_message)
         self._neighbours.publish_position(me, self._publish_position)

@@ -14,7 +14,7 @@ START_POSE = (-0.9, -0.9, 35.0)
 DEFAULT_LIGHT_COLOUR = "#35c26b"
 MAX_DISTANCE_M = 4.0
 ACCELERATION, BRAKING = 1.5, 20.0  # m/s²
-TURNING, TURN_BRAKING = 360.0, 4000.0  # °/s²
+TURN_ACCELERATION, TURN_BRAKING = 360.0, 4000.0  # °/s²
 _MAX_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _BUMPER_ANGLE_DEG = 50.0
@@ -117,7 +117,7 @@ class WheelBody:
     def _step(self, dt: float) -> None:
         speed, turn_speed = (0.0, 0.0) if self.is_lifted else self._target
         self.speed = _approach(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
-        self.turn_speed = _approach(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
+        self.turn_speed = _approach(self.turn_speed, turn_speed, TURN_ACCELERATION * dt, TURN_BRAKING * dt)
         if self._pressed_s > 0.0:
             self._pressed_s -= dt
             self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""

@@ -25,7 +25,7 @@ class BlocklyBridge(QObject):
         initial_settings: Returns the settings for the slot `initial_settings`.
     """
 
-    told = Signal(str, str)  # to the page: a command and its JSON
+    command_sent = Signal(str, str)  # to the page: a command and its JSON
     page_ready = Signal()
     edited = Signal(str, int, str)  # a tab's key, generation of the program loaded there, workspace as JSON
     undo_changed = Signal(bool, bool)
@@ -55,16 +55,16 @@ class BlocklyBridge(QObject):
 
     def __init__(self, initial_settings: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._begin = initial_settings
+        self._initial_settings = initial_settings
 
     def send_command(self, command: str, payload: object) -> None:
         """Send a command with a JSON payload to the page, which sends no reply."""
-        self.told.emit(command, deep_json.dumps(payload, ascii=True))
+        self.command_sent.emit(command, deep_json.dumps(payload, ascii=True))
 
     @Slot(result=str)
-    def beginning(self) -> str:
+    def initial_settings(self) -> str:
         """Return theme, language and motion settings as JSON, which the page needs before its first paint."""
-        return deep_json.dumps(self._begin(), ascii=True)
+        return deep_json.dumps(self._initial_settings(), ascii=True)
 
     @Slot()
     def ready(self) -> None:
@@ -91,7 +91,7 @@ class BlocklyBridge(QObject):
         self.picture_rendered.emit(token, data)
 
     @Slot(str)
-    def tries(self, stack: str) -> None:
+    def try_stack(self, stack: str) -> None:
         self.try_requested.emit(stack)
 
     @Slot()
@@ -103,7 +103,7 @@ class BlocklyBridge(QObject):
         self.block_focused.emit(is_focused)
 
     @Slot(str)
-    def offers(self, sensors: str) -> None:
+    def show_sensors(self, sensors: str) -> None:
         self.visible_sensors_changed.emit(sensors)
 
     @Slot(bool)
@@ -115,11 +115,11 @@ class BlocklyBridge(QObject):
         self.removed.emit(count)
 
     @Slot(int, int, bool, str)
-    def carried(self, x: int, y: int, is_outside: bool, tab: str) -> None:
+    def drag_outside(self, x: int, y: int, is_outside: bool, tab: str) -> None:
         self.blocks_dragged_outside.emit(x, y, is_outside, tab)
 
     @Slot(str, float)
-    def pictureOfCarried(self, data: str, ratio: float) -> None:
+    def drag_picture(self, data: str, ratio: float) -> None:
         self.drag_picture_rendered.emit(data, ratio)
 
     @Slot(int, int)
@@ -127,7 +127,7 @@ class BlocklyBridge(QObject):
         self.blocks_dropped_outside.emit(x, y)
 
     @Slot(int, str, str)
-    def brought(self, count: int, mode: str, source_tab: str) -> None:
+    def transferred(self, count: int, mode: str, source_tab: str) -> None:
         self.blocks_transferred.emit(count, mode, source_tab)
 
     @Slot(str)
@@ -154,11 +154,11 @@ class BlocklyBridge(QObject):
             self.command_requested.emit(name)
 
     @Slot(str)
-    def watches(self, variables: str) -> None:
+    def watch_variables(self, variables: str) -> None:
         self.watched_variables_changed.emit(variables)
 
     @Slot(str)
-    def wants(self, what: str) -> None:
+    def press_canvas_button(self, what: str) -> None:
         self.canvas_button_pressed.emit(what)
 
     @Slot(str)

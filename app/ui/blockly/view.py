@@ -163,7 +163,7 @@ class BlocklyView(BlocklyHost):
         self._waiting[self._tokens] = callback
         self._bridge.send_command("flush", self._tokens)
 
-    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
+    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the shown tab as an image.
 
         Args:

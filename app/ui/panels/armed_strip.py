@@ -41,26 +41,26 @@ class ArmedStrip(QWidget):
         self._is_on = False
         self.switch = Switch(self._theme, _("Armed"))
         self.switch.clicked.connect(self._toggle_armed)
-        self.words = label("", "small", role="textSecondary")
+        self.text_label = label("", "small", role="textSecondary")
         self._targets_label = label(_("sends to"), "small", role="textSecondary")
         self.tokens: list[LinkButton] = []
         self._flow_widget = QWidget()
         self._flow = Flow(self._flow_widget, gap=8, row_gap=4)
         self.counts = label("", "small", role="textSecondary")
-        for widget in (self.switch, self.words, self._targets_label, self.counts):
+        for widget in (self.switch, self.text_label, self._targets_label, self.counts):
             self._flow.addWidget(widget)
         self.question = label("", "small", role="warn", wrap=True)
         self.question.setMinimumWidth(0)
-        self.let = Button(self._theme, _("Arm sending"), size="small")
+        self.allow_button = Button(self._theme, _("Arm sending"), size="small")
         self.cancel = Button(self._theme, _("Cancel"), size="small")
-        self.let.clicked.connect(lambda: self.acting.answer(is_allowed=True))
+        self.allow_button.clicked.connect(lambda: self.acting.answer(is_allowed=True))
         self.cancel.clicked.connect(lambda: self.acting.answer(is_allowed=False))
         self._question_row = QWidget()
         row = QHBoxLayout(self._question_row)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         row.addWidget(self.question, 1)
-        for button in (self.let, self.cancel):
+        for button in (self.allow_button, self.cancel):
             row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
         content = QVBoxLayout()
         content.setContentsMargins(12, 7, 12, 7)
@@ -97,8 +97,8 @@ class ArmedStrip(QWidget):
         can_arm = self.is_for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
         nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
-        self.words.setText(_("{time} left").format(time=remaining) if arming.is_on else nothing)
-        set_role(self.words, "warn" if arming.is_on else "textSecondary")
+        self.text_label.setText(_("{time} left").format(time=remaining) if arming.is_on else nothing)
+        set_role(self.text_label, "warn" if arming.is_on else "textSecondary")
         self._targets_label.setVisible(bool(targets))
         self.counts.setVisible(bool(more))
         self.counts.setText(more)
@@ -139,7 +139,7 @@ class ArmedStrip(QWidget):
             token.setProperty("target", target.name)
             token.setAccessibleName(_("Stop sending to {name}").format(name=target.name))
             token.setToolTip(plain.tip(token.accessibleName()))
-            token.clicked.connect(lambda _on=False, target=target: self.acting.forbid(target))
+            token.clicked.connect(lambda _on=False, target=target: self.acting.deny(target))
             self._flow.addWidget(token)
             self.tokens.append(token)
         self._flow.removeWidget(self.counts)

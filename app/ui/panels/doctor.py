@@ -56,7 +56,7 @@ class DoctorPanel(PanelWidget):
         self._last_state: tuple[object, ...] = ()
         self._offered: tuple[object, ...] = ()
         self._master = ""
-        self._asker: PanelWidget | None = None
+        self._stalled_panel: PanelWidget | None = None
         self._shown_blockers: list[Blocker] = []
         self._wait_starts_s: dict[tuple[PanelWidget, str], float] = {}  # start of waiting, by panel and topic
         self._suggestions: dict[str, str | None] = {}
@@ -74,19 +74,19 @@ class DoctorPanel(PanelWidget):
             self.theme, "stethoscope", _("Checking connections"), _("This takes a second or two.")
         )
         self.pages = PanelRows(self.empty, _("Connection doctor"))
-        self.missed = ComboBox(self.theme, name=_("Missing topic"))
-        self.missed.activated.connect(self._set_missed_topic)
+        self.topic_choice = ComboBox(self.theme, name=_("Missing topic"))
+        self.topic_choice.activated.connect(self._set_expected_topic)
         self._arrange()
 
     def _arrange(self) -> None:
         about = label(_("Missing topic"), "body", role="textSecondary")
-        about.setBuddy(self.missed)
+        about.setBuddy(self.topic_choice)
         self.looked = ElidedLabel("small", "textTertiary", min_width=40)
         top = QHBoxLayout()
         top.setContentsMargins(12, 8, 12, 4)
         top.setSpacing(8)
         top.addWidget(about)
-        top.addWidget(self.missed, 1)
+        top.addWidget(self.topic_choice, 1)
         top.addWidget(self.looked, 1)
         self.terminal = ElidedLabel("small", "textSecondary", min_width=40)
         self.copy = Button(self.theme, _("Copy the report"), "copy", size="small")
@@ -113,15 +113,15 @@ class DoctorPanel(PanelWidget):
         Args:
             asker: Panel that shows no new data; None for no panel.
         """
-        if self._asker is not None:
-            self._asker.destroyed.disconnect(self._clear_stalled_panel)
-        self._asker = asker
+        if self._stalled_panel is not None:
+            self._stalled_panel.destroyed.disconnect(self._clear_stalled_panel)
+        self._stalled_panel = asker
         if asker is not None:
             asker.destroyed.connect(self._clear_stalled_panel)
         self.refresh()
 
     def _clear_stalled_panel(self) -> None:
-        self._asker = None
+        self._stalled_panel = None
 
     def refresh(self) -> None:
         doctor = self.session.doctor
@@ -168,13 +168,13 @@ class DoctorPanel(PanelWidget):
         libraries = session.alerts.get(not_installed.ALERT_ID)
         if libraries is not None:
             yield Blocker(libraries.title, libraries.detail, "", lambda: None)
-        if session.replay is not None and (topic or self._asker is not None):
+        if session.replay is not None and (topic or self._stalled_panel is not None):
             yield self._replay_blocker(topic)
         network = session.live.networks.get(split_key(topic)[0])
         if network is not None:
             yield from self._network_blockers(topic, lost_message(network))
-        if self._asker is not None:
-            yield from self._asker.blockers()
+        if self._stalled_panel is not None:
+            yield from self._stalled_panel.blockers()
         yield from self._waiting_blockers()
 
     def _waiting_blockers(self) -> Iterator[Blocker]:
@@ -233,15 +233,15 @@ class DoctorPanel(PanelWidget):
     def _update_topics(self) -> None:
         live, expected_topic = self.session.live, self.session.doctor.expected_topic
         state = (live.topics.revision, live.networks.revision, expected_topic)
-        if state == self._offered or self.missed.view().isVisible():
+        if state == self._offered or self.topic_choice.view().isVisible():
             return
         self._offered = state
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
-        self.missed.clear()
-        self.missed.addItem(_("no specific topic"), "")
+        self.topic_choice.clear()
+        self.topic_choice.addItem(_("no specific topic"), "")
         for name in sorted({*names[:MAX_TOPICS], expected_topic} - {""}):
-            self.missed.addItem(topic_label(name), name)
-        self.missed.set_value(expected_topic)
+            self.topic_choice.addItem(topic_label(name), name)
+        self.topic_choice.set_value(expected_topic)
         command = (
             f"nep doctor {expected_topic}"
             if expected_topic and not split_key(expected_topic)[0]
@@ -251,13 +251,13 @@ class DoctorPanel(PanelWidget):
 
     def _update_progress(self, *, is_done: bool) -> None:
         doctor = self.session.doctor
-        checked, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
+        checked, count = (number(each, ".0f") for each in (doctor.check_count, doctor.total_checks))
         if not is_done:
             self.looked.setText(_("Checking: {done} of {count}").format(done=checked, count=count))
             return
-        template = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
+        template = ngettext("{count} check done", "{count} checks done", doctor.check_count)
         if all(each.severity not in PROBLEM_SEVERITIES for each in self.shown):
-            template = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
+            template = ngettext("{count} check passed", "All {count} checks passed", doctor.check_count)
         self.looked.setText(template.format(count=checked))
 
     def _show(self, findings: Sequence[Finding]) -> None:
@@ -332,8 +332,8 @@ class DoctorPanel(PanelWidget):
             self.context.show_toast(_("Done. Checking again"))
 
     def _use_topic(self, topic: str) -> None:
-        if self._asker is not None:
-            self._asker.show_topic(topic)
+        if self._stalled_panel is not None:
+            self._stalled_panel.show_topic(topic)
         else:
             self.context.open_topic(topic)
         self.session.doctor.expect_topic(topic)
@@ -347,8 +347,8 @@ class DoctorPanel(PanelWidget):
         QGuiApplication.clipboard().setText(command)
         self.context.show_toast(_("Copied “{command}”").format(command=command))
 
-    def _set_missed_topic(self) -> None:
-        self.session.doctor.expect_topic(self.missed.value)
+    def _set_expected_topic(self) -> None:
+        self.session.doctor.expect_topic(self.topic_choice.value)
         self.set_stalled_panel(None)
 
     def copy_report(self) -> None:

@@ -34,9 +34,9 @@ class HealthRow(QWidget):
     def __init__(self, theme: Theme, density: Density) -> None:
         super().__init__()
         self._theme = theme
-        self.fact: HealthItem | None = None
+        self.item: HealthItem | None = None
         self.title = label("", TEXT_FONTS[density])
-        self.words = label("", TEXT_FONTS[density], role="textSecondary", wrap=True)
+        self.text_label = label("", TEXT_FONTS[density], role="textSecondary", wrap=True)
         line = paint.height_of(theme.font(TEXT_FONTS[density]))
         space = round(max(1.0, (theme.scaled(ROW_HEIGHTS[density]) - line) / 2))
         self._space = space
@@ -44,7 +44,7 @@ class HealthRow(QWidget):
         self._text_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._text_layout.setSpacing(10)
         self._text_layout.addWidget(self.title, 0, Qt.AlignmentFlag.AlignTop)
-        self._text_layout.addWidget(self.words, 1)
+        self._text_layout.addWidget(self.text_label, 1)
         row = QHBoxLayout(self)
         row.setContentsMargins(16, 0, 16, 0)
         row.setSpacing(10)
@@ -58,18 +58,18 @@ class HealthRow(QWidget):
         self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if is_wide else 0)
         space = self._space
         self.title.setContentsMargins(0, space, 0, space if is_wide else 0)
-        self.words.setContentsMargins(0, space if is_wide else 0, 0, space)
+        self.text_label.setContentsMargins(0, space if is_wide else 0, 0, space)
         self._text_layout.setDirection(direction)
         self._text_layout.setSpacing(10 if is_wide else 0)
 
-    def show_fact(self, item: HealthItem) -> None:
+    def show_item(self, item: HealthItem) -> None:
         """Show the icon, title and text of an item of a robot's health."""
-        if item == self.fact:
+        if item == self.item:
             return
-        self.fact = item
+        self.item = item
         self.icon.set(item.status)
         self.title.setText(_(item.title))
-        self.words.setText(item.text)
+        self.text_label.setText(item.text)
         self.setAccessibleName(_(item.title))
         self.setAccessibleDescription(item.text)
 
@@ -132,7 +132,7 @@ class HealthPanel(OneRobotPanel):
     def _show(self, items: tuple[HealthItem, ...], link: RobotLink) -> None:
         self._make_rows(len(items))
         for row, item in zip(self.rows, items, strict=True):
-            row.show_fact(item)
+            row.show_item(item)
         problems = [item for item in items if item.needs_attention]
         worst = "error" if any(item.status == "error" for item in problems) else "warn"
         summary = ngettext("{count} warning", "{count} warnings", len(problems)).format(count=len(problems))

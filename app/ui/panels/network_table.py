@@ -53,15 +53,15 @@ class NetworkLine(QWidget):
 
     def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
         super().__init__()
-        self.words = label("", "small", role="warn", wrap=True)
-        self.words.setMinimumWidth(0)
+        self.text_label = label("", "small", role="warn", wrap=True)
+        self.text_label.setMinimumWidth(0)
         self.button = LinkButton(theme, _("Other networks"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.button.clicked.connect(lambda: run(BROWSE_COMMAND))
         row = QHBoxLayout()
         row.setContentsMargins(12, 5, 12, 5)
         row.setSpacing(8)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
         row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -73,7 +73,7 @@ class NetworkLine(QWidget):
     def set_messages(self, messages: Sequence[str]) -> None:
         """Show sentences, one per line. The widget is hidden if all of them are empty."""
         text = "\n".join(filter(None, messages))
-        self.words.setText(text)
+        self.text_label.setText(text)
         show_when(self, bool(text))
 
 

@@ -21,13 +21,13 @@ class NoRobotController:
 
     def __init__(self, empty: EmptyState, title: str, text: str, actions: Sequence[EmptyAction] = ()) -> None:
         self._empty, self._title, self._text, self._actions = empty, title, text, tuple(actions)
-        self._coming: tuple[str, ...] = ()
+        self._starting: tuple[str, ...] = ()
 
     def set_starting(self, coming: tuple[str, ...]) -> None:
         """Set the names of the robots that are starting; call on every refresh without a robot."""
-        if coming == self._coming:
+        if coming == self._starting:
             return
-        self._coming = coming
+        self._starting = coming
         if coming:
             self._empty.set_texts(
                 connected_text((), coming), _("A virtual robot takes a few seconds to start.")

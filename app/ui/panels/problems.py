@@ -129,7 +129,7 @@ class ProblemsPanel(PanelWidget):
         super().__init__(context, _("Problems"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
-        self._of_editor: ActiveAlert | None = None
+        self._editor_alert: ActiveAlert | None = None
         self._problem_lines: tuple[ProblemLine, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
@@ -153,9 +153,9 @@ class ProblemsPanel(PanelWidget):
             self.checked.setText(_("Checking"))
             return
         of_editor = self.session.alerts.get(not_installed.ALERT_ID)
-        if program is self._program and of_editor == self._of_editor:
+        if program is self._program and of_editor == self._editor_alert:
             return
-        self._program, self._of_editor = program, of_editor
+        self._program, self._editor_alert = program, of_editor
         self.checked.setText(_("Checked as you build"))
         lines = problem_lines(
             program.problems,

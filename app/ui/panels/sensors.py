@@ -40,7 +40,7 @@ class SensorRow(QWidget):
         self.title = sensor.title[:1].upper() + sensor.title[1:]
         self.reading = ReadingText()
         self.large = True
-        self._yes_s: float | None = None
+        self._last_true_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(self.title)
 
@@ -53,10 +53,11 @@ class SensorRow(QWidget):
         """
         reading = reading_text(self.sensor, value)
         if value is True:
-            self._yes_s = now
-        elif value is False and self._yes_s is not None:
+            self._last_true_s = now
+        elif value is False and self._last_true_s is not None:
             reading = ReadingText(
-                reading.value, _("{age} ago").format(age=age_text(max(1.0, float(int(now - self._yes_s)))))
+                reading.value,
+                _("{age} ago").format(age=age_text(max(1.0, float(int(now - self._last_true_s))))),
             )
         if reading != self.reading:
             self.reading = reading

@@ -53,8 +53,10 @@ class SentPanel(PanelWidget):
         self._last_revision: object = None
         self._ticks = 0
         self.filter = FilterField(self.theme, _("Filter sent messages"))
-        self.again = IconButton(self.theme, "repeat", _("Send or call the selected entry again"), size=26)
-        self.header = [self.filter, self.again]
+        self.repeat_button = IconButton(
+            self.theme, "repeat", _("Send or call the selected entry again"), size=26
+        )
+        self.header = [self.filter, self.repeat_button]
         self.model: TableModel[SentRecord] = TableModel(_columns(), lambda each: str(each.number))
         self.table = TableView(self.theme, self.model)
         self.table.setAccessibleName(_("Sent messages, newest first"))
@@ -79,7 +81,7 @@ class SentPanel(PanelWidget):
     def _connect(self) -> None:
         self.filter.textChanged.connect(self._rebuild)
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.again.clicked.connect(self.repeat)
+        self.repeat_button.clicked.connect(self.repeat)
         self.table.filter_requested.connect(self.focus_filter)
         self.table.menu_requested.connect(self._show_menu)
         self.table.opened.connect(self.show_row)
@@ -144,10 +146,10 @@ class SentPanel(PanelWidget):
         return self.acting.sent.get(int(key)) if key else None
 
     def _can_repeat(self, record: SentRecord | None) -> bool:
-        return record is not None and record.repeat is not None and self.acting.arming.allows(record.target)
+        return record is not None and record.resend is not None and self.acting.arming.allows(record.target)
 
     def _update_repeat_button(self) -> None:
-        self.again.setEnabled(self._can_repeat(self.selected()))
+        self.repeat_button.setEnabled(self._can_repeat(self.selected()))
 
     def blockers(self) -> list[Blocker]:
         filter_text = self.filter.text().strip()
@@ -158,7 +160,7 @@ class SentPanel(PanelWidget):
     def repeat(self) -> None:
         """Send the selected entry again. Show a confirmation if necessary, or the reason on failure."""
         record = self.selected()
-        reason = self.acting.repeat(record.number) if record is not None else ""
+        reason = self.acting.resend(record.number) if record is not None else ""
         if reason:
             self.context.show_toast(reason)
         if self.acting.question is not None:
@@ -200,7 +202,7 @@ class SentPanel(PanelWidget):
         if record is None:
             return None
         menu = Menu(self.theme, self)
-        if record.repeat is not None:
+        if record.resend is not None:
             text = _("Call again") if record.origin == "service" else _("Send again")
             can_repeat = self._can_repeat(record)
             text = text if can_repeat else _("{what} (not armed)").format(what=text)
@@ -255,7 +257,7 @@ def _columns() -> tuple[Column[SentRecord], ...]:
     def content_cell(record: SentRecord) -> Cell:
         return Cell(record.result_text, role="error" if record.is_error else "text")
 
-    def count(record: SentRecord) -> Cell:
+    def count_cell(record: SentRecord) -> Cell:
         return Cell(f"\u00d7 {group_digits(record.count)}" if record.count > 1 else "", role="textSecondary")
 
     def target_cell(record: SentRecord) -> Cell:
@@ -272,7 +274,7 @@ def _columns() -> tuple[Column[SentRecord], ...]:
         Column("sign", "", 34, state_cell, label=lazy("Kind")),
         Column("name", lazy("Sent to"), 112, target_cell, tip=lambda each: each.name),
         Column("what", lazy("Result"), 110, content_cell, stretch=True, tip=tip),
-        Column("count", lazy("Count"), 60, count, is_numeric=True, hide_order=1),
+        Column("count", lazy("Count"), 60, count_cell, is_numeric=True, hide_order=1),
         Column("asker", lazy("Sent from"), 90, sender_cell, hide_order=2),
     )  # fmt: skip
 

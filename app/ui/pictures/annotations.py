@@ -14,7 +14,7 @@ from app.ui.widgets import paint
 from nep.i18n import number
 
 MIN_PEN, MAX_PEN = 1.0, 64.0
-MIN_LETTERS, MAX_LETTERS = 8.0, 96.0
+MIN_FONT_PX, MAX_FONT_PX = 8.0, 96.0
 AREA_LABEL_SIZE_PX = 12.0
 BAR_SIZE = QSizeF(12, 140)
 BAR_MARGIN = 10
@@ -78,7 +78,7 @@ def _paint_text(
 ) -> None:
     # The lower left corner of the text is at `position`; the text is upright for any rotation of the image.
     font, text = theme.font("small"), drawn.text
-    font.setPixelSize(round(min(max(height, MIN_LETTERS), MAX_LETTERS)))
+    font.setPixelSize(round(min(max(height, MIN_FONT_PX), MAX_FONT_PX)))
     metrics = QFontMetricsF(font)
     room = QRectF(
         position.x(), position.y() - metrics.height(), metrics.horizontalAdvance(text) + 4, metrics.height()

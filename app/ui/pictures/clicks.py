@@ -36,7 +36,7 @@ class ClickablePicture(ZoomablePicture):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
-        self._takes_clicks = False
+        self._accepts_clicks = False
         self._pressed: tuple[QPointF, PicturePoint] | None = None
         self._pending_click: PicturePoint | None = None
         self._double_click_timer = QTimer(self)
@@ -46,29 +46,29 @@ class ClickablePicture(ZoomablePicture):
         """Pixel under the keyboard cursor, or None."""
         self.marked: PicturePoint | None = None
         """Point with a mark, or None."""
-        self._fading = QTimer(self)
-        self._fading.setSingleShot(True)
-        self._fading.timeout.connect(self._clear_mark)
+        self._mark_timer = QTimer(self)
+        self._mark_timer.setSingleShot(True)
+        self._mark_timer.timeout.connect(self._clear_mark)
 
     @property
     def accepts_clicks(self) -> bool:
         """True if clicks are emitted. Setting another value discards a pending click."""
-        return self._takes_clicks
+        return self._accepts_clicks
 
     @accepts_clicks.setter
     def accepts_clicks(self, takes: bool) -> None:
         """True if clicks are emitted. Setting another value discards a pending click."""
-        if takes != self._takes_clicks:
-            self._takes_clicks = takes
+        if takes != self._accepts_clicks:
+            self._accepts_clicks = takes
             self.discard_click()
-            self._show_cursor()
+            self._update_cursor_shape()
             if takes:
                 announce(self, _(KEYBOARD_HINT))
 
     def show_mark(self, point: PicturePoint) -> None:
         """Show a mark at a point for a short time."""
         self.marked = point
-        self._fading.start(MARK_DURATION_MS)
+        self._mark_timer.start(MARK_DURATION_MS)
         self.update()
 
     def _clear_mark(self) -> None:
@@ -92,8 +92,8 @@ class ClickablePicture(ZoomablePicture):
         if point is not None:
             self.clicked.emit(point)
 
-    def _show_cursor(self) -> None:
-        if self._takes_clicks:
+    def _update_cursor_shape(self) -> None:
+        if self._accepts_clicks:
             self.setCursor(Qt.CursorShape.CrossCursor)
         else:
             self.unsetCursor()
@@ -109,7 +109,7 @@ class ClickablePicture(ZoomablePicture):
 
     def _point_at(self, event: QMouseEvent) -> PicturePoint | None:
         button, picture = BUTTON_NAMES.get(event.button()), self.picture
-        pixel = self.pixel_at(event.position()) if self._takes_clicks and button is not None else None
+        pixel = self.pixel_at(event.position()) if self._accepts_clicks and button is not None else None
         if pixel is None or picture is None or button is None:
             return None
         return PicturePoint(*pixel, picture.width, picture.height, picture.stamp_ns, button)
@@ -128,7 +128,7 @@ class ClickablePicture(ZoomablePicture):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         super().mouseReleaseEvent(event)
-        self._show_cursor()
+        self._update_cursor_shape()
         pressed, self._pressed = self._pressed, None
         if pressed is not None:
             self._pending_click = pressed[1]
@@ -143,7 +143,7 @@ class ClickablePicture(ZoomablePicture):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name, picture = key_name(event), self.picture
         direction = KEY_DIRECTIONS.get(name.removeprefix("Shift+"))
-        if not self._takes_clicks or picture is None:
+        if not self._accepts_clicks or picture is None:
             super().keyPressEvent(event)
         elif direction is not None:
             self._move_cursor(
@@ -177,7 +177,7 @@ class ClickablePicture(ZoomablePicture):
 
     def _scroll_to_cursor(self) -> None:
         # Scrolls a zoomed image so that the cursor is visible.
-        if self.pointed is None or self.place.zoom is None:
+        if self.pointed is None or self.placement.zoom is None:
             return
         position, visible_rect = (
             self._view_position(self.pointed),
@@ -195,7 +195,7 @@ class ClickablePicture(ZoomablePicture):
             return QPointF()
         x, y = _clamp_to_picture(pixel, picture)
         share = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
-        return self.place.to_view(self.area()).map(share)
+        return self.placement.to_view(self.area()).map(share)
 
     def _clear_cursor(self) -> None:
         if self.pointed is not None:
@@ -211,8 +211,10 @@ class ClickablePicture(ZoomablePicture):
         if self.picture is None:
             return
         if self.marked is not None:
-            self._paint_cross(self.place.to_view(self.area()).map(QPointF(*self.marked.relative_position)))
-        if self.pointed is not None and self._takes_clicks:
+            self._paint_cross(
+                self.placement.to_view(self.area()).map(QPointF(*self.marked.relative_position))
+            )
+        if self.pointed is not None and self._accepts_clicks:
             self._paint_cross(self._view_position(self.pointed), ring=False)
 
     def _paint_cross(self, position: QPointF, *, ring: bool = True) -> None:

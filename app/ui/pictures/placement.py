@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QTransform
 
-SMALLEST, MAX_SIZE = 0.02, 64.0
+MIN_ZOOM, MAX_ZOOM = 0.02, 64.0
 MAX_FILL_RATIO = 1.34
 
 
@@ -107,8 +107,8 @@ class PicturePlacement:
         """Zoom by a factor; the image point at ``position`` (in the view) stays in place."""
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.rotated_size(picture).width())
-        smallest = min(SMALLEST, self.fit_zoom(view, picture))
-        after = min(MAX_SIZE, max(smallest, before * factor))
+        smallest = min(MIN_ZOOM, self.fit_zoom(view, picture))
+        after = min(MAX_ZOOM, max(smallest, before * factor))
         share_x = (position.x() - area.x()) / max(1e-9, area.width())
         share_y = (position.y() - area.y()) / max(1e-9, area.height())
         rotated = self.rotated_size(picture) * after
@@ -132,7 +132,7 @@ class PicturePlacement:
 
     def set_zoom(self, zoom: float | None) -> None:
         """Set the zoom in logical pixels per image pixel, or None to fit the view."""
-        self.zoom = zoom if zoom is None else min(MAX_SIZE, max(SMALLEST, zoom))
+        self.zoom = zoom if zoom is None else min(MAX_ZOOM, max(MIN_ZOOM, zoom))
         if zoom is None:
             self.centre = (0.5, 0.5)
 

@@ -31,7 +31,7 @@ MIN_SHARP_SCALE = 2.0  # screen pixels per image pixel from which pixels are dra
 STATS_INTERVAL_S = 1.0  # a rate or age that changes with every image would be unreadable
 MAX_AGE_S = 3600.0
 BLUR_SIZE = QSize(16, 12)
-DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
+BACKGROUND_DIM_COLOUR, STALE_DIM_COLOUR = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
 ICON_SIZE = 28.0
 
 
@@ -109,15 +109,15 @@ class PictureView(QWidget):
         self._clock = clock
         self._theme = theme
         self._fill, self._labelled = fill, labelled
-        self.place = PicturePlacement()
+        self.placement = PicturePlacement()
         self._picture: Picture | None = None
         self._image: QImage | None = None
         self._grey: QImage | None = None  # grey version of the last image, shown while the stream is silent
         self._boxes: tuple[DetectionBox, ...] = ()
-        self._drawn: tuple[AnnotationShape, ...] = ()
+        self._annotations: tuple[AnnotationShape, ...] = ()
         self._rate = self._state = self._age = ""
         self._rates = RateText(clock)
-        self._silent = False  # the last image is shown because no new one arrives
+        self._is_stale = False  # the last image is shown because no new one arrives
         self.mouse: QPointF | None = None  # position of the mouse if it is over the image
         self._age_updated_s = -STATS_INTERVAL_S  # time of the last update of the age
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -134,7 +134,7 @@ class PictureView(QWidget):
             return ""
         under = self._hovered_pixel_text()
         size = "" if self._state else f"{picture.width}\u00d7{picture.height}"
-        zoom = f"{round(self.scale() * 100)} %" if self.place.zoom is not None else ""
+        zoom = f"{round(self.scale() * 100)} %" if self.placement.zoom is not None else ""
         details = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
         return "  ".join(part for part in (self._state or self._rate, *details) if part)
 
@@ -146,7 +146,7 @@ class PictureView(QWidget):
     @property
     def annotations(self) -> tuple[AnnotationShape, ...]:
         """Annotations on the current image."""
-        return self._drawn
+        return self._annotations
 
     @property
     def picture(self) -> Picture | None:
@@ -156,10 +156,10 @@ class PictureView(QWidget):
     def clear(self) -> None:
         """Remove the image and its label from the view."""
         self._picture = self._image = self._grey = None
-        self._boxes, self._drawn = (), ()
+        self._boxes, self._annotations = (), ()
         self._rate = self._state = self._age = ""
         self._rates.clear()
-        self._silent = False
+        self._is_stale = False
         self.update()
 
     def show_image(
@@ -177,16 +177,16 @@ class PictureView(QWidget):
             boxes: Bounding boxes of detections on the image.
             drawn: Returns the annotations for an image with the given width and height; None for none.
         """
-        previous_text, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
+        previous_text, before = self.label_text, (self._boxes, self._annotations, self._is_stale, self._state)
         picture, displayed, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.for_stream(stream)
         now = self._clock()
         if picture is not None and (now - self._age_updated_s >= STATS_INTERVAL_S or not self._age):
             self._age, self._age_updated_s = _age_text(stream.stamp_age_s), now
-        self._silent = not stream.is_frozen and silent_s is not None and silent_s > STALE_AFTER_S
+        self._is_stale = not stream.is_frozen and silent_s is not None and silent_s > STALE_AFTER_S
         if stream.is_frozen:
             self._state = _("Frozen {age} ago").format(age=age_text(stream.age_s))
-        elif self._silent:
+        elif self._is_stale:
             self._state = _("Last image {age} ago").format(age=age_text(stream.age_s))
         else:
             self._state = ""
@@ -207,13 +207,13 @@ class PictureView(QWidget):
         if not stream.is_frozen or picture is not displayed:
             self._boxes = boxes  # boxes on a frozen image don't change
             displayed = self._picture
-            self._drawn = (
+            self._annotations = (
                 drawn(displayed.width, displayed.height)
                 if drawn is not None and displayed is not None
                 else ()
             )
         stream.set_size(self._requested_size())
-        if (self._boxes, self._drawn, self._silent, self._state) != before:
+        if (self._boxes, self._annotations, self._is_stale, self._state) != before:
             self.update()
         self._update_label(previous_text)
 
@@ -231,7 +231,7 @@ class PictureView(QWidget):
             return None
         ratio = self.devicePixelRatioF()
         size = self.area().size() if self._picture is not None else QSizeF(self.size())
-        if self.place.rotation_deg % 180:
+        if self.placement.rotation_deg % 180:
             size = size.transposed()
         return round(size.width() * ratio), round(size.height() * ratio)
 
@@ -247,11 +247,11 @@ class PictureView(QWidget):
         """Return the rectangle of the rotated image, which may exceed the view; without image, the view."""
         if self._picture is None:
             return QRectF(self.rect())
-        return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
+        return self.placement.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
 
     def scale(self) -> float:
         """Return the number of device pixels per image pixel."""
-        rotated_width = self.place.rotated_size(self.picture_size()).width()
+        rotated_width = self.placement.rotated_size(self.picture_size()).width()
         return self.area().width() / max(1.0, rotated_width) * self.devicePixelRatioF()
 
     def pixel_at(self, position: QPointF) -> tuple[int, int] | None:
@@ -259,7 +259,7 @@ class PictureView(QWidget):
         picture = self._picture
         if picture is None:
             return None
-        share = self.place.to_picture(position, self.area())
+        share = self.placement.to_picture(position, self.area())
         if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
             return None
         x, y = int(share.x() * picture.width + 1e-6), int(share.y() * picture.height + 1e-6)
@@ -275,7 +275,7 @@ class PictureView(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         area, view = self.area(), QRectF(self.rect())
-        image = self._grey_image() if self._silent and not self._labelled else self._image
+        image = self._grey_image() if self._is_stale and not self._labelled else self._image
         if image is None or not area.contains(view):
             if image is None or not self._fill:
                 painter.fillRect(self.rect(), QColor("black"))
@@ -283,17 +283,17 @@ class PictureView(QWidget):
                 paint_blurred_background(painter, view, image)
         if image is not None:
             self._paint_image(painter, area, image)
-        if self._silent and not self._labelled:
+        if self._is_stale and not self._labelled:
             paint_stale(painter, self._theme, view, self._state)
-        elif self._silent:
+        elif self._is_stale:
             painter.fillRect(area, QColor(90, 90, 90, 150))
         else:
-            shares = self.place.to_view(area)
+            shares = self.placement.to_view(area)
             for box in self._boxes:
                 paint_box(painter, self._theme, shares.mapRect(box.rect), box)
-            if self._drawn:
+            if self._annotations:
                 paint_annotations(
-                    painter, self._theme, shares, self.scale() / self.devicePixelRatioF(), self._drawn
+                    painter, self._theme, shares, self.scale() / self.devicePixelRatioF(), self._annotations
                 )
         if self._labelled and self._picture is not None and self._picture.scale is not None:
             paint_colour_bar(painter, self._theme, view, self._picture.scale)
@@ -309,7 +309,7 @@ class PictureView(QWidget):
     def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
         smooth = self.scale() < MIN_SHARP_SCALE
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-        placement = self.place
+        placement = self.placement
         if (
             not placement.rotation_deg
             and not placement.is_flipped_horizontally
@@ -347,7 +347,7 @@ def paint_blurred_background(painter: QPainter, view: QRectF, image: QImage) -> 
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
     painter.drawImage(view, image.scaled(BLUR_SIZE, ignore, smooth))
     painter.restore()
-    painter.fillRect(view, DIMMED)
+    painter.fillRect(view, BACKGROUND_DIM_COLOUR)
 
 
 def to_greyscale(image: QImage) -> QImage:
@@ -357,7 +357,7 @@ def to_greyscale(image: QImage) -> QImage:
 
 def paint_stale(painter: QPainter, theme: Theme, view: QRectF, text: str) -> None:
     """Darken the view and paint a camera icon with a text in the middle, for a stream without new images."""
-    painter.fillRect(view, SILENT)
+    painter.fillRect(view, STALE_DIM_COLOUR)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)
     line = paint.height_of(font)

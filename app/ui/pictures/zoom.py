@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QNativeGestureEvent, QWheelEve
 from app.ui.pictures.view import PictureView
 from app.ui.theme.theme import Theme
 
-STEP, NOTCH = 1.25, 120
+ZOOM_STEP, WHEEL_NOTCH = 1.25, 120
 KEY_MOVE_PX = 40
 KEY_DIRECTIONS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 
@@ -31,7 +31,7 @@ class ZoomablePicture(PictureView):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
         self.keys: frozenset[str] = frozenset()
-        self._dragged: QPointF | None = None
+        self._drag_position: QPointF | None = None
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
@@ -43,12 +43,12 @@ class ZoomablePicture(PictureView):
             position: Point that stays in place (default: the centre).
         """
         middle = QPointF(self.width() / 2, self.height() / 2)
-        self.place.zoom_at(factor, position or middle, QSizeF(self.size()), self.picture_size())
+        self.placement.zoom_at(factor, position or middle, QSizeF(self.size()), self.picture_size())
         self.notify_changed()
 
     def fit_to_view(self) -> None:
         """Fit the image into the view."""
-        self.place.set_zoom(None)
+        self.placement.set_zoom(None)
         self.notify_changed()
 
     def show_actual_size(self, position: QPointF | None = None) -> None:
@@ -61,7 +61,7 @@ class ZoomablePicture(PictureView):
 
     def move_by(self, dx: float, dy: float) -> None:
         """Move the image by a distance in px."""
-        self.place.move(dx, dy, QSizeF(self.size()), self.picture_size())
+        self.placement.move(dx, dy, QSizeF(self.size()), self.picture_size())
         self.notify_changed()
 
     def notify_changed(self) -> None:
@@ -73,7 +73,7 @@ class ZoomablePicture(PictureView):
         if self.picture is None:
             event.ignore()
             return
-        self.zoom_by(STEP ** (event.angleDelta().y() / NOTCH), event.position())
+        self.zoom_by(ZOOM_STEP ** (event.angleDelta().y() / WHEEL_NOTCH), event.position())
         event.accept()
 
     def event(self, event: QEvent) -> bool:
@@ -81,14 +81,14 @@ class ZoomablePicture(PictureView):
             if event.gestureType() == Qt.NativeGestureType.ZoomNativeGesture:
                 self.zoom_by(1.0 + event.value(), event.position())
                 return True
-        elif _is_key(event) and key_name(event) in self.keys:
+        elif _is_shortcut_override(event) and key_name(event) in self.keys:
             event.accept()  # takes precedence over the window's shortcut
             return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name = key_name(event)
-        if name in KEY_DIRECTIONS and self.place.zoom is not None:
+        if name in KEY_DIRECTIONS and self.placement.zoom is not None:
             dx, dy = KEY_DIRECTIONS[name]
             self.move_by(dx * KEY_MOVE_PX, dy * KEY_MOVE_PX)
         elif name in self.keys:
@@ -98,29 +98,29 @@ class ZoomablePicture(PictureView):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() in {Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton}:
-            self._dragged = event.position()
-            if self.place.zoom is not None:
+            self._drag_position = event.position()
+            if self.placement.zoom is not None:
                 self.setCursor(Qt.CursorShape.ClosedHandCursor)
             self.setFocus(Qt.FocusReason.MouseFocusReason)
         else:
             super().mousePressEvent(event)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self._dragged = None
+        self._drag_position = None
         self.unsetCursor()
         super().mouseReleaseEvent(event)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            if self.place.zoom is None:
+            if self.placement.zoom is None:
                 self.show_actual_size(event.position())
             else:
                 self.fit_to_view()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._dragged is not None:
-            step = event.position() - self._dragged
-            self._dragged = event.position()
+        if self._drag_position is not None:
+            step = event.position() - self._drag_position
+            self._drag_position = event.position()
             self.move_by(step.x(), step.y())
         self.mouse = event.position()
         self.update()
@@ -130,7 +130,7 @@ class ZoomablePicture(PictureView):
         self.update()
 
 
-def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
+def _is_shortcut_override(event: QEvent) -> TypeGuard[QKeyEvent]:
     return isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
 
 

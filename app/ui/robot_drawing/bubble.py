@@ -12,9 +12,9 @@ from app.ui.robot_drawing.room import Spot
 from app.ui.robot_drawing.state import RobotState
 
 MIN_WIDTH, SHORT_WIDTH, LONG_WIDTH = 140.0, 190.0, 320.0
-SHORT_LINES, MAX_LINES, MAX_NARROW = 4, 6, 8
-LARGE, SMALL = 14, 12
-INSIDE, EDGE = 14.0, 8.0
+SHORT_LINES, MAX_LINES, MAX_NARROW_LINES = 4, 6, 8
+LARGE_FONT_PX, SMALL_FONT_PX = 14, 12
+PADDING, MARGIN = 14.0, 8.0
 LINES_ABOVE_SPOKEN = 2
 """Number of visible lines above the line that is being spoken."""
 
@@ -104,33 +104,35 @@ def paint_bubble(
         occupied: Rectangles of other bubbles, which are covered only if there is no free space.
     """
     gap, caption = 31.0 * head.scale, state.caption
-    room_right, room_left = bounds.right() - EDGE - head.u - gap, head.u - gap - bounds.left() - EDGE
+    room_right, room_left = bounds.right() - MARGIN - head.u - gap, head.u - gap - bounds.left() - MARGIN
     face = QFont(font)
     face.setWeight(QFont.Weight.DemiBold)
-    face.setPixelSize(LARGE)
-    width = min(SHORT_WIDTH, bounds.width() - 2 * EDGE)
-    lines = wrap_text(caption, QFontMetricsF(face), width - 2 * INSIDE)
+    face.setPixelSize(LARGE_FONT_PX)
+    width = min(SHORT_WIDTH, bounds.width() - 2 * MARGIN)
+    lines = wrap_text(caption, QFontMetricsF(face), width - 2 * PADDING)
     if len(lines) > SHORT_LINES:
-        face.setPixelSize(SMALL)
+        face.setPixelSize(SMALL_FONT_PX)
         max_room = max(
             room_right, room_left
         )  # narrower and higher, so that the bubble doesn't cover the face
-        width = min(max(MIN_WIDTH, max_room), LONG_WIDTH, bounds.width() - 2 * EDGE)
-        lines = wrap_text(caption, QFontMetricsF(face), width - 2 * INSIDE)
+        width = min(max(MIN_WIDTH, max_room), LONG_WIDTH, bounds.width() - 2 * MARGIN)
+        lines = wrap_text(caption, QFontMetricsF(face), width - 2 * PADDING)
     metrics = QFontMetricsF(face)
     line_height = metrics.height() + 1
-    max_lines = int((bounds.height() - 2 * EDGE - 30) / line_height)
+    max_lines = int((bounds.height() - 2 * MARGIN - 30) / line_height)
     text = scroll_to_spoken(
-        lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, max_lines), state.spoken_fraction
+        lines, min(MAX_NARROW_LINES if width < SHORT_WIDTH else MAX_LINES, max_lines), state.spoken_fraction
     )
-    width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
+    width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * PADDING
     height = text.visible_count * line_height + 18
     side = -1.0 if room_left > room_right and room_right < width else 1.0
 
     def box_at(towards: float) -> QRectF:
         left = head.u + gap if towards > 0 else head.u - gap - width
-        left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
-        return QRectF(left, max(bounds.top() + EDGE, head.v - 39 * head.scale - height), width, height)
+        left = min(
+            max(left, bounds.left() + MARGIN), max(bounds.left() + MARGIN, bounds.right() - MARGIN - width)
+        )
+        return QRectF(left, max(bounds.top() + MARGIN, head.v - 39 * head.scale - height), width, height)
 
     side, box = _pick_box([(side, box_at(side)), (-side, box_at(-side))], occupied, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
@@ -153,9 +155,9 @@ def _pick_box(
         common = [candidate[1].intersected(other) for other in occupied]
         return sum(each.width() * each.height() for each in common)
 
-    tops = [other.bottom() + EDGE for other in occupied]
+    tops = [other.bottom() + MARGIN for other in occupied]
     lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in candidates]
-    fitting = [candidate for candidate in lower if candidate[1].bottom() <= bounds.bottom() - EDGE]
+    fitting = [candidate for candidate in lower if candidate[1].bottom() <= bounds.bottom() - MARGIN]
     return min([*candidates, *fitting], key=covered_area)
 
 
@@ -169,10 +171,10 @@ def paint_caption(p: QPainter, area: QRectF, text: str, font: QFont) -> None:
         font: Font of the text.
     """
     metrics = QFontMetricsF(font)
-    max_width = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
+    max_width = max(0.0, area.width() - 4 * MARGIN - 2 * PADDING)
     line = metrics.elidedText(text, Qt.TextElideMode.ElideRight, max_width)
-    width, height = metrics.horizontalAdvance(line) + 2 * INSIDE, metrics.height() + 10
-    box = QRectF(area.center().x() - width / 2, area.bottom() - EDGE - height, width, height)
+    width, height = metrics.horizontalAdvance(line) + 2 * PADDING, metrics.height() + 10
+    box = QRectF(area.center().x() - width / 2, area.bottom() - MARGIN - height, width, height)
     p.setRenderHint(QPainter.RenderHint.Antialiasing)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(28, 27, 25, 215))

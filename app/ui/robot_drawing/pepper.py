@@ -18,7 +18,7 @@ from app.ui.robot_drawing.state import RobotState
 
 HEAD_CENTRE = QPointF(0.0, -152.2)
 SHOULDER_X, SHOULDER_Y = 26.2, -102.5
-ARM, ARM_WIDTH, HAND = 46.5, 14.4, 7.7
+ARM_LENGTH, ARM_WIDTH, HAND_RADIUS = 46.5, 14.4, 7.7
 REST_DEG, UP_DEG = 20.0, 160.0  # limits that keep the arms beside body and head
 ARM_PLANE_RAD = math.radians(25.0)
 WHITE, LIMB, LIMB_EDGE, HAND_WHITE = "#FFFFFF", "#E2E7F0", "#CFD6E3", "#F3F5FA"
@@ -29,7 +29,7 @@ DARK_COLOUR = "#15181F"
 
 
 @dataclass(frozen=True, slots=True)
-class Limb:
+class ProjectedArm:
     """Arm as seen by the viewer.
 
     Attributes:
@@ -87,28 +87,28 @@ _EXPRESSIONS = {
 EMOTIONS = tuple(_EXPRESSIONS)
 
 
-def limbs(state: RobotState) -> tuple[Limb, Limb]:
+def project_arms(state: RobotState) -> tuple[ProjectedArm, ProjectedArm]:
     """Return the left and the right arm of the robot."""
     heading = math.radians(state.theta_deg)
     return (
-        _limb("left", 1, state.arm_left_deg, heading),
-        _limb("right", -1, state.arm_right_deg, heading),
+        _project_arm("left", 1, state.arm_left_deg, heading),
+        _project_arm("right", -1, state.arm_right_deg, heading),
     )
 
 
-def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
+def _project_arm(side: str, sign: int, raised_deg: float, heading: float) -> ProjectedArm:
     out = sign * math.pi / 2 + heading
     raised = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
     shoulder = QPointF(SHOULDER_X * math.sin(out), SHOULDER_Y)
     projection = math.cos(ARM_PLANE_RAD) * math.sin(out) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
-    hand = shoulder + QPointF(ARM * math.sin(raised) * projection, ARM * math.cos(raised))
-    return Limb(side, shoulder, hand, math.cos(out))
+    hand = shoulder + QPointF(ARM_LENGTH * math.sin(raised) * projection, ARM_LENGTH * math.cos(raised))
+    return ProjectedArm(side, shoulder, hand, math.cos(out))
 
 
-def paint_figure(p: QPainter, state: RobotState) -> None:
+def paint_pepper(p: QPainter, state: RobotState) -> None:
     """Paint the robot; the origin of the painter is the centre of the foot."""
     heading = math.radians(state.theta_deg)
-    arms = limbs(state)
+    arms = project_arms(state)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(50, 42, 40, 118))
     p.drawEllipse(QPointF(0, 0), 52, 10.8)
@@ -200,7 +200,7 @@ def _paint_back(p: QPainter, heading: float) -> None:
     p.restore()
 
 
-def _paint_arm(p: QPainter, arm: Limb, state: RobotState) -> None:
+def _paint_arm(p: QPainter, arm: ProjectedArm, state: RobotState) -> None:
     edge = QPen(QColor(LIMB_EDGE), ARM_WIDTH + 0.9, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
     p.setPen(edge)
     p.drawLine(QLineF(arm.shoulder, arm.hand))
@@ -208,7 +208,7 @@ def _paint_arm(p: QPainter, arm: Limb, state: RobotState) -> None:
     p.drawLine(QLineF(arm.shoulder, arm.hand))
     p.setPen(QPen(QColor(LIMB_EDGE), 0.7))
     p.setBrush(QColor(HAND_WHITE))
-    p.drawEllipse(arm.hand, HAND, HAND)
+    p.drawEllipse(arm.hand, HAND_RADIUS, HAND_RADIUS)
     p.setPen(Qt.PenStyle.NoPen)
     if arm.front > -0.5:
         p.setBrush(QColor(JOINT))
@@ -217,7 +217,7 @@ def _paint_arm(p: QPainter, arm: Limb, state: RobotState) -> None:
         p.setBrush(QColor(state.shoulders))
         p.drawEllipse(arm.shoulder, 4.0, 4.0)
     if f"{arm.side}_hand" in state.touched_parts:
-        _paint_halo(p, arm.hand, HAND + 3)
+        _paint_halo(p, arm.hand, HAND_RADIUS + 3)
 
 
 def _paint_halo(p: QPainter, centre: QPointF, radius: float) -> None:

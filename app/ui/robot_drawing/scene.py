@@ -11,10 +11,10 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPixmap
 
 from app.ui.robot_drawing.bubble import paint_bubble
 from app.ui.robot_drawing.objects import paint_thing, thing_area
-from app.ui.robot_drawing.pepper import HEAD_CENTRE, limbs, paint_figure
+from app.ui.robot_drawing.pepper import HEAD_CENTRE, paint_pepper, project_arms
 from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_drawing.state import RobotState, Thing
-from app.ui.robot_drawing.turtle import TOP_CENTRE, paint_turtle, side_at
+from app.ui.robot_drawing.turtle import TOP_CENTRE, bumper_side_at, paint_turtle
 
 TURTLE_FIGURE = "turtle"
 OtherRobots: TypeAlias = Sequence[tuple[str, RobotState]]
@@ -128,7 +128,7 @@ class RobotDrawing:
                 return thing.name or thing.kind
         return next((each.part_name("body") for each in figures if each.area.contains(unit)), None)
 
-    def side_at(
+    def bumper_side_at(
         self, point: QPointF, area: QRectF, part: str, state: RobotState, others: OtherRobots = ()
     ) -> str | None:
         """Return the side of the bumper that a click presses, or None if the robot has no bumper.
@@ -143,7 +143,7 @@ class RobotDrawing:
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             if figure.part_name("body") == part and figure.state.figure == TURTLE_FIGURE:
-                return side_at(figure.to_own_units(stage.to_units(point)), figure.state.theta_deg)
+                return bumper_side_at(figure.to_own_units(stage.to_units(point)), figure.state.theta_deg)
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
@@ -163,7 +163,9 @@ class RobotDrawing:
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE_FIGURE
-            part_positions = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
+            part_positions = (
+                {} if small else {f"{limb.side}_hand": limb.hand for limb in project_arms(figure.state)}
+            )
             part_positions |= (
                 {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
             )
@@ -269,7 +271,7 @@ def _paint_figure(p: QPainter, figure: Figure) -> None:
     lifted = 9.0 if figure.state.is_lifted else 0.0
     p.translate(figure.spot.u, figure.spot.v - lifted)
     p.scale(figure.spot.scale, figure.spot.scale)
-    (paint_turtle if figure.state.figure == TURTLE_FIGURE else paint_figure)(p, figure.state)
+    (paint_turtle if figure.state.figure == TURTLE_FIGURE else paint_pepper)(p, figure.state)
     p.restore()
 
 
@@ -290,7 +292,7 @@ def _part_at(point: QPointF, state: RobotState) -> str | None:
     # Only Pepper has parts that can be touched.
     if state.figure == TURTLE_FIGURE:
         return None
-    for limb in limbs(state):
+    for limb in project_arms(state):
         if _is_near(point, limb.hand, 11.0):
             return f"{limb.side}_hand"
     return "head" if _is_near(point, HEAD_CENTRE, 36.0) else None

@@ -54,7 +54,7 @@ def point_on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QP
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
 
-def side_at(point: QPointF, theta_deg: float) -> str:
+def bumper_side_at(point: QPointF, theta_deg: float) -> str:
     """Return the side of the bumper that a click presses: "left", "right", "front" or "back".
 
     A click on the top presses the front.

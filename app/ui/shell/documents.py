@@ -54,7 +54,7 @@ class ClosedTab:
     """
 
     def __init__(self, document: Document, message: str = "", earlier: SavedVersion | None = None) -> None:
-        self.words, self.earlier = message, earlier
+        self.message, self.earlier = message, earlier
         self.workspace = document.workspace
         self.stamp = stamp_of(document.path) if document.path is not None else None
 
@@ -81,7 +81,7 @@ class DocumentController:
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `editor` returns the behaviour panel, or None before it exists.
-        self._session, self.asks, self._show_toast, self._show_editor = (
+        self._session, self.dialogs, self._show_toast, self._show_editor = (
             session,
             dialogs,
             show_toast,
@@ -102,7 +102,7 @@ class DocumentController:
         """Ask for a behaviour file and open it."""
         self._session.alerts.resolve("strange")
         path = self._session.document.path
-        self.asks.open(str(path.parent if path is not None else Path.home()), self.open)
+        self.dialogs.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
         """Open a behaviour file in a tab; an error is shown as an alert."""
@@ -174,7 +174,7 @@ class DocumentController:
                 self._documents.close(document)
                 closed_tabs.append(closed_tab)
             self._session.tabs.save()
-            self._notify_closed([each for each in closed_tabs if each.words])
+            self._notify_closed([each for each in closed_tabs if each.message])
 
         self.run_after_flush(close_documents)
 
@@ -243,7 +243,7 @@ class DocumentController:
             else Path.home()
         )
         suggestion = str(folder / f"{document.name}{SUFFIX}")
-        self.asks.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
+        self.dialogs.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
 
     def fix(self, action: str) -> bool:
         """Apply a fix to the blocks of the current behaviour.
@@ -345,7 +345,7 @@ class DocumentController:
         # Shows a toast that names the saved behaviours and offers undo.
         if not closed:
             return
-        message = closed[0].words
+        message = closed[0].message
         if len(closed) > 1:
             message = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed))
             message = message.format(count=len(closed))

@@ -10,7 +10,7 @@ from shiboken6 import isValid
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
-OUT, HALO = 5, 5
+RING_OFFSET, HALO = 5, 5
 CORNER_RADIUS = 12
 POLL_MS = 100
 TIMEOUT_MS = 15_000
@@ -23,17 +23,17 @@ class HintRing(QWidget):
         super().__init__(window)
         self._theme, self._window = theme, window
         self.target: QAbstractButton | None = None
-        self._listens_to: QWindow | None = None
+        self._filtered_window: QWindow | None = None
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._poll_timer = QTimer(self)
         self._poll_timer.setInterval(POLL_MS)
         self._poll_timer.timeout.connect(self._reposition)
-        self._end = QTimer(self)
-        self._end.setSingleShot(True)
-        self._end.setInterval(TIMEOUT_MS)
-        self._end.timeout.connect(self.clear)
+        self._timeout_timer = QTimer(self)
+        self._timeout_timer.setSingleShot(True)
+        self._timeout_timer.setInterval(TIMEOUT_MS)
+        self._timeout_timer.timeout.connect(self.clear)
         self.hide()
 
     def point_at(self, command: str) -> bool:
@@ -45,24 +45,24 @@ class HintRing(QWidget):
         if self.target is None:
             return False
         self.target.clicked.connect(self.clear)
-        self._listens_to = self._window.windowHandle()
-        if self._listens_to is not None:
-            self._listens_to.installEventFilter(self)
+        self._filtered_window = self._window.windowHandle()
+        if self._filtered_window is not None:
+            self._filtered_window.installEventFilter(self)
         self._reposition()
         self._poll_timer.start()
-        self._end.start()
+        self._timeout_timer.start()
         return True
 
     def clear(self) -> None:
         """Remove the highlight."""
         if self.target is not None and isValid(self.target):
             self.target.clicked.disconnect(self.clear)
-        if self._listens_to is not None and isValid(self._listens_to):
-            self._listens_to.removeEventFilter(self)
-        self._listens_to = None
+        if self._filtered_window is not None and isValid(self._filtered_window):
+            self._filtered_window.removeEventFilter(self)
+        self._filtered_window = None
         self.target = None
         self._poll_timer.stop()
-        self._end.stop()
+        self._timeout_timer.stop()
         self.hide()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -80,7 +80,7 @@ class HintRing(QWidget):
             self.clear()
             return
         inset = int(target.property("focusInset") or 0)
-        out = OUT + HALO - inset
+        out = RING_OFFSET + HALO - inset
         geometry = QRect(target.mapTo(self._window, QPoint()), target.size()).adjusted(-out, -out, out, out)
         if geometry != self.geometry():
             self.setGeometry(geometry)

@@ -33,11 +33,11 @@ class PanelFocus(QObject):
         docks = [dock for dock in bench.docks.values() if dock.is_displayed()] if bench is not None else []
         if bench is None or not docks:
             return
-        current = self.dock()
+        current = self.focused_dock()
         index = docks.index(current) if current in docks else (-1 if step > 0 else 0)
         bench.focus_panel(docks[(index + step) % len(docks)])
 
-    def number(self, number: int) -> None:
+    def focus_at(self, number: int) -> None:
         """Focus the open panel at a position, counted from 1 in the order of creation.
 
         Has no effect if there is no panel at this position.
@@ -84,7 +84,7 @@ class PanelFocus(QObject):
         docks = bench.docks.values() if bench is not None else ()
         return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
 
-    def dock(self) -> Dock | None:
+    def focused_dock(self) -> Dock | None:
         """Return the dock that contains the focused widget, or None."""
         focus, bench = QApplication.focusWidget(), self._bench()
         if bench is None or focus is None:

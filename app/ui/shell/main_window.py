@@ -93,21 +93,21 @@ class MainWindow(QMainWindow):
         self.session, self.theme, self.panels = session, theme, panels
         self.state = WindowState(session.settings, self.log_problem)
         self.saved_layouts = SavedLayouts(self.state, self.log_problem)
-        self.on_shut: Callable[[], object] = lambda: None
+        self.on_closed: Callable[[], object] = lambda: None
         self.can_restart = self.wants_restart = False
-        self._showing = self._previous_layout = ""
+        self._current_layout = self._previous_layout = ""
         self.benches: dict[str, Workbench] = {}
         self._prepared_benches: dict[str, Workbench] = {}  # workbenches with panels created in advance
         self._status_formatter = StatusFormatter(session)
         self._last_alerts_state = (-1, False)
         self._source_revision = session.source_revision
-        self._ticks = self._halves = 0
-        self._twice = False  # the timer runs at twice the tick rate
-        self._shut = False
+        self._ticks = self._half_ticks = 0
+        self._has_double_rate = False  # the timer runs at twice the tick rate
+        self._is_closed = False
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
         files = dialogs if dialogs is not None else self._file_dialogs()
-        focus_question = self.asked.focus_input
+        focus_question = self.question_card.focus_input
         self.context = PanelContext(
             session, theme, self.open_topic, self.show_toast, self._run_command, files, focus_question,
             self.plot,
@@ -119,7 +119,7 @@ class MainWindow(QMainWindow):
         self.timer.setInterval(TICK_MS)
         self.timer.timeout.connect(self._on_half_tick)
         self.gc_freeze = GcFreezeTimer(self)
-        self.panel_focus = PanelFocus(lambda: None if self._shut else self.bench, self)
+        self.panel_focus = PanelFocus(lambda: None if self._is_closed else self.bench, self)
         self.commands = Commands(self, session, files)
         self._connect()
         self.show_start()
@@ -154,8 +154,10 @@ class MainWindow(QMainWindow):
         self.banner.setParent(middle)  # in no layout, because it floats over the free area of a bar
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
-        self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
-        self.question = MotionPermissionCard(theme, self, self.session.fleet.permission, self.log_problem)
+        self.question_card = QuestionCard(theme, self, self.session.runs.asking.answer)
+        self.permission_card = MotionPermissionCard(
+            theme, self, self.session.fleet.permission, self.log_problem
+        )
 
     def _connect(self) -> None:
         commands, start, run = self.commands, self.start, self._run_command
@@ -201,7 +203,7 @@ class MainWindow(QMainWindow):
     @property
     def current_layout(self) -> str:
         """Name of the current layout, or `START_PAGE` for the start page."""
-        return self._showing
+        return self._current_layout
 
     @property
     def surface(self) -> QWidget:
@@ -226,15 +228,15 @@ class MainWindow(QMainWindow):
     def show_start(self) -> None:
         """Show the start page."""
         if self.bench is not None:
-            self._previous_layout = self._showing
-        self._showing = START_PAGE
+            self._previous_layout = self._current_layout
+        self._current_layout = START_PAGE
         self.pages.setCurrentWidget(self.start)
         self.show_recent()
         self._show_bars(None)
         self.start.focus_first()
 
     @property
-    def left(self) -> str:
+    def return_layout(self) -> str:
         """Name of the layout to return to from the start page, or "".
 
         If no layout was shown before, this is "behaviour" if a behaviour isn't blank, else "".
@@ -272,7 +274,7 @@ class MainWindow(QMainWindow):
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
         had_focus = focus is None or self.pages.isAncestorOf(focus)
-        self._showing = layout.name
+        self._current_layout = layout.name
         self.pages.setCurrentWidget(bench)
         if had_focus:  # focus the layout only if the focus was in it, not in the switch or a menu
             bench.focus_main_panel()
@@ -292,7 +294,7 @@ class MainWindow(QMainWindow):
         """Return functions that create in advance the panels of layouts not opened yet, one panel each."""
 
         def make(layout: Layout, name: str) -> None:
-            if not self._shut and layout.name not in self.benches:
+            if not self._is_closed and layout.name not in self.benches:
                 self._prepared_benches[layout.name] = bench = self._new_bench(layout)
                 bench.preload(name)
 
@@ -300,7 +302,7 @@ class MainWindow(QMainWindow):
 
     def show_placeholder(self, layout: str) -> None:
         """Show the bars of a layout, and a placeholder until `show_layout` creates its workbench."""
-        self._showing = layout
+        self._current_layout = layout
         placeholder = Placeholder(layout)
         self.pages.addWidget(placeholder)
         self.pages.setCurrentWidget(placeholder)
@@ -309,7 +311,7 @@ class MainWindow(QMainWindow):
         self.bench_created.connect(placeholder.deleteLater)
 
     def _show_bars(self, layout: str | None) -> None:
-        self.bar.show_layout(layout, back=bool(self.left))
+        self.bar.show_layout(layout, back=bool(self.return_layout))
         self.run_bar.setVisible(layout == "behaviour")
         self.tool_bar.setVisible(layout == "developer")
         self.status.setVisible(layout is not None)
@@ -393,8 +395,8 @@ class MainWindow(QMainWindow):
     def _on_half_tick(self) -> None:
         # The timer runs 60 times a second while images are visible: at 30 Hz about every tenth image would
         # arrive together with another one and be dropped. Otherwise it runs at 30 Hz, the rate of the tick.
-        self._halves += 1
-        if self._halves % 2 or not self._twice:
+        self._half_ticks += 1
+        if self._half_ticks % 2 or not self._has_double_rate:
             self.tick()
         elif self.bench is not None:
             self.bench.refresh(pictures=True)
@@ -413,8 +415,8 @@ class MainWindow(QMainWindow):
         for bench in self.benches.values():
             bench.update_suspension(now)
         twice = self.bench is not None and self.bench.shows_video()
-        if twice != self._twice:
-            self._twice, self._halves = twice, 1
+        if twice != self._has_double_rate:
+            self._has_double_rate, self._half_ticks = twice, 1
             self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
 
     def tick(self) -> None:
@@ -427,7 +429,7 @@ class MainWindow(QMainWindow):
         with guarded(lazy("show its state")):
             self._show_session()
         with guarded(lazy("ask a question")):
-            self.question.refresh()
+            self.permission_card.refresh()
         with guarded(lazy("switch the source")):
             self._update_source()
         with guarded(lazy("pause panels")):
@@ -443,7 +445,7 @@ class MainWindow(QMainWindow):
         text, status = robots_chip(self.session)
         self.bar.show_robots(text, status)
         self.toast.refresh()
-        self.asked.show_question(self.session.runs.asking.question, paused=view.state == "paused")
+        self.question_card.show_question(self.session.runs.asking.question, paused=view.state == "paused")
         if self.current_layout == START_PAGE:
             self.bar.stop.show_state(
                 _(view.stop_label), ring=view.state == "stopping", filled=self._may_move()
@@ -566,7 +568,7 @@ class MainWindow(QMainWindow):
         return ""
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        if not self._shut:
+        if not self._is_closed:
             if self._is_moving():
                 self.session.runs.stop()  # sent now, so that replies can arrive while the session closes
             if not self._flush_before_close.ready():
@@ -577,7 +579,7 @@ class MainWindow(QMainWindow):
                 self._flush_before_close.reset()
                 event.ignore()
                 return
-            self._shut = True
+            self._is_closed = True
             self.timer.stop()
             with log_errors("keep how the window looks"):
                 self._save_state()
@@ -585,7 +587,7 @@ class MainWindow(QMainWindow):
             for bench in (*self.benches.values(), *self._prepared_benches.values()):
                 bench.dispose()
             self.session.close()
-            self.on_shut()
+            self.on_closed()
         super().closeEvent(event)
 
     def _may_discard_work(self) -> bool:

@@ -37,7 +37,7 @@ class WindowState:
     def __init__(self, settings: Settings, report_error: Callable[[str], object]) -> None:
         # `report_error` is called with a message if settings can't be saved.
         self._settings = settings
-        self._complain = report_error
+        self._report_error = report_error
         self._reported_error = ""
 
     def apply_theme(self, theme: Theme) -> None:
@@ -130,7 +130,7 @@ class WindowState:
                 str(error) != self._reported_error
             ):  # report an error only once, because settings are saved often
                 self._reported_error = str(error)
-                self._complain(self._reported_error)
+                self._report_error(self._reported_error)
             return False
         self._reported_error = ""
         return True

@@ -12,7 +12,7 @@ import glob
 import sys
 from collections.abc import Callable, MutableMapping, Sequence
 
-CHOICE, BY_SOFTWARE = "QT_QUICK_BACKEND", "software"
+BACKEND_VARIABLE, SOFTWARE_BACKEND = "QT_QUICK_BACKEND", "software"
 GPU_DEVICE_PATTERNS = (
     "/dev/dri/renderD*",
     "/dev/nvidia[0-9]*",
@@ -40,9 +40,9 @@ def use_software_renderer(
     Returns:
         True if the software renderer is selected.
     """
-    if not environ.get(CHOICE) and not (has_gpu or has_graphics_processor)(platform):
-        environ[CHOICE] = BY_SOFTWARE
-    return environ.get(CHOICE) == BY_SOFTWARE
+    if not environ.get(BACKEND_VARIABLE) and not (has_gpu or has_graphics_processor)(platform):
+        environ[BACKEND_VARIABLE] = SOFTWARE_BACKEND
+    return environ.get(BACKEND_VARIABLE) == SOFTWARE_BACKEND
 
 
 def has_graphics_processor(platform: str) -> bool:

@@ -24,7 +24,7 @@ from PySide6.QtCore import QObject, Qt, QTimer
 SWITCH_INTERVAL_S = 0.0005
 FREEZE_DELAY_MS = 1000
 COLLECT_INTERVAL_MS = 250
-NEW_OBJECTS, COLLECTIONS = 10_000, 20
+NEW_OBJECTS_THRESHOLD, COLLECTIONS_THRESHOLD = 10_000, 20
 """Thresholds: new objects for a collection of generation 0, and collections for one of the next older."""
 
 
@@ -41,8 +41,8 @@ def freeze_objects() -> None:
 def collect_garbage() -> None:
     """Run the collection that the thresholds require, if any, as Python's automatic collection would."""
     new_objects, young, middle = gc.get_count()
-    if new_objects > NEW_OBJECTS:
-        gc.collect(0 if young <= COLLECTIONS else 1 if middle <= COLLECTIONS else 2)
+    if new_objects > NEW_OBJECTS_THRESHOLD:
+        gc.collect(0 if young <= COLLECTIONS_THRESHOLD else 1 if middle <= COLLECTIONS_THRESHOLD else 2)
 
 
 class GcTimer(QTimer):

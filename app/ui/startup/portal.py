@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, MutableMapping
 from pathlib import Path
 
-THEME, CHOICE = "xdgdesktopportal", "QT_QPA_PLATFORMTHEME"
-NAME, OBJECT = "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"
+PORTAL_THEME, THEME_VARIABLE = "xdgdesktopportal", "QT_QPA_PLATFORMTHEME"
+SERVICE_NAME, OBJECT_PATH = "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"
 FILE_CHOOSER_INTERFACE = "org.freedesktop.portal.FileChooser"
 REPLY_TIMEOUT_MS = 300
 
@@ -31,7 +31,9 @@ def has_file_chooser() -> bool:
     try:
         if not bus.isConnected():
             return False
-        request = QDBusMessage.createMethodCall(NAME, OBJECT, "org.freedesktop.DBus.Properties", "Get")
+        request = QDBusMessage.createMethodCall(
+            SERVICE_NAME, OBJECT_PATH, "org.freedesktop.DBus.Properties", "Get"
+        )
         request.setArguments([FILE_CHOOSER_INTERFACE, "version"])
         return bus.call(request, timeout=REPLY_TIMEOUT_MS).type() == QDBusMessage.MessageType.ReplyMessage
     finally:
@@ -49,10 +51,15 @@ def use_portal(
         platform: Value of `sys.platform`.
         is_available: Returns True if the portal has a file chooser.
     """
-    if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and is_available():
-        environ[CHOICE] = THEME
+    if (
+        platform.startswith("linux")
+        and not environ.get(THEME_VARIABLE)
+        and has_bus(environ)
+        and is_available()
+    ):
+        environ[THEME_VARIABLE] = PORTAL_THEME
 
 
 def has_system_dialogs(environ: MutableMapping[str, str], platform: str) -> bool:
     """Return True if the platform has native file dialogs: Windows, macOS, and Linux with the portal."""
-    return platform in {"win32", "darwin"} or environ.get(CHOICE) == THEME
+    return platform in {"win32", "darwin"} or environ.get(THEME_VARIABLE) == PORTAL_THEME

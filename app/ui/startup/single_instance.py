@@ -36,7 +36,7 @@ else:
 
 CONNECT_TIMEOUT_MS = 300
 REPLY_TIMEOUT_MS = 3000
-START_S, POLL_S = 20.0, 0.05
+START_TIMEOUT_S, POLL_S = 20.0, 0.05
 MAX_REQUEST_LENGTH = 1_000_000
 MAX_PATH_LENGTH = 100  # the path of a Unix socket has at most 108 bytes
 OK_REPLY = b"ok\n"
@@ -163,7 +163,9 @@ def send_request(name: str, request: StartRequest) -> bool:
     return reply == OK_REPLY
 
 
-def pass_to_running(name: str, request: StartRequest, lock: FileLock, within_s: float = START_S) -> bool:
+def pass_to_running(
+    name: str, request: StartRequest, lock: FileLock, within_s: float = START_TIMEOUT_S
+) -> bool:
     """Send a request to a running instance, or to one that is just starting.
 
     Args:
@@ -211,7 +213,7 @@ class SingleInstanceServer(QObject):
         self._server = QtNetwork.QLocalServer(self)
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
         self._server.newConnection.connect(self._accept)
-        self.open = self._listen(name)
+        self.is_listening = self._listen(name)
         """True if later starts can reach this window; otherwise each opens its own."""
 
     def _listen(self, name: str) -> bool:

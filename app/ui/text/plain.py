@@ -11,20 +11,24 @@ import unicodedata
 
 from PySide6.QtGui import Qt
 
-LONG_WORD, PIECE = 20, 4
+MAX_WORD_LENGTH, PIECE_LENGTH = 20, 4
 ZERO_WIDTH_SPACE = "\u200b"  # zero-width space, at which a line may break
 
 
 def make_breakable(text: str) -> str:
     """Insert zero-width spaces into long words, so that a label can wrap instead of truncating them."""
-    return " ".join(_break_word(word) if len(word) > LONG_WORD else word for word in text.split(" "))
+    return " ".join(_break_word(word) if len(word) > MAX_WORD_LENGTH else word for word in text.split(" "))
 
 
 def _break_word(word: str) -> str:
     # Combining characters are not separated from their letter.
     result, since = "", 0
     for letter in word:
-        if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
+        if (
+            since >= PIECE_LENGTH
+            and not unicodedata.combining(letter)
+            and unicodedata.category(letter)[0] in "LN"
+        ):
             result, since = result + ZERO_WIDTH_SPACE, 0
         result, since = result + letter, since + 1
     return result

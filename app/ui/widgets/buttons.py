@@ -89,17 +89,17 @@ class PaintedButton(QAbstractButton):
         self.setProperty("focusRadius", theme.radius(radius))
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         theme.changed.connect(self.updateGeometry)
-        self._aimed = False
+        self._is_drop_target = False
 
     @property
     def is_drop_target(self) -> bool:
         """True if the button is the drop target of a drag."""
-        return self._aimed
+        return self._is_drop_target
 
     def set_drop_target(self, aimed: bool) -> None:
         """Set whether the button is the drop target of a drag; a drop target has a ring."""
-        if aimed != self._aimed:
-            self._aimed = aimed
+        if aimed != self._is_drop_target:
+            self._is_drop_target = aimed
             self.update()
 
     def set_text(self, text: str, name: str = "") -> None:
@@ -141,11 +141,11 @@ class PaintedButton(QAbstractButton):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         rect, radius, role = QRectF(self.rect()), self._theme.radius("small"), self._theme.colour
-        if self._aimed:
+        if self._is_drop_target:
             paint.box(painter, rect, radius, role("accentTint"))
         self.paint_button(painter, rect)
         # above the button's own painting, because the tab that opens under dragged blocks is filled
-        if self._aimed:
+        if self._is_drop_target:
             paint.box(painter, rect, radius, None, role("accent"), DROP_TARGET_WIDTH)
         painter.end()
 
@@ -173,8 +173,8 @@ class Button(PaintedButton):
         size: Size = "normal",
         parent: QWidget | None = None,
     ) -> None:
-        self.measure = _METRICS[size]
-        super().__init__(theme, text, radius=self.measure.radius, parent=parent)
+        self.metrics = _METRICS[size]
+        super().__init__(theme, text, radius=self.metrics.radius, parent=parent)
         self.kind: Kind = kind
         self.icon_name = icon
         self.fill_icon = False
@@ -201,9 +201,9 @@ class Button(PaintedButton):
 
     def set_size(self, size: Size) -> None:
         """Set the size, which determines height, font and padding."""
-        if self.measure != _METRICS[size]:
-            self.measure = _METRICS[size]
-            self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
+        if self.metrics != _METRICS[size]:
+            self.metrics = _METRICS[size]
+            self.setProperty("focusRadius", self._theme.radius(self.metrics.radius))
             self.updateGeometry()
             self.update()
 
@@ -215,14 +215,14 @@ class Button(PaintedButton):
 
     def width_with(self, text: str) -> int:
         """Return the width in px that the button needs for a text."""
-        width = paint.width_of(self._theme.font(self.measure.font), text) + 2 * self.measure.padding
+        width = paint.width_of(self._theme.font(self.metrics.font), text) + 2 * self.metrics.padding
         if self.icon_name is not None:
-            width += self.icon_side() + (self.measure.gap if text else 0)
+            width += self.icon_side() + (self.metrics.gap if text else 0)
         return round(width) + 1
 
     def sizeHint(self) -> QSize:
-        text_height = round(paint.height_of(self._theme.font(self.measure.font))) + 8
-        return QSize(self.width_with(self.text()), max(self.measure.height, text_height))
+        text_height = round(paint.height_of(self._theme.font(self.metrics.font))) + 8
+        return QSize(self.width_with(self.text()), max(self.metrics.height, text_height))
 
     def minimumSizeHint(self) -> QSize:
         hint = self.sizeHint()
@@ -239,7 +239,7 @@ class Button(PaintedButton):
 
     def icon_side(self) -> int:
         """Return the size of the icon in px, which scales with the text size."""
-        return round(self._theme.scaled(self.measure.icon))
+        return round(self._theme.scaled(self.metrics.icon))
 
     def displayed_text(self) -> str:
         """Return the text to paint, which differs from `text` if only the icon is shown."""
@@ -247,7 +247,7 @@ class Button(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         fill, border, colour = self._colours()
-        paint.box(painter, rect, self._theme.radius(self.measure.radius), fill, border)
+        paint.box(painter, rect, self._theme.radius(self.metrics.radius), fill, border)
         self.paint_content(painter, colour)
 
     def paint_content(self, painter: QPainter, colour: QColor) -> None:
@@ -257,14 +257,14 @@ class Button(PaintedButton):
             painter: Painter.
             colour: Colour of the text and, by default, of the icon.
         """
-        font = self._theme.font(self.measure.font)
-        if self.measure.font == "body":
+        font = self._theme.font(self.metrics.font)
+        if self.metrics.font == "body":
             font.setWeight(font.Weight.Medium)
         frame = QRectF(self.rect())
         text = self.displayed_text()
         text_width = paint.width_of(font, text)
         icon = self.icon_side() if self.icon_name is not None else 0
-        gap = self.measure.gap if icon and text else 0
+        gap = self.metrics.gap if icon and text else 0
         left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
@@ -445,7 +445,7 @@ class RunButton(Button):
             self.update()
 
     def icon_side(self) -> int:
-        return self.measure.icon  # the text needs the space
+        return self.metrics.icon  # the text needs the space
 
     def displayed_text(self) -> str:
         return "" if self._is_icon_only else self.text()
@@ -455,15 +455,15 @@ class RunButton(Button):
         if self._is_icon_only:
             return QSize(
                 max(ICON_ONLY_WIDTH, self.icon_side() + 28),
-                max(self.measure.height, round(paint.height_of(font)) + 12),
+                max(self.metrics.height, round(paint.height_of(font)) + 12),
             )
-        height = max(self.measure.height, round(paint.height_of(font)) + 12)
+        height = max(self.metrics.height, round(paint.height_of(font)) + 12)
         return QSize(self.full_width(), height)
 
     def full_width(self) -> int:
         """Return the width in px with the longest text that the button can show."""
         text_width = paint.width_of(self._theme.font("button"), self._widest)
-        return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + text_width) + 28)
+        return max(RUN_WIDTH, round(self.icon_side() + self.metrics.gap + text_width) + 28)
 
 
 class StopButton(PaintedButton):

@@ -57,7 +57,7 @@ class AlertBox(QWidget):
     Buttons are to the right of the text or, if there is too little space, below it.
     """
 
-    icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
+    icon_side, icon_left, left, vertical_margin, gap = 18, 12, 40, 10, 10
     min_text_width = 220  # minimum width of the text beside the buttons, in px at 100 %
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
@@ -68,7 +68,7 @@ class AlertBox(QWidget):
         self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
         self.button_row.setSpacing(self.gap)
         self._main_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        vertical_margin = self.high if framed else 4
+        vertical_margin = self.vertical_margin if framed else 4
         self._main_layout.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
         self._main_layout.setSpacing(self.gap)
         self._main_layout.addLayout(self.text_column, 1)

@@ -17,7 +17,7 @@ from app.ui.widgets.buttons import Button
 from app.ui.widgets.labels import label
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea
 
-TILE, BELOW_TILE = 56, 16
+TILE_SIZE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400
 MARGIN = 12
 ROW_TOP_MARGIN = 14
@@ -44,14 +44,16 @@ class _Tile(QWidget):
     def __init__(self, theme: Theme, icon: str) -> None:
         super().__init__()
         self._theme, self.icon = theme, icon
-        self.setFixedSize(TILE, TILE + BELOW_TILE)
+        self.setFixedSize(TILE_SIZE, TILE_SIZE + BELOW_TILE)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
         painter = QPainter(self)
-        paint.box(painter, QRectF(0, 0, TILE, TILE), theme.radius("palette"), theme.colour("sunken"))
+        paint.box(
+            painter, QRectF(0, 0, TILE_SIZE, TILE_SIZE), theme.radius("palette"), theme.colour("sunken")
+        )
         side = theme.size("icon", "empty")
-        icon_rect = QRectF((TILE - side) / 2, (TILE - side) / 2, side, side)
+        icon_rect = QRectF((TILE_SIZE - side) / 2, (TILE_SIZE - side) / 2, side, side)
         paint_icon(painter, icon_rect, self.icon, theme.colour("textSecondary"))
         painter.end()
 
@@ -114,7 +116,7 @@ class EmptyState(QWidget):
         self._text.setMinimumHeight(max(0, text))
         content_height = self._title.heightForWidth(width) + text + 4
         content_height += ROW_TOP_MARGIN + self._buttons[0].sizeHint().height() if self._buttons else 0
-        self._tile.setVisible(self.height() - 2 * MARGIN >= content_height + TILE + BELOW_TILE)
+        self._tile.setVisible(self.height() - 2 * MARGIN >= content_height + TILE_SIZE + BELOW_TILE)
         is_low = bool(self._buttons) and self.height() - 2 * MARGIN < content_height
         self._text.setVisible(not is_low)
         self._title.setToolTip(plain.tip(self._text.text()) if is_low else "")

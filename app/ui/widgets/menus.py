@@ -50,7 +50,7 @@ def set_round_corners(widget: QWidget) -> None:
         widget.setAttribute(Qt.WidgetAttribute.WA_TranslucentBackground)
 
 
-def cut(widget: QWidget, radius: float) -> None:
+def clip_corners(widget: QWidget, radius: float) -> None:
     """Clip a popup to round corners, on platforms that may have no compositor.
 
     Args:
@@ -163,7 +163,7 @@ class Menu(QMenu):
         super().showEvent(event)
         modifiers = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
         self._by_keys = bool(modifiers) or is_keyboard_navigation()
-        cut(self, self._theme.radius("panel"))
+        clip_corners(self, self._theme.radius("panel"))
         self._avoid_stop()
 
     def _avoid_stop(self) -> None:
@@ -191,7 +191,7 @@ class Menu(QMenu):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        cut(self, self._theme.radius("panel"))
+        clip_corners(self, self._theme.radius("panel"))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
@@ -276,7 +276,7 @@ def open_below(menu: Menu, anchor: QWidget) -> None:
     menu.popup(anchor.mapToGlobal(position))
 
 
-class ContextMenuFilter(QObject):
+class FieldContextMenu(QObject):
     """Context menu of a text field in Studio's style, in place of the standard one."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:

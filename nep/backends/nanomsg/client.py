@@ -122,7 +122,7 @@ class NanomsgClient(ClientCalls[_Call]):
         # Returns None if the context was closed; the call already has its outcome then.
         nng = load_pynng()
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
-        parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
+        parts = self._framing.encode_call(call.number, self.spec.codec.number, left_s, call.data)
         try:
             call.context.send(join_parts(self._framing, parts))  # blocks until a server is connected
             call.is_sent, call.data = True, b""  # the context outlives the timeout: release the payload

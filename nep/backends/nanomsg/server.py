@@ -144,7 +144,7 @@ class NanomsgServer:
                     return False
                 self._answered_at = time.monotonic()
             try:
-                context.send(join_parts(self._framing, self._framing.reply(number, checked)))
+                context.send(join_parts(self._framing, self._framing.encode_reply(number, checked)))
             except (load_pynng().NNGException, TypeError) as error:  # the client has stopped waiting
                 _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False

@@ -44,7 +44,7 @@ class PollableSub:
             recv_timeout=round(SHORT_WAIT_S * 1000),
         )
         self.fd = int(self.socket.recv_fd)
-        self._room = queue_length(codec)
+        self._queue_length = queue_length(codec)
         self._is_closed = False
 
     @property
@@ -55,8 +55,8 @@ class PollableSub:
     def enlarge_queue(self, history: int) -> None:
         """Enlarge the receive queue so that a history of `history` messages fits."""
         room = 2 * min(history, MAX_HISTORY)
-        if room > self._room:
-            self._room = self.socket.recv_buffer_size = room
+        if room > self._queue_length:
+            self._queue_length = self.socket.recv_buffer_size = room
 
     def recv(self, *, may_wait: bool) -> bytes | None:
         """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
@@ -101,7 +101,7 @@ class NanomsgSubSocket(UnbatchedReader):
             spec, self._own_topic, self.sources, self.disconnect, lambda _publisher, _seq: None
         )
         self._links: dict[int, _Link] = {}
-        self._greeters: dict[str, Any] = {}
+        self._hello_sockets: dict[str, Any] = {}
         """Sockets for the hellos, by address of the publisher. Also read by pynng's threads."""
         self._sub.socket.subscribe(self._topic)
         self._sub.socket.subscribe(self._own_topic)
@@ -171,7 +171,7 @@ class NanomsgSubSocket(UnbatchedReader):
             # with a queue, sending never blocks pynng's threads
             link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE_LENGTH))
             self._links[publisher] = link
-            self._greeters[address] = link.hello_socket
+            self._hello_sockets[address] = link.hello_socket
             link.hello_socket.dial(f"tcp://{hellos}", block=False)
             link.dialer = self._sub.socket.dial(f"tcp://{address}", block=False)
         except (nng.NNGException, TooManyFilesError) as error:
@@ -181,7 +181,7 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         # Called in a thread of pynng. Sends the hello with the local address of the connection.
-        greeter = self._greeters.get(str(pipe.remote_address))
+        greeter = self._hello_sockets.get(str(pipe.remote_address))
         if greeter is not None:
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
@@ -199,7 +199,7 @@ class NanomsgSubSocket(UnbatchedReader):
     def _remove_link(self, publisher: int) -> None:
         link = self._links.pop(publisher, None)
         if link is not None:
-            self._greeters.pop(link.address, None)
+            self._hello_sockets.pop(link.address, None)
             link.close()
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched

@@ -112,7 +112,7 @@ class NanomsgTransport(ZeromqTransport):
     def _create_direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
         publisher = DirectPublisher(spec, direct, self._publisher_closer(lambda: None))
         with close_on_error(publisher.release):
-            self._attached[spec.id] = publisher.endpoint
+            self._direct_endpoints[spec.id] = publisher.endpoint
             self._add_publisher(publisher)
         try:
             publisher.wait_for_any(DIRECT_WAIT_S)
@@ -128,10 +128,10 @@ class NanomsgTransport(ZeromqTransport):
             readable, io, spec, self._discard_subscriber
         )
         with close_on_error(readable.close):
-            self._attached[spec.id] = readable.endpoint
+            self._direct_endpoints[spec.id] = readable.endpoint
             self._add_subscriber(subscriber)
         try:
-            self._serve(io, subscriber)
+            self._start_serving(io, subscriber)
         except BaseException:
             subscriber.close()
             raise

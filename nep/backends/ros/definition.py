@@ -56,16 +56,16 @@ class _Reader:
         """Remaining number of nested messages. Empty ones aren't limited by the size of the data."""
 
     @property
-    def left(self) -> int:
+    def bytes_left(self) -> int:
         return len(self.data) - self.at
 
     def read(self, count: int) -> memoryview:
-        if count > self.left:
+        if count > self.bytes_left:
             raise struct.error
         self.at += count
         return self.data[self.at - count : self.at]
 
-    def length(self) -> int:
+    def read_length(self) -> int:
         return int(_LENGTH.unpack(self.read(4))[0])
 
 
@@ -144,11 +144,11 @@ class Definition:
         except _FieldError as error:
             reason = _("field '{path}' {reason}").format(path=error.path, reason=error.reason)
             raise DecodeError(self.name, len(reader.data), reason) from None
-        if reader.left:
+        if reader.bytes_left:
             raise DecodeError(
                 self.name,
                 len(reader.data),
-                _("{count} unexpected bytes follow the message").format(count=reader.left),
+                _("{count} unexpected bytes follow the message").format(count=reader.bytes_left),
             )
         return values
 
@@ -347,7 +347,7 @@ def _write_string(value: object, path: str, out: bytearray) -> None:
 
 
 def _read_string(reader: _Reader, _path: str) -> object:
-    return str(reader.read(reader.length()), "utf-8", "replace")
+    return str(reader.read(reader.read_length()), "utf-8", "replace")
 
 
 def _array_kind(kind: FieldKind, length: int | None) -> FieldKind:
@@ -360,7 +360,7 @@ def _array_kind(kind: FieldKind, length: int | None) -> FieldKind:
     if length is None:
 
         def read_all(reader: _Reader, path: str) -> object:
-            return read(reader, path, reader.length())
+            return read(reader, path, reader.read_length())
 
         return FieldKind(name, write, read_all, 4, element=kind)
 
@@ -428,7 +428,7 @@ def _list_reader(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
     size = struct.calcsize(f"<{format_char}")
 
     def read(reader: _Reader, path: str, count: int) -> object:
-        if count * kind.min_bytes > reader.left:
+        if count * kind.min_bytes > reader.bytes_left:
             raise _FieldError(
                 path, _("has {count} elements, more than the data can hold").format(count=count)
             )

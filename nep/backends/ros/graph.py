@@ -65,16 +65,16 @@ def graph_view(state: RosSystemState, local_nodes: list[LocalRosNode]) -> GraphV
         local_nodes: nep nodes of this process.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-    for topic, name in _foreign_entries(state.publishers, local_nodes, lambda each: each.publishers):
+    for topic, name in _remote_entries(state.publishers, local_nodes, lambda each: each.publishers):
         kind = state.types.get(topic, "*")
         uri = state.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
         _apply_request(graph, AddPublisher(_node_record(name, uri), record))
-    for topic, name in _foreign_entries(state.subscribers, local_nodes, lambda each: each.subscribers):
+    for topic, name in _remote_entries(state.subscribers, local_nodes, lambda each: each.subscribers):
         subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, state.types.get(topic, "*"))
         _apply_request(graph, AddSubscriber(_node_record(name, state.uris.get(name, "")), subscriber_count))
-    for service, name in _foreign_entries(state.services, local_nodes, lambda each: each.servers):
+    for service, name in _remote_entries(state.services, local_nodes, lambda each: each.servers):
         node = _node_record(name, state.uris.get(name, ""))
         _apply_request(graph, _server_request(node, _stable_id(name, service, "s"), service))
     for local_node in local_nodes:
@@ -83,7 +83,7 @@ def graph_view(state: RosSystemState, local_nodes: list[LocalRosNode]) -> GraphV
     return graph.view()
 
 
-def _foreign_entries(
+def _remote_entries(
     nodes_by_name: Mapping[str, Sequence[str]],
     local_nodes: list[LocalRosNode],
     rows_of: Callable[[LocalRosNode], Sequence[tuple[object, ...]]],

@@ -133,7 +133,7 @@ class RosProcess:
                 registrations.publications or registrations.subscriptions or services
             ) and self.master.register(self.name, self.uri, registrations, _REQUEST_TIMEOUT_S)
 
-    def resolved(self, topic: str) -> str:
+    def resolve_name(self, topic: str) -> str:
         """Return the full name of a topic or service. Raises `BadTopicError`."""
         return str(self.rospy.resolve_name(ros_topic(topic)))
 

@@ -48,7 +48,7 @@ class RosClient(ClientCalls[_Call]):
     def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
         super().__init__(spec)
         self.process = process
-        self.service = process.resolved(spec.service)
+        self.service = process.resolve_name(spec.service)
         self._on_close = forget
         self._waiting: list[_Call] = []
         self._is_discovering = False

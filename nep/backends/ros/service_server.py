@@ -52,7 +52,7 @@ class RosServer:
     def __init__(self, process: RosProcess, spec: ServerSpec, forget: Callable[[RosServer], None]) -> None:
         self.spec = spec
         self.process = process
-        self.service = process.resolved(spec.service)
+        self.service = process.resolve_name(spec.service)
         self.calls = CallQueue()
         self.stats = ServerStats()
         self.is_closed = False

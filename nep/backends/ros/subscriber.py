@@ -77,7 +77,7 @@ class RospySubscriber(WakingSubscriber):
         super().__init__(owner.changed)
         self.spec = spec
         self.process = process
-        self.topic = process.resolved(spec.topic)
+        self.topic = process.resolve_name(spec.topic)
         self.inbox = Inbox(spec.keep, spec.max_messages, max_bytes)
         self.ready: deque[Message] = deque()
         self.received = 0

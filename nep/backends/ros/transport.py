@@ -61,7 +61,7 @@ class RospyPublisher:
         self.process = process
         self._transport = transport
         self._definition = installed_definition(ros_type_of(spec.msg_type))
-        self.topic = process.resolved(spec.topic)
+        self.topic = process.resolve_name(spec.topic)
         self._lock = threading.RLock()
         self._is_closed = False
         self._room = QueueLimit()

@@ -43,7 +43,7 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-_MAX_FOREIGN_ENDPOINTS = 10_000
+_MAX_REMOTE_ENDPOINTS = 10_000
 """Maximum number of other programs' writers and readers in the graph."""
 
 
@@ -88,9 +88,9 @@ def current_graph(participant: Participant) -> GraphView:
         if each.gid in local_names and ros_service(each.topic) is None:
             _add_endpoint(parties, names, NodeEndpoint(local_names[each.gid], each), kind)
     for node, kind, endpoint in islice(
-        _foreign_endpoints(participant, endpoints, names), _MAX_FOREIGN_ENDPOINTS
+        _remote_endpoints(participant, endpoints, names), _MAX_REMOTE_ENDPOINTS
     ):
-        _add_foreign(graph, node, kind, endpoint, names)
+        _add_remote(graph, node, kind, endpoint, names)
         if endpoint is not None and ros_service(endpoint.topic) is None:
             _add_endpoint(parties, names, NodeEndpoint(node.name, endpoint), kind)
     alerts = (
@@ -137,7 +137,7 @@ def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
     graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
 
 
-def _foreign_endpoints(
+def _remote_endpoints(
     participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _NameCache
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
     # Yields foreign writers and readers with their node, and None for nodes without any.
@@ -180,7 +180,7 @@ def _unknown_node(gid: bytes) -> NodeRecord:
     return _node_record(_hashed_id(gid), f"dds/{gid.hex()[:24]}")
 
 
-def _add_foreign(
+def _add_remote(
     graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint | None, names: _NameCache
 ) -> None:
     # Records that the graph rejects are skipped.
@@ -190,7 +190,7 @@ def _add_foreign(
         return
     topic, msg_type, number = names.topic(endpoint), names.msg_type(endpoint), names.id(endpoint)
     if ros_service(endpoint.topic) is not None:
-        _add_foreign_service(graph, node, kind, endpoint, topic, number)
+        _add_remote_service(graph, node, kind, endpoint, topic, number)
         return
     if kind == "writer":
         publisher = PublisherRecord(
@@ -201,7 +201,7 @@ def _add_foreign(
         graph.apply(AddSubscriber(node, SubscriberRecord(number, topic, msg_type)), 0, 0.0, node.id)
 
 
-def _add_foreign_service(
+def _add_remote_service(
     graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint, topic: str, number: int
 ) -> None:
     # A reader of requests is a server, a writer of requests is a client.

@@ -19,7 +19,7 @@ from nep.system.forks import call_in_child
 _MODULE_NAMES = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
 _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _FD_FOLDER = "/proc/self/fd"
-_PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
+_FIRST_PORT, _PORTS_PER_DOMAIN = 7400, 250
 """Base port of domain 0, and number of ports per domain, as the DDS wire protocol (RTPS) specifies."""
 _inherited_libraries: set[str] = set()
 """Names of libraries that were in use in the parent process before a fork.
@@ -86,14 +86,14 @@ def restrict_to_loopback(domain: int) -> None:
     """
     if not sys.platform.startswith("linux"):
         return
-    first = _PORTS + _PORTS_OF_A_DOMAIN * domain
+    first = _FIRST_PORT + _PORTS_PER_DOMAIN * domain
     for path in Path(_FD_FOLDER).iterdir():
         try:
             if not path.is_socket():
                 continue
             with socket.socket(fileno=os.dup(int(path.name))) as copy:
                 host, port = copy.getsockname()[:2]
-                if host == "0.0.0.0" and port in range(first, first + _PORTS_OF_A_DOMAIN):  # noqa: S104
+                if host == "0.0.0.0" and port in range(first, first + _PORTS_PER_DOMAIN):  # noqa: S104
                     copy.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
         except (
             OSError,

@@ -41,7 +41,7 @@ class Matches:
             library.core.DDSStatus.PublicationMatched,
             library.core.DDSStatus.SubscriptionMatched,
         )
-        self._followed: dict[bytes, Any] = {}
+        self._entities: dict[bytes, Any] = {}
         self._remote_matches: dict[bytes, frozenset[bytes]] = {}
         self._published = b""
         self._has_changes = False
@@ -53,18 +53,18 @@ class Matches:
     def add(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Add a writer or reader of this program."""
         entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
-        self._followed[entity.guid.bytes] = entity
+        self._entities[entity.guid.bytes] = entity
         self._remote_matches[entity.guid.bytes] = frozenset()
 
     def remove(self, gid: bytes) -> None:
         """Remove a closed writer or reader."""
-        self._followed.pop(gid, None)
+        self._entities.pop(gid, None)
         self._remote_matches.pop(gid, None)
         self._has_changes = True
 
     def publish_changes(self) -> None:
         """Publish the matches of this program if they have changed since the last call."""
-        for gid, entity in self._followed.items():
+        for gid, entity in self._entities.items():
             if entity.take_status():
                 matched = matched_gids(entity)
                 self._remote_matches[gid] = frozenset(each for each in matched if not self._is_local(each))

@@ -189,7 +189,7 @@ class Participant:
         self.changed = threading.Condition(threading.RLock())
         """Guards all state; notified when endpoints change."""
         self._members: dict[str, _Member] = {}
-        self._others: dict[bytes, tuple[RosNode, ...]] = {}
+        self._remote_nodes: dict[bytes, tuple[RosNode, ...]] = {}
         self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
         self._is_closing = self._has_changes = self._is_settled = False
         check_free_descriptors(_FDS_PER_PARTICIPANT, "a participant of ROS 2")
@@ -282,7 +282,7 @@ class Participant:
         discovered = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
         telling = self.participants(with_nodes=True) - {self.gid}
         return all(
-            gid in self._others and all(node.gids <= discovered for node in self._others[gid])
+            gid in self._remote_nodes and all(node.gids <= discovered for node in self._remote_nodes[gid])
             for gid in telling
         )
 
@@ -364,9 +364,11 @@ class Participant:
             _logger.debug("malformed message on ros_discovery_info: %s", error)
             return
         gid = info["gid"]["data"][:16]
-        if gid == self.gid or (gid not in self._others and len(self._others) >= _MAX_PARTICIPANTS):
+        if gid == self.gid or (
+            gid not in self._remote_nodes and len(self._remote_nodes) >= _MAX_PARTICIPANTS
+        ):
             return
-        self._others[gid] = tuple(
+        self._remote_nodes[gid] = tuple(
             RosNode(
                 f"{each['node_namespace'].rstrip('/')}/{each['node_name']}",
                 frozenset(
@@ -380,7 +382,9 @@ class Participant:
         """Return the names of other programs' nodes that own the endpoints with these GUIDs."""
         requested = set(gids)
         with self.changed:
-            nodes = [node for others in self._others.values() for node in others if node.gids & requested]
+            nodes = [
+                node for others in self._remote_nodes.values() for node in others if node.gids & requested
+            ]
         return tuple(sorted({each.name for each in nodes}))
 
     def local_node_names(self) -> dict[bytes, str]:
@@ -406,8 +410,8 @@ class Participant:
             alive: GUIDs of the existing participants; all others are removed.
         """
         with self.changed:
-            self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
-            return dict(self._others)
+            self._remote_nodes = {gid: nodes for gid, nodes in self._remote_nodes.items() if gid in alive}
+            return dict(self._remote_nodes)
 
     # ---- discovery
 

@@ -56,7 +56,7 @@ def wait_for_matches(
         return participant.remote_node_names(unready)
 
 
-def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
+def endpoint_user_data(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
     """Return the USER_DATA of a writer or reader, with the entries for ROS 2 and for nep.
 
     Args:
@@ -94,7 +94,7 @@ class Ros2Publisher:
         library = participant.dds
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
         type_hash = participant.types.type_hash(ros_type)
-        announced = announcement(type_hash, node_id, spec)
+        announced = endpoint_user_data(type_hash, node_id, spec)
         depth = queue_depth(spec.qos, spec.codec.name)
         with participant.changed:
             self._kind = participant.topics.sample_class(ros_type)

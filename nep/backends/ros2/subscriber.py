@@ -19,7 +19,7 @@ from nep.backends.base import SubscriberSpec, SubscriberTransport
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
-from nep.backends.ros2.publisher import announcement, wait_for_matches
+from nep.backends.ros2.publisher import endpoint_user_data, wait_for_matches
 from nep.backends.ros2.quality import qos_policies, queue_depth
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.backends.waking import WakingSubscriber
@@ -123,7 +123,7 @@ class Ros2Subscriber(WakingSubscriber):
         participant, spec = self._participant, self.spec
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
-        announced = announcement(self._type_hash, self._transport.node.id, spec)
+        announced = endpoint_user_data(self._type_hash, self._transport.node.id, spec)
         depth = max(queue_depth(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,

@@ -113,7 +113,7 @@ class ZenohServer:
             if query not in self._queries:
                 return False
             self._queries.discard(query)
-        header, data = (bytes(each) for each in NATIVE.reply(number, reply))
+        header, data = (bytes(each) for each in NATIVE.encode_reply(number, reply))
         try:
             with query:
                 query.reply(self._key, data, attachment=header)
@@ -252,7 +252,7 @@ class ZenohClient(ClientCalls[_Call]):
                 return
             call.key = key
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
-        parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
+        parts = NATIVE.encode_call(call.number, self.spec.codec.number, limit_s, call.data)
         call.data = b""  # the query outlives its timeout: release the payload
         query_s = (
             _MAX_QUERY_TIMEOUT_S

@@ -142,7 +142,7 @@ class ZenohSession:
         self._subscribers: tuple[ZenohSubscriber, ...] = ()
         self._servers: tuple[ListedServer, ...] = ()
         self._clients: tuple[ListedClient, ...] = ()
-        self._outputs: dict[int, Any] = {}
+        self._zenoh_subscribers: dict[int, Any] = {}
         self._load = CpuLoad()
         self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
         self._opened = open_session_at(address, wait_s)
@@ -377,7 +377,7 @@ class ZenohSession:
         key = pattern_data_key(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._outputs[spec.id] = self._zenoh.declare_subscriber(
+            self._zenoh_subscribers[spec.id] = self._zenoh.declare_subscriber(
                 key, create_handler(subscriber.receive_message)
             )
             self._tokens[subscriber] = self._declare_token(subscriber_key(self.node.id, record))
@@ -420,7 +420,7 @@ class ZenohSession:
             self._subscribers = tuple(entity for entity in self._subscribers if entity is not closed)
             undeclared = [self._tokens.pop(closed, None)]
             if isinstance(closed, ZenohSubscriber):
-                undeclared.append(self._outputs.pop(closed.spec.id, None))
+                undeclared.append(self._zenoh_subscribers.pop(closed.spec.id, None))
         for entity in undeclared:
             if entity is not None:
                 with suppress(load_zenoh().ZError):  # closing the session has undeclared it
@@ -520,5 +520,5 @@ def _parse_requests(key: str, reply: bytes) -> tuple[Request, ...]:
     return tuple(
         each
         for each in decoded
-        if isinstance(each, allowed) and key == call_key(requests.node_of(each) or "")
+        if isinstance(each, allowed) and key == call_key(requests.node_id_of(each) or "")
     )

@@ -25,7 +25,7 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import ExpectedSubscriber, NodeRecord, RemovePublisher, SubscriberRecord
-from nep.system.forks import close_in_child, watch
+from nep.system.forks import close_in_child, notify_after_fork
 
 _logger = logging.getLogger("nep")
 _CLOSE_TIMEOUT_S = 0.3
@@ -56,7 +56,7 @@ class ZenohTransport:
         self._is_closed = False
         self._is_shut_down = False
         self._services = ZenohServices(self._session, node.name)
-        watch(self)
+        notify_after_fork(self)
 
     # ---- publishers and subscribers
 
@@ -68,13 +68,13 @@ class ZenohTransport:
     def _create_publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         session = self._session(spec.configuration, spec.wait_s)
 
-        def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh is not typed
+        def new_publisher(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh is not typed
             return ZenohPublisher(
                 zenoh_session, spec, session.roster.count_subscribers, self._close_publisher
             )
 
         session.join()
-        publisher = session.create_publisher(make)
+        publisher = session.create_publisher(new_publisher)
         try:
             session.check(publisher.record)
             self._add(self._publishers, publisher, session)

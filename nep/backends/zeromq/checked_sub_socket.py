@@ -52,7 +52,7 @@ class CheckedSubSocket(SubSocket):
 
     def _is_authentic(self, parts: list[zmq.Frame]) -> bool:
         first = parts[0].bytes
-        if len(first) >= self._body and first.startswith(self._topic):
+        if len(first) >= self._payload_offset and first.startswith(self._topic):
             publisher = unpack_header_at(first, self._topic_length)[-1]
         elif len(parts) > 1 and len(parts[1]) == HEADER_BYTES:
             publisher = unpack_header(parts[1].bytes)[-1]

@@ -43,7 +43,7 @@ from nep.system.descriptors import (
     is_descriptor_shortage,
     open_descriptor_count,
 )
-from nep.system.forks import watch
+from nep.system.forks import notify_after_fork
 from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep.io")
@@ -58,7 +58,7 @@ _FDS_PER_CONTEXT = 12
 _FDS_PER_SOCKET = 4
 """Number of descriptors per socket: the socket, its port, its Unix socket and a connection."""
 _MAX_IDLE_WAKERS = 8
-_ROOM_CHECKS, _ROOM_CHECK_S = 10, 0.01
+_MAX_ROOM_CHECKS, _ROOM_CHECK_INTERVAL_S = 10, 0.01
 _ReadyKey = tuple[selectors.SelectorKey, int]
 _EPOLL_TICK_S = 0.001
 _EPOLL_SELECTOR = getattr(selectors, "EpollSelector", ())
@@ -116,11 +116,11 @@ class IoThread:
         self._timers: list[tuple[float, int, Pollable]] = []
         self._numbers = itertools.count()
         self._iteration = 0
-        self._stuck_in: int | None = None
+        self._stuck_iteration: int | None = None
         self._is_closing = False
         self._pause = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        watch(self)
+        notify_after_fork(self)
 
     # ---- from other threads
 
@@ -147,8 +147,8 @@ class IoThread:
             return
         done = threading.Event()
         self._queue_command("remove", served, done)
-        if self._stuck_in != self._iteration and not done.wait(timeout_s):
-            self._stuck_in = self._iteration
+        if self._stuck_iteration != self._iteration and not done.wait(timeout_s):
+            self._stuck_iteration = self._iteration
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Stop the thread and wait up to `timeout_s` seconds for it to end."""
@@ -370,10 +370,10 @@ class SharedContext:
 
     def _wait_for_room(self, owner: str) -> None:
         # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
-        for _ in range(_ROOM_CHECKS):
+        for _ in range(_MAX_ROOM_CHECKS):
             if has_free_descriptors(_FDS_PER_SOCKET + RESERVED_DESCRIPTORS):
                 return
-            self._pause.wait(_ROOM_CHECK_S)
+            self._pause.wait(_ROOM_CHECK_INTERVAL_S)
         check_free_descriptors(_FDS_PER_SOCKET, owner)
 
     def acquire_waker(self) -> Waker:

@@ -140,7 +140,7 @@ class OriginalPublisher:
         self.missing: tuple[str, ...] = ()
         self._socket = socket
         self._generation = direct.generation
-        self._filters = 0
+        self._subscription_count = 0
         self._is_closed = False
         self._backlog = Backlog()
         self._untracked_bytes = 0
@@ -160,17 +160,17 @@ class OriginalPublisher:
     @property
     def has_subscribers(self) -> bool:
         """True if there is at least one subscription."""
-        return self._filters > 0
+        return self._subscription_count > 0
 
     @property
     def subscribers(self) -> int:
         """Number of subscriptions. A proxy counts as one subscriber."""
-        return self._filters
+        return self._subscription_count
 
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds for a subscriber to connect."""
         with self._changed:
-            wait_until(self._changed, lambda: self._filters > 0, timeout_s)
+            wait_until(self._changed, lambda: self._subscription_count > 0, timeout_s)
 
     def report(self, problem: str) -> None:
         """Ignore the problem, because a direct connection has no graph to report it in."""
@@ -198,7 +198,7 @@ class OriginalPublisher:
             self.count += 1
             if self._backlog.has_room(len(frame)):
                 self._send(frame)
-            self._read_filters()
+            self._read_subscriptions()
 
     def _send(self, frame: bytes) -> None:
         self._untracked_bytes += len(frame)
@@ -213,7 +213,7 @@ class OriginalPublisher:
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
         """Process subscriptions."""
         with self._changed:
-            self._read_filters()
+            self._read_subscriptions()
         return PollState()
 
     def close(self, timeout_s: float) -> None:
@@ -253,12 +253,12 @@ class OriginalPublisher:
             if self._close_monitor.closed:
                 return
             self._close_monitor.poll(self._remaining_ms() + _CLOSE_EVENT_MS)
-            if self.count and self._filters and not self._remaining_ms():
+            if self.count and self._subscription_count and not self._remaining_ms():
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
                     self.spec.topic,
-                    self._filters,
+                    self._subscription_count,
                     self.count,
                 )
             self._close_monitor.close(0)
@@ -266,10 +266,10 @@ class OriginalPublisher:
     def _remaining_ms(self) -> int:
         return max(0, int((self._deadline - time.monotonic()) * 1000))
 
-    def _read_filters(self) -> None:
+    def _read_subscriptions(self) -> None:
         while not self._socket.closed and int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
             event = self._socket.recv_multipart(zmq.DONTWAIT)[0]
-            self._filters += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
+            self._subscription_count += {b"\x01": 1, b"\x00": -1}.get(event[:1], 0)
             self._changed.notify_all()
 
 

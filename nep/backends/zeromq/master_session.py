@@ -69,7 +69,7 @@ _logger = logging.getLogger("nep")
 _ADDRESS_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for checking whether the publishers must bind other addresses."""
 _JOIN_RETRY_S = 0.5
-_RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
+_RECONNECT_S, _RECONNECT_REMOTE_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
 """Reconnection intervals for a master on this and on another computer.
 
 libzmq gives up after a failed handshake, for example with a PUB socket at the master's address.
@@ -177,7 +177,7 @@ class MasterSession:
         self.address = address
         self._node = node
         self._io = io
-        self._calls = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
+        self._client = RpcClient(socket, address, after_use=lambda: io.serve_soon(self))
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]] = {}
@@ -188,29 +188,29 @@ class MasterSession:
         self._address_check_at = 0.0
         self._was_connected = False
         self._is_closed = False
-        self._leaving: PendingRequest | None = None
+        self._leave_request: PendingRequest | None = None
         self._leave_sent_s = 0.0
-        self._is_near = is_loopback(address)
-        self._reconnect_s = _RECONNECT_S if self._is_near else _RECONNECT_FAR_S
+        self._is_master_local = is_loopback(address)
+        self._reconnect_s = _RECONNECT_S if self._is_master_local else _RECONNECT_REMOTE_S
         self._reconnect_at = time.monotonic() + self._reconnect_s
         self._served_hosts: tuple[str, ...] = ()
         self._own_host = LOOPBACK
-        self._name = MasterNameResolver(address, self._set_address, look_up)
-        if self._name.known:
-            self._set_address(self._name.known)
-        self._name.resolve(time.monotonic())
-        self._moved_to = self.hosts
+        self._resolver = MasterNameResolver(address, self._set_address, look_up)
+        if self._resolver.address:
+            self._set_address(self._resolver.address)
+        self._resolver.resolve(time.monotonic())
+        self._bound_hosts = self.hosts
         self._connected_from = self._own_host
         self._load = CpuLoad()
         self._clock = ClockSamples()
         self._read_at = self._clock.now()
         self._clocks: Mapping[str, ClockDifference] = {}
-        self.fd = self._calls.fd
+        self.fd = self._client.fd
 
     @property
     def endpoint(self) -> str:
         """Endpoint of the connection; "" until the master's address is resolved."""
-        return self._calls.endpoint
+        return self._client.endpoint
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -220,7 +220,7 @@ class MasterSession:
         serves other computers. On other computers, it is the address of the interface that reaches the
         master.
         """
-        return (LOOPBACK, *self._served_hosts) if self._is_near else (self._own_host,)
+        return (LOOPBACK, *self._served_hosts) if self._is_master_local else (self._own_host,)
 
     # ---- for the transport, in any thread
 
@@ -228,20 +228,20 @@ class MasterSession:
     def is_idle(self) -> bool:
         """True if nothing is registered and no request is pending."""
         with self._lock:
-            return not self._publishers and not self._subscribers and not self._calls.has_waiting_calls
+            return not self._publishers and not self._subscribers and not self._client.has_waiting_requests
 
     def wait_for_address(self, wait_s: float | None) -> None:
         """Wait up to `wait_s` seconds until the master's address is resolved; None waits forever.
 
         Raises `MasterUnreachable` on timeout.
         """
-        if not self._name.wait(wait_s) and wait_s is not None:
+        if not self._resolver.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
 
     def _set_address(self, address: str) -> None:
-        if not self._is_near:
+        if not self._is_master_local:
             self._own_host = local_address_towards(address) or self._own_host
-        self._calls.connect(address)
+        self._client.connect(address)
 
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
@@ -258,7 +258,7 @@ class MasterSession:
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
-            reply = self._calls.request(AddPublisher(self._node, record), wait_s)
+            reply = self._client.request(AddPublisher(self._node, record), wait_s)
         except BaseException:
             self.remove_publisher(record.id, 0)
             raise
@@ -287,7 +287,7 @@ class MasterSession:
         with self._lock:
             self._subscribers[record.id] = (record, subscriber)
         try:
-            reply = self._calls.request(AddSubscriber(self._node, record), wait_s)
+            reply = self._client.request(AddSubscriber(self._node, record), wait_s)
         except BaseException:
             self.remove_subscriber(record.id)
             raise
@@ -308,7 +308,7 @@ class MasterSession:
             removed = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
         if removed is not None:
-            self._calls.notify(RemovePublisher(self._node.id, publisher, last_seq))
+            self._client.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
         """Unregister a subscriber by its id, without waiting."""
@@ -316,16 +316,16 @@ class MasterSession:
             removed = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
         if removed is not None:
-            self._calls.notify(RemoveSubscriber(self._node.id, subscriber))
+            self._client.notify(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
         """Report the ids of subscribers that have not completed the handshake with a publisher."""
-        self._calls.notify(ReportMissing(self._node.id, publisher, tuple(subscribers)))
+        self._client.notify(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def query_graph(self, timeout_s: float) -> GraphView:
         """Request the graph from the master. Raises the same errors as `RpcClient.request`."""
         self.wait_for_address(timeout_s)
-        reply = self._calls.request(QueryGraph(), timeout_s)
+        reply = self._client.request(QueryGraph(), timeout_s)
         if not isinstance(reply, GraphReply):
             raise RequestRefusedError(
                 _("the master at '{address}' didn't reply with its graph").format(address=self.address)
@@ -338,37 +338,37 @@ class MasterSession:
             if self._is_closed:
                 return
             self._is_closed = True  # prevents joining again
-        if self._calls.is_connected:
+        if self._client.is_connected:
             self._renew()  # subscribers that miss the bye learn the last sequence numbers from the master
         with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
             self._confirmed.clear()
-        if self._epoch != 0 and self._calls.is_connected:
-            self._leaving = self._calls.send_request(Leave(self._node.id))
+        if self._epoch != 0 and self._client.is_connected:
+            self._leave_request = self._client.send_request(Leave(self._node.id))
             self._leave_sent_s = time.monotonic()
 
-    def leave(self, timeout_s: float) -> None:
+    def finish_leave(self, timeout_s: float) -> None:
         """Wait for the reply to the request of `start_leave`, until `timeout_s` seconds after it was sent."""
-        if self._leaving is None:
+        if self._leave_request is None:
             return
         remaining_s = timeout_s + self._leave_sent_s - time.monotonic()
         try:
-            self._calls.wait(self._leaving, max(0.0, remaining_s))
+            self._client.wait(self._leave_request, max(0.0, remaining_s))
         except (MasterUnreachable, RequestRefusedError, ClosedError):
             _logger.debug("no reply from the master at '%s' while leaving", self.address)
 
     def close(self) -> None:
         """Close the connection."""
-        self._calls.stop()
+        self._client.stop()
         self._io.remove(self)
-        self._calls.release()
+        self._client.release()
 
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
         """Process replies; renew when a renewal is due, and immediately after a reconnection."""
-        messages = self._calls.read()
+        messages = self._client.read()
         self._read_at = self._clock.now() if messages else self._read_at
         for message in messages:
             self._handle_reply(message.content, now)
@@ -376,14 +376,14 @@ class MasterSession:
                 message.callback(message.content)
         if self._is_closed:
             return PollState()
-        is_connected = self._calls.is_connected
+        is_connected = self._client.is_connected
         if is_connected and not self._was_connected:
             self._renewal_timer.due_at = now
         self._was_connected = is_connected
         if is_connected:
             self._reconnect_at = now + self._reconnect_s
         else:
-            self._name.resolve(now)
+            self._resolver.resolve(now)
             self._reconnect_if_due(now)
         is_due = now >= self._renewal_timer.due_at
         if is_due or now >= self._address_check_at:
@@ -393,22 +393,22 @@ class MasterSession:
             self._renewal_timer.start(now)
             self._renew()
         due = min(self._renewal_timer.due_at, self._address_check_at)
-        return PollState(due=now if self._calls.has_more else due)
+        return PollState(due=now if self._client.has_more else due)
 
     def _reconnect_if_due(self, now: float) -> None:
         if now >= self._reconnect_at:
             self._reconnect_at = now + self._reconnect_s
-            self._calls.reconnect()
+            self._client.reconnect()
 
     def _update_addresses(self) -> None:
         # Publishers move when this computer's address or the master changes, or when descriptors run out.
-        if not self._is_near and self._name.known:
-            self._own_host = local_address_towards(self._name.known) or self._own_host
+        if not self._is_master_local and self._resolver.address:
+            self._own_host = local_address_towards(self._resolver.address) or self._own_host
             self._reconnect_from(self._own_host)
         is_cramped = not has_room_for_unix_sockets()
-        if self.hosts == self._moved_to and not is_cramped:
+        if self.hosts == self._bound_hosts and not is_cramped:
             return
-        self._moved_to = self.hosts
+        self._bound_hosts = self.hosts
         with self._lock:
             for id, (record, publisher) in self._publishers.items():
                 if is_cramped:
@@ -416,25 +416,25 @@ class MasterSession:
                 try:
                     moved = replace(record, endpoints=publisher.move(self.hosts), local=publisher.is_local)
                 except (AddressInUseError, TooManyFilesError):
-                    self._moved_to = ()  # try again at the next renewal
+                    self._bound_hosts = ()  # try again at the next renewal
                     continue
                 if moved != record and moved.endpoints:
                     self._publishers[id] = (moved, publisher)
                     if id in self._confirmed:
-                        self._calls.notify(AddPublisher(self._node, moved))
+                        self._client.notify(AddPublisher(self._node, moved))
 
     def _reconnect_from(self, host: str) -> None:
         # Connections from the old address would stay silent for many seconds.
         before, self._connected_from = self._connected_from, host
         if before in {host, LOOPBACK}:  # `LOOPBACK`: not known before
             return
-        self._calls.reconnect()
+        self._client.reconnect()
         self._was_connected = False
         for _record, subscriber in self._all_subscribers():
             subscriber.reconnect_remote()
 
     def _select_endpoints(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
-        return tuple(select_endpoint(remote, self._name.known or self.address) for remote in remotes)
+        return tuple(select_endpoint(remote, self._resolver.address or self.address) for remote in remotes)
 
     def _handle_reply(self, reply: Reply | Push, now: float) -> None:
         if isinstance(reply, AddedReply | FoundReply | RenewedReply) and reply.hosts != self._served_hosts:
@@ -489,7 +489,7 @@ class MasterSession:
                 self._load.ratio(),
                 offset or (),
             )
-            self._calls.notify(request, callback=partial(self._add_clock_sample, self._clock.now()))
+            self._client.notify(request, callback=partial(self._add_clock_sample, self._clock.now()))
 
     def _add_clock_sample(self, sent: Moment, reply: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
@@ -497,7 +497,7 @@ class MasterSession:
             return
         was_known = self._clock.offset() is not None
         if len(reply.times) != 2:
-            self._calls.rejections.add(_("a reply to a renewal must have two times"))
+            self._client.rejections.add(_("a reply to a renewal must have two times"))
         elif self._clock.add(sent, *reply.times, self._read_at) and not was_known:
             self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
@@ -522,7 +522,7 @@ class MasterSession:
             if len(clock_times) == 2 and is_plausible_clock(clock_times[0] // 2, clock_times[1] // 2)
         }
         if len(differences) < len(reply.clocks):
-            self._calls.rejections.add(_("a reported clock difference is impossible"))
+            self._client.rejections.add(_("a reported clock difference is impossible"))
         return differences
 
     def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:
@@ -548,7 +548,7 @@ class MasterSession:
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
             items = {record.id for record in publishers} | {record.id for record in subscribers}
-            self._calls.notify(request, callback=lambda reply: self._handle_joined(reply, items))
+            self._client.notify(request, callback=lambda reply: self._handle_joined(reply, items))
 
     def _handle_joined(self, reply: Reply, items: set[int]) -> None:
         if not isinstance(reply, FoundReply):

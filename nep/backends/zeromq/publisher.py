@@ -174,7 +174,7 @@ class NativePublisher(HandshakePublisher):
         self._form = encode_form(self._codec, self._flags)
         # `with` is three times faster on the lock than on the condition
         self._lock = threading.Lock()
-        super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
+        super().__init__(threading.Condition(self._lock), self._subscriptions.counts_at_hello)
         self.fd = int(socket.getsockopt(zmq.FD))
         bytes_only = PublishHooks(self, bytes, _reject_payload, None, self.send_now)
         self._send_bytes = self._batch.publish_function(bytes_only, self, self._lock)
@@ -282,7 +282,7 @@ class NativePublisher(HandshakePublisher):
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.flush_locked()
             if self._flags:
-                self._update_subscribers_before_locked(size)
+                self._read_subscriptions_if_needed_locked(size)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
@@ -296,7 +296,7 @@ class NativePublisher(HandshakePublisher):
                 self._send_in_parts_locked(data, size, seq, stamp_ns)
             self._poll_subscriptions_locked(stamp_ns)
 
-    def _update_subscribers_before_locked(self, size: int) -> None:
+    def _read_subscriptions_if_needed_locked(self, size: int) -> None:
         # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
         # order. Without a history only if `_send_all_locked` would read them.
         if self.spec.history > 1 or self._bytes + size >= self._full_path_at:
@@ -318,7 +318,7 @@ class NativePublisher(HandshakePublisher):
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.flush_locked()
             if self._flags:
-                self._update_subscribers_before_locked(size)
+                self._read_subscriptions_if_needed_locked(size)
             number = (
                 shared.write(payload, self._counts_at_hello, time.monotonic())
                 if shared and not self._legacy_filters

@@ -23,9 +23,9 @@ _logger = logging.getLogger("nep")
 
 _MAX_MESSAGES_PER_READ = 50
 """Maximum number of replies read before other sockets are served."""
-_RESEND_S = 0.5
+_RESEND_INTERVAL_S = 0.5
 """Interval in seconds for sending an unanswered request again, for example to a restarted master."""
-_MAX_CALLS = 256
+_MAX_REQUESTS = 256
 
 ReplyCallback = Callable[[Reply], None]
 
@@ -68,7 +68,7 @@ class RpcClient:
         self.address = address
         self._socket = socket
         self._after_use = after_use
-        self._calls: dict[int, PendingRequest] = {}
+        self._requests: dict[int, PendingRequest] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
         self.rejections = RejectionLog()
@@ -90,10 +90,10 @@ class RpcClient:
         self.fd = int(socket.getsockopt(zmq.FD))
 
     @property
-    def has_waiting_calls(self) -> bool:
+    def has_waiting_requests(self) -> bool:
         """True if a thread waits for a reply."""
         with self._changed:
-            return any(call.has_waiter for call in self._calls.values())
+            return any(call.has_waiter for call in self._requests.values())
 
     def connect(self, address: str) -> None:
         """Disconnect from the previous address and connect to `address`. Thread-safe."""
@@ -143,7 +143,9 @@ class RpcClient:
                 _remaining_s(started, timeout_s),
             ):
                 if timeout_s is not None and time.monotonic() - started >= timeout_s:
-                    self._calls = {number: each for number, each in self._calls.items() if each is not call}
+                    self._requests = {
+                        number: each for number, each in self._requests.items() if each is not call
+                    }
                     raise MasterUnreachable(self.address, timeout_s)
                 call.is_sent = False  # requests are idempotent, so they may be resent
                 self._flush_locked()
@@ -216,8 +218,8 @@ class RpcClient:
             call = PendingRequest(encode_request(request, number), is_waited, callback)
             if self._is_closed:
                 return call
-            self._calls[number] = call
-            if len(self._calls) > _MAX_CALLS:
+            self._requests[number] = call
+            if len(self._requests) > _MAX_REQUESTS:
                 self._drop_oldest_locked()
             self._flush_locked()
             events = self._events()
@@ -230,15 +232,15 @@ class RpcClient:
 
     def _drop_oldest_locked(self) -> None:
         # Requests without a waiting thread would pile up while the master hangs.
-        oldest = next((number for number, call in self._calls.items() if not call.has_waiter), None)
+        oldest = next((number for number, call in self._requests.items() if not call.has_waiter), None)
         if oldest is not None:
-            del self._calls[oldest]
+            del self._requests[oldest]
 
     def _flush_locked(self) -> bool:
         # Requests without a waiting thread are dropped if they can't be sent.
         # Returns True if anything was sent.
         has_sent = False
-        for number, call in list(self._calls.items()):
+        for number, call in list(self._requests.items()):
             if call.is_sent or self._is_closed:
                 continue
             try:
@@ -246,14 +248,14 @@ class RpcClient:
                 call.is_sent = has_sent = True
             except zmq.Again:
                 if not call.has_waiter:
-                    del self._calls[number]
+                    del self._requests[number]
         return has_sent
 
     def _read_one_locked(self) -> ReceivedMessage | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
         view_number = call_of_graph_reply(body)
         if view_number is not None:
-            graph_call = self._calls.pop(view_number, None)
+            graph_call = self._requests.pop(view_number, None)
             if graph_call is not None:  # otherwise its request has timed out
                 graph_call.view = body
                 self._changed.notify_all()
@@ -263,7 +265,7 @@ class RpcClient:
         except WireError as error:
             self._reject(error)
             return None
-        call = self._calls.pop(number, None)
+        call = self._requests.pop(number, None)
         if call is None or isinstance(reply, Push):
             return ReceivedMessage(reply, None)
         call.reply = reply
@@ -285,5 +287,5 @@ class RpcClient:
 
 def _remaining_s(started: float, timeout_s: float | None) -> float:
     if timeout_s is None:
-        return _RESEND_S
-    return max(0.0, min(_RESEND_S, started + timeout_s - time.monotonic()))
+        return _RESEND_INTERVAL_S
+    return max(0.0, min(_RESEND_INTERVAL_S, started + timeout_s - time.monotonic()))

@@ -262,7 +262,7 @@ class SubSocket:
         """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
         self._run: _DecodedRun | None = None
-        self._body = self._topic_length + HEADER_BYTES
+        self._payload_offset = self._topic_length + HEADER_BYTES
         """Offset of the payload in a message of one part."""
         # sizes at which a payload can't be told apart from the first part of the next message
         self._ambiguous_sizes = frozenset({0, len(self._topic), len(self._hello)})
@@ -413,7 +413,7 @@ class SubSocket:
             first: First part of the next message, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, buffer.append
-        cut, body = self._topic_length, self._body
+        cut, body = self._topic_length, self._payload_offset
         count, uncounted, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
             while count < max_messages and max_bytes > 0:
@@ -466,7 +466,7 @@ class SubSocket:
 
     def _read_batch(self, first: bytes, buffer: MessageBuffer) -> tuple[int, int]:
         # Returns the number of messages, and how many of them aren't counted yet.
-        body = self._body
+        body = self._payload_offset
         form, size, seq, _stamp_ns, publisher = unpack_header_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
         count = int.from_bytes(first[body : body + 4], "little")
@@ -544,10 +544,12 @@ class SubSocket:
             not source
             or source.last != seq - 1
             or source.shared_form != form
-            or len(first) != self._body + size
+            or len(first) != self._payload_offset + size
         ):
             return None
-        data = self._shared.read(publisher, first[self._body :], may_copy=source.kind.codec == "bytes")
+        data = self._shared.read(
+            publisher, first[self._payload_offset :], may_copy=source.kind.codec == "bytes"
+        )
         if data is None:
             return None
         self.sources.received += 1
@@ -582,10 +584,10 @@ class SubSocket:
             first = self._recv(0 if may_wait else _DONTWAIT)
         except zmq.Again:
             return None
-        if len(first) >= self._body and first.startswith(self._topic):
+        if len(first) >= self._payload_offset and first.startswith(self._topic):
             form, size, seq, stamp_ns, publisher = unpack_header_at(first, self._topic_length)
             source = self.sources.by_id.get(publisher)
-            raw = first[self._body :]
+            raw = first[self._payload_offset :]
             if source and source.form == form and source.last == seq - 1 and len(raw) == size:
                 self.sources.received += 1
                 message = new_message(Message)

@@ -175,8 +175,8 @@ class SocketSubscriber(Generic[R]):
         self._queues_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """Messages read ahead, which precede those of the inbox. Pop from the left, without the lock."""
-        self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
-        self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
+        self._sub_socket: SubSocket | None = readable if isinstance(readable, SubSocket) else None
+        self.payloads: deque[Any] = deque() if self._sub_socket is None else self._sub_socket.payloads
         """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
         self._read_ahead = ReadAhead(spec.max_messages)
@@ -186,7 +186,7 @@ class SocketSubscriber(Generic[R]):
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
         self._io_check_at = _INFINITE
-        self._is_hot = False
+        self._waits_in_socket = False
         self._lock_requests: deque[None] = deque()
         self._waiters: list[Wakeable] = []
         self._waker: Waker | None = None
@@ -213,12 +213,12 @@ class SocketSubscriber(Generic[R]):
         with self._lock:
             if self.is_closed:
                 return None
-            may_wait = self._is_hot and not self._lock_requests and timeout_s >= SHORT_WAIT_S
+            may_wait = self._waits_in_socket and not self._lock_requests and timeout_s >= SHORT_WAIT_S
             message = self._next_locked(may_wait=may_wait)
             if message is not None:
-                self._is_hot = True
+                self._waits_in_socket = True
                 return message
-            self._is_hot = False
+            self._waits_in_socket = False
             # Under the same lock: the socket is empty, so its descriptor signals the next message.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
@@ -244,7 +244,7 @@ class SocketSubscriber(Generic[R]):
                 return None
             message = self._next_locked()
             # after a longer wait the short one would only delay each message
-            self._is_hot = message is not None and time.monotonic() - started_s < SHORT_WAIT_S
+            self._waits_in_socket = message is not None and time.monotonic() - started_s < SHORT_WAIT_S
             return message
 
     # ---- statistics
@@ -405,22 +405,22 @@ class SocketSubscriber(Generic[R]):
 
     def restore(self) -> None:
         """Convert the remaining payloads back to messages. See `SupportsPayloads.restore`."""
-        if self._source is not None:
+        if self._sub_socket is not None:
             with self._requested_lock():
-                self._source.restore(self.ready)
+                self._sub_socket.restore(self.ready)
 
     # ---- with the lock held
 
     def _next_locked(self, *, may_wait: bool = False) -> Message | None:
-        if self._source is not None:
+        if self._sub_socket is not None:
             if self.payloads:
-                self._source.restore(self.ready)
-            self._source.wants_payloads = self.wants_payloads and self._may_exceed_bound
+                self._sub_socket.restore(self.ready)
+            self._sub_socket.wants_payloads = self.wants_payloads and self._may_exceed_bound
         try:
             return self._next_message_locked(may_wait=may_wait)
         finally:
-            if self._source is not None:
-                self._source.wants_payloads = False  # applies to the current reader only
+            if self._sub_socket is not None:
+                self._sub_socket.wants_payloads = False  # applies to the current reader only
 
     def _next_message_locked(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
@@ -432,8 +432,8 @@ class SocketSubscriber(Generic[R]):
             self._io.serve_soon(self)
         if self._queues_all and not self.ready and not self._inbox.messages:
             span, self._read_at = now - self._read_at, now
-            if span > self._read_ahead.span_s:
-                if self._read_ahead.now > 1:
+            if span > self._read_ahead.max_interval_s:
+                if self._read_ahead.message_count > 1:
                     self._read_ahead.reset()
                 message = self._read(self.ready, may_wait=may_wait)
                 return self._drop_excess_locked(message) if self.ready else message

@@ -27,7 +27,7 @@ class Subscriptions:
     """
 
     def __init__(self, topic: str, publisher: int) -> None:
-        self.seen: dict[int, int] = {}
+        self.counts_at_hello: dict[int, int] = {}
         """Number of messages at the hello of each connected subscriber, by id."""
         self.hellos: dict[int, bytes] = {}
         """First part of messages addressed to one subscriber alone, by its id."""
@@ -47,7 +47,7 @@ class Subscriptions:
     @property
     def has_subscribers(self) -> bool:
         """True if any subscriber is connected."""
-        return bool(self.seen or self.legacy_filters)
+        return bool(self.counts_at_hello or self.legacy_filters)
 
     @property
     def all_accept_batches(self) -> bool:
@@ -57,11 +57,11 @@ class Subscriptions:
     @property
     def all_acknowledge(self) -> bool:
         """True if all current subscribers acknowledge messages."""
-        return not self.legacy_filters and len(self.windows) == len(self.seen)
+        return not self.legacy_filters and len(self.windows) == len(self.counts_at_hello)
 
     def clear(self) -> None:
         """Remove all subscribers that have sent a hello."""
-        self.seen.clear()
+        self.counts_at_hello.clear()
         self.hellos.clear()
         self.windows.clear()
         self._remote_connections.clear()
@@ -110,14 +110,14 @@ class Subscriptions:
         return read is not None or shares is not None
 
     def _add_subscriber(self, hello: Hello, subscription: bytes, count: int) -> bytes | None:
-        if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
+        if len(self.counts_at_hello) >= MAX_SUBSCRIBERS and hello.subscriber not in self.counts_at_hello:
             self._reject(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
             return None
         if hello.reads_one_part:  # its plain filter was counted before
             remaining = self.legacy_filters.pop(self._topic, 0) - 1
             if remaining > 0:
                 self.legacy_filters[self._topic] = remaining
-        self.seen[hello.subscriber] = count
+        self.counts_at_hello[hello.subscriber] = count
         self.hellos[hello.subscriber] = subscription
         self.windows.pop(hello.subscriber, None)
         if self.shared is not None:
@@ -144,7 +144,7 @@ class Subscriptions:
                 connection.close()
 
     def _remove_subscriber(self, subscriber: int) -> None:
-        self.seen.pop(subscriber, None)
+        self.counts_at_hello.pop(subscriber, None)
         self.hellos.pop(subscriber, None)
         self.windows.pop(subscriber, None)
         self._remote_connections.pop(subscriber, None)

@@ -44,7 +44,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import ExpectedSubscriber, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import MAX_SUBSCRIPTION_BYTES
 from nep.system.descriptors import check_free_descriptors
-from nep.system.forks import close_in_child, watch
+from nep.system.forks import close_in_child, notify_after_fork
 from nep.system.wakeup import Waker
 
 DIRECT_WAIT_S = 0.3
@@ -134,9 +134,9 @@ class ZeromqTransport:
         self._is_closed = False
         self._is_terminated = False
         self._services = ZeromqServices(self._shared, self._session, node.name)
-        self._attached: dict[int, str] = {}
+        self._direct_endpoints: dict[int, str] = {}
         """Endpoints of direct connections, by the id of their publisher or subscriber."""
-        watch(self)
+        notify_after_fork(self)
 
     # ---- publishers
 
@@ -193,7 +193,7 @@ class ZeromqTransport:
             socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
             publisher = OriginalPublisher(socket, spec, direct, closer)
         with close_on_error(publisher.release):
-            self._attached[spec.id] = attach(socket, direct, is_publisher=True)
+            self._direct_endpoints[spec.id] = attach(socket, direct, is_publisher=True)
             self._add_publisher(publisher)
         try:
             publisher.wait_for_any(DIRECT_WAIT_S)
@@ -218,7 +218,7 @@ class ZeromqTransport:
         def close(publisher: OwnedPublisher, timeout_s: float) -> None:
             with self._lock:
                 self._publishers.pop(publisher.spec.id, None)
-                self._attached.pop(publisher.spec.id, None)
+                self._direct_endpoints.pop(publisher.spec.id, None)
             unregister()
             publisher.send_bye()
             publisher.finish(time.monotonic() + timeout_s)
@@ -267,7 +267,7 @@ class ZeromqTransport:
                 )
             subscriber.connect_listed(reply.publishers)
             if isinstance(subscriber, NativeSubscriber):
-                self._serve(io, subscriber)
+                self._start_serving(io, subscriber)
             with self._waker() as waker:
                 subscriber.wait_for(
                     (each.publisher.id for each in reply.publishers), HANDSHAKE_TIMEOUT_S, waker
@@ -290,10 +290,10 @@ class ZeromqTransport:
         else:
             subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._discard_subscriber)
         with close_on_error(socket.close):
-            self._attached[spec.id] = attach(socket, direct, is_publisher=False)
+            self._direct_endpoints[spec.id] = attach(socket, direct, is_publisher=False)
             self._add_subscriber(subscriber)
         try:
-            self._serve(io, subscriber)
+            self._start_serving(io, subscriber)
             if isinstance(subscriber, NativeSubscriber):
                 with self._waker() as waker:
                     subscriber.wait_for_any(DIRECT_WAIT_S, waker)
@@ -318,7 +318,7 @@ class ZeromqTransport:
             self._check_open_locked()
             self._subscribers[subscriber.spec.id] = subscriber
 
-    def _serve(self, io: IoThread, subscriber: SocketSubscriber[Any]) -> None:
+    def _start_serving(self, io: IoThread, subscriber: SocketSubscriber[Any]) -> None:
         # Raises `ClosedError` if the subscriber was closed meanwhile.
         with self._lock:
             if subscriber.spec.id not in self._subscribers:
@@ -350,7 +350,7 @@ class ZeromqTransport:
     def _discard_subscriber(self, subscriber: int) -> None:
         with self._lock:
             self._subscribers.pop(subscriber, None)
-            self._attached.pop(subscriber, None)
+            self._direct_endpoints.pop(subscriber, None)
 
     # ---- services
 
@@ -485,7 +485,7 @@ class ZeromqTransport:
                 self._io.remove(publisher)
                 publisher.flush(deadline)
         for session in sessions:
-            session.leave(min(_LEAVE_TIMEOUT_S, timeout_s))
+            session.finish_leave(min(_LEAVE_TIMEOUT_S, timeout_s))
         for subscriber in subscribers:
             subscriber.close()
         self._services.close(max(0.0, deadline - time.monotonic()))
@@ -511,7 +511,7 @@ class ZeromqTransport:
 
     def forked(self) -> None:
         """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
-        close_in_child(*self._attached.values())
+        close_in_child(*self._direct_endpoints.values())
         self._services.forked()
         for session in self._sessions.values():
             close_in_child(session.endpoint)

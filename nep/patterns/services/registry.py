@@ -201,7 +201,9 @@ class ServiceRegistry:
     @property
     def queues(self) -> list[CallQueue]:
         """Queues of the calls that the spinning thread serves."""
-        return [queue for each in self._servers if (queue := each.spun) is not None and not each.is_closed]
+        return [
+            queue for each in self._servers if (queue := each.spin_queue) is not None and not each.is_closed
+        ]
 
     def run(self, node_ends: threading.Event) -> bool:
         """Serve one call per server in the spinning thread; return True if a call was served.
@@ -213,7 +215,7 @@ class ServiceRegistry:
         for server in self._servers:
             if node_ends.is_set():
                 break
-            if server.spun is not None and not server.is_closed:
+            if server.spin_queue is not None and not server.is_closed:
                 has_run = server.run_one() or has_run
         return has_run
 

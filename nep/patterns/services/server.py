@@ -108,7 +108,7 @@ class Server:
         return self._transport.is_closed
 
     @property
-    def spun(self) -> CallQueue | None:
+    def spin_queue(self) -> CallQueue | None:
         """Queue of the calls that the spinning thread serves; None without a callback or with own threads."""
         return self._transport.calls if self._callback is not None and not self._threads else None
 

@@ -60,11 +60,11 @@ class Alarms:
         """
         self.evaluator = AlarmEvaluator(rules, clock=clock, clock_s=clock_s)
         self.history = history if history is not None else AlarmHistory()
-        self._carriers = dict(carriers or {})
+        self._action_starters = dict(carriers or {})
         self._clock, self._clock_s = clock, clock_s
         self._results: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
         self._retries: dict[tuple[str, str], _Retry] = {}
-        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_ACTION_RESULTS)
+        self._action_results: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_ACTION_RESULTS)
         self._running_count = 0
         self.revision = 0
         """Number of changes to the rules so far."""
@@ -123,8 +123,8 @@ class Alarms:
         Returns:
             Tuples of the rule, the result as text, and the time of completion (s since 1970).
         """
-        deeds = list(self._deeds)
-        self._deeds.clear()
+        deeds = list(self._action_results)
+        self._action_results.clear()
         return deeds
 
     def tick(self) -> list[AlarmEvent]:
@@ -157,7 +157,7 @@ class Alarms:
                 self._start_action(event, action, 1)
 
     def _start_action(self, event: AlarmEvent, action: AlarmAction, tries: int) -> None:
-        carrier = self._carriers.get(action.kind)
+        carrier = self._action_starters.get(action.kind)
         self._running_count += 1
         if carrier is None:
             self._results.put((event, action, MAX_TRIES, False, _("this action isn't available here")))
@@ -177,7 +177,7 @@ class Alarms:
         for _number in range(self._results.qsize()):
             event, action, tries, is_ok, text = self._results.get()
             self._running_count -= 1
-            self._deeds.append((event.rule, text, self._clock_s()))
+            self._action_results.append((event.rule, text, self._clock_s()))
             record = self.history.last(event.rule.id)
             if record is None:
                 continue

@@ -127,7 +127,7 @@ class AlarmEvaluator:
         self._sampled_at = 0.0
         self.skipped = 0
         """Number of large messages that were not decoded."""
-        self.came = threading.Event()
+        self.has_events = threading.Event()
         """Event that is set when a message turned an alarm on, to wake the thread that calls `tick`."""
         self.set_rules(rules)
 
@@ -205,7 +205,7 @@ class AlarmEvaluator:
                         self._emit(track, transition)
                         is_news = True
         if is_news:
-            self.came.set()
+            self.has_events.set()
 
     def update_graph(self, view: GraphView | None) -> None:
         """Evaluate a new snapshot of the graph.
@@ -268,7 +268,7 @@ class AlarmEvaluator:
         """
         now, now_s = self._clock(), self._clock_s()
         with self._lock:
-            self.came.clear()
+            self.has_events.clear()
             if now - self._sampled_at >= _SAMPLE_PERIOD_S:
                 self._sampled_at = now
                 for subscription in self._subscribed.values():

@@ -18,7 +18,7 @@ class TopicLosses:
     """
 
     def __init__(self) -> None:
-        self._before: dict[int, tuple[int, int]] = {}
+        self._previous_counts: dict[int, tuple[int, int]] = {}
         self._samples: deque[tuple[float, int, int]] = deque(maxlen=_MAX_SAMPLES)
         self._has_counts = False
 
@@ -36,11 +36,11 @@ class TopicLosses:
         }
         lost = received = 0
         for id, (lost_now, received_now) in counts.items():
-            if id in self._before:
-                lost_then, received_then = self._before[id]
+            if id in self._previous_counts:
+                lost_then, received_then = self._previous_counts[id]
                 lost += max(0, lost_now - lost_then)
                 received += max(0, received_now - received_then)
-        self._before = counts
+        self._previous_counts = counts
         self._has_counts = self._has_counts or bool(counts)
         if self._samples and now - self._samples[-1][0] < _SAMPLE_PERIOD_S:
             sampled_at, lost_before, received_before = self._samples[-1]

@@ -145,7 +145,7 @@ class RuleProblem(NamedTuple):
 class _RuleChecker:
     problems: list[RuleProblem] = field(default_factory=list)
 
-    def number(self, key: str, value: object, minimum: float, maximum: float) -> None:
+    def check_number(self, key: str, value: object, minimum: float, maximum: float) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float) or not minimum <= value <= maximum:
             template = _("must be a number from {least:g} to {most:g}")
             self.problems.append(RuleProblem(key, template.format(least=minimum, most=maximum)))
@@ -176,7 +176,7 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
     """Return the first problem of a rule, or None if it is valid."""
     check = _RuleChecker()
     _check_condition(rule.condition, check)
-    check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
+    check.check_number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
         template = _("an alarm can have at most {most} actions; split it into two alarms")
         check.problems.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
@@ -210,23 +210,23 @@ def _check_condition(condition: AlarmCondition, check: _RuleChecker) -> None:
 def _check_limit(condition: AlarmCondition, check: _RuleChecker) -> None:
     limit = condition.limit
     if condition.kind in {"rate_below", "rate_above"}:
-        check.number("than", limit, 0.001, 1e6)
+        check.check_number("than", limit, 0.001, 1e6)
     elif condition.kind == "loses":
-        check.number("than", limit, 0, 100)
+        check.check_number("than", limit, 0, 100)
     elif condition.kind in NUMBER_KINDS:
-        check.number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
+        check.check_number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
     elif condition.kind in KINDS_WITH_LIMIT and not _is_scalar(limit):
         check.problems.append(RuleProblem("than", _("must be a number, a string, true, false or null")))
-    check.number("margin", condition.margin, 0, _MAX_NUMBER)
+    check.check_number("margin", condition.margin, 0, _MAX_NUMBER)
 
 
 def _check_time(condition: AlarmCondition, check: _RuleChecker) -> None:
     if condition.kind == "silent":
-        check.number("for_s", condition.for_s, MIN_S, MAX_S)
+        check.check_number("for_s", condition.for_s, MIN_S, MAX_S)
     elif condition.kind == "loses":
-        check.number("for_s", condition.for_s, 1, MAX_WINDOW_S)
+        check.check_number("for_s", condition.for_s, 1, MAX_WINDOW_S)
     else:
-        check.number("for_s", condition.for_s, 0, MAX_S)
+        check.check_number("for_s", condition.for_s, 0, MAX_S)
 
 
 def _check_action(action: AlarmAction, check: _RuleChecker) -> None:
@@ -237,7 +237,7 @@ def _check_action(action: AlarmAction, check: _RuleChecker) -> None:
     elif action.kind == "send":
         check.check_name("send", check_topic, action.name)
     elif action.kind == "keep":
-        check.number("keep_s", action.recording_s, 1, MAX_WINDOW_S)
+        check.check_number("keep_s", action.recording_s, 1, MAX_WINDOW_S)
 
 
 def _is_scalar(value: object) -> bool:

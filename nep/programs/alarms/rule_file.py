@@ -142,7 +142,7 @@ def parse_alarms(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
             "prints an example"
         )
         raise NepError(template.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
-    return _Reader(path, text, lenient=lenient).file(json.loads(text))
+    return _Reader(path, text, lenient=lenient).parse(json.loads(text))
 
 
 def encode_alarms(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
@@ -209,9 +209,9 @@ class _Reader:
         self._path, self._text, self._lenient = path, text, lenient
         self._spans: list[tuple[int, int]] | None = None
 
-    def file(self, value: object) -> AlarmFile:
+    def parse(self, value: object) -> AlarmFile:
         try:
-            alarms = self._root(value)
+            alarms = self._alarm_list(value)
         except _InvalidAlarmError as error:
             raise NepError(str(error)) from None
         rules: list[AlarmRule] = []
@@ -235,7 +235,7 @@ class _Reader:
                 rules.append(rule)
         return AlarmFile(tuple(rules), self._history(value), tuple(problems))
 
-    def _root(self, value: object) -> list[object]:
+    def _alarm_list(self, value: object) -> list[object]:
         if not isinstance(value, dict):
             self._fail("", _('not an alarm file; it must begin with {"format": 1, "alarms": ['))
         version = value.get("format", FORMAT_VERSION)

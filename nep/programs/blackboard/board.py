@@ -160,7 +160,7 @@ class Blackboard:
         self._timer_at = math.inf
         self.changes_dropped = 0
         """Number of changes that were not passed to callbacks, because the node doesn't spin fast enough."""
-        forks.watch(self)
+        forks.notify_after_fork(self)
 
     # ---- writing
 

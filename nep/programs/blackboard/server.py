@@ -68,7 +68,7 @@ class BlackboardServer:
             node.new_server(service_name(name, operation), handler)
             for operation, handler in (("get", self._get), ("set", self._set), ("keys", self._keys))
         ]
-        self._end = board.on_change("**", self._publish_change)
+        self._remove_callback = board.on_change("**", self._publish_change)
 
     def _publish_change(self, change: BlackboardChange) -> None:
         change_map = {"blackboard": self._name, "cause": change.cause, **_entry_to_map(change.entry)}
@@ -124,7 +124,7 @@ class BlackboardServer:
 
     def close(self) -> None:
         """Stop publishing and serving; the blackboard stays open. Idempotent."""
-        self._end()
+        self._remove_callback()
         for server in self._servers:
             server.close()
         self._changes.close()

@@ -53,7 +53,7 @@ class MessageMapping:
         each: str = "",
     ) -> None:
         self._key = None if key is None else parse_key(key)
-        self._has_holes = any(_PLACEHOLDER.search(name) for name in self._key or ())
+        self._has_placeholders = any(_PLACEHOLDER.search(name) for name in self._key or ())
         self._list_path = parse_key(each) if each else ()
         if isinstance(fields, str):
             raise WrongTypeError(_("'fields' must be a list of names, not a string"))
@@ -79,7 +79,7 @@ class MessageMapping:
                     )
                 )
             return entries
-        return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
+        return payload if self._has_placeholders and isinstance(payload, list | tuple) else (payload,)
 
     def perceived_values(self, topic: str, item: object) -> Iterator[PerceivedValue]:
         """Yield the values of an item with their keys. Fields that the item lacks are skipped.
@@ -114,7 +114,7 @@ class MessageMapping:
                 yield name, value
 
     def _key_for(self, item: object) -> Key:
-        if not self._has_holes:
+        if not self._has_placeholders:
             return self._key or ()
         return tuple(
             _PLACEHOLDER.sub(lambda found: _name_from_field(item, found[1]), name) for name in self._key or ()
@@ -166,7 +166,7 @@ class BlackboardWatch:
         """Number of messages that could not be decoded or stored completely; the reason is logged."""
         self.problem = ""
         """Reason why the last message was rejected; "" if it was stored."""
-        self._reading = reading
+        self._mapping = reading
         self._store = store
         self._is_pattern = is_pattern
         self._subscriber: Subscriber | None = None
@@ -199,9 +199,9 @@ class BlackboardWatch:
             return
         self.received += 1
         problem: NepError | None = None
-        for item in self._reading.items(payload):
+        for item in self._mapping.items(payload):
             try:
-                self._store(message, tuple(self._reading.perceived_values(message.topic, item)))
+                self._store(message, tuple(self._mapping.perceived_values(message.topic, item)))
             except NepError as error:
                 problem = error  # the other items are stored
         if problem is not None:

@@ -61,7 +61,7 @@ class Bridge:
         self.configuration = configuration
         self.id = secrets.token_hex(8)
         self._own_publisher_ids: set[int] = set()
-        self._echoes: dict[tuple[SideName, str], LoopGuard] = {}
+        self._loop_guards: dict[tuple[SideName, str], LoopGuard] = {}
         self._lock = threading.Lock()
         self._pacer = Pacer(f"bridge-{configuration.name}-pace")
         self._routes: tuple[Route, ...] = ()
@@ -125,7 +125,7 @@ class Bridge:
         deadline = time.monotonic() + timeout_s
         while not all(side.is_guard_ready for side in self.sides.values()) and time.monotonic() < deadline:
             self._closed.wait(_WAIT_SLICE_S)
-        refusals = (each.denial_reason for each in self._routes if not each.is_found)
+        refusals = (each.denial_reason for each in self._routes if not each.is_from_pattern)
         return tuple(dict.fromkeys(filter(None, refusals)))
 
     def status(self) -> dict[str, object]:
@@ -174,12 +174,12 @@ class Bridge:
                 pacer=self._pacer,
                 max_rate_hz=topic.max_rate_hz,
             )
-            route.is_found = topic.is_pattern
+            route.is_from_pattern = topic.is_pattern
             self._routes = (*self._routes, route)
 
     def _route_end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
         side_configuration, end = self.configuration.side(side), topic.end(side)
-        echoes = self._echoes.setdefault((side, name), LoopGuard())
+        echoes = self._loop_guards.setdefault((side, name), LoopGuard())
         guard = self.sides[side].guard
         return RouteEnd(
             side,
@@ -192,7 +192,7 @@ class Bridge:
             guard,
         )
 
-    def find(self, side: BridgeSide, view: GraphView) -> None:
+    def on_graph(self, side: BridgeSide, view: GraphView) -> None:
         """Create routes for published topics that match a pattern, and remove idle ones.
 
         Called with each new graph of a side, in the side's thread.
@@ -221,7 +221,7 @@ class Bridge:
 
     def _close_idle_routes(self, side: BridgeSide, view: GraphView, now: float) -> None:
         for route in self._routes:
-            if not route.is_found or route.origin.side != side.name:
+            if not route.is_from_pattern or route.origin.side != side.name:
                 continue
             if published_type(view, route.origin.topic, self.own_nodes):
                 route.idle_since = None

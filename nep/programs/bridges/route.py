@@ -158,7 +158,7 @@ class Route:
     ) -> None:
         self.origin = origin
         self.end = end
-        self.is_found = False
+        self.is_from_pattern = False
         """True if the route was created by a pattern."""
         self.idle_since: float | None = None
         """Time (monotonic, s) since which the topic has no publisher except bridges; None if it has one."""

@@ -37,7 +37,7 @@ class SideOwner(Protocol):
     def routes(self) -> tuple[Route, ...]:
         """All routes in both directions."""
 
-    def find(self, side: BridgeSide, view: GraphView) -> None:
+    def on_graph(self, side: BridgeSide, view: GraphView) -> None:
         """Create and remove the routes of a side, given its new graph."""
 
     def status(self) -> dict[str, object]:
@@ -169,7 +169,7 @@ class BridgeSide:
             self.guard.update_graph(view)
         self.view = view
         self.poll_count += 1
-        owner.find(self, view)
+        owner.on_graph(self, view)
         for route in owner.routes:
             if route.origin.side == self.name:
                 route.close_stale_publishers(view, time.monotonic())

@@ -80,12 +80,12 @@ class LoopGuard:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._sent: OrderedDict[bytes, tuple[int, float]] = OrderedDict()
-        self._are_needed = True
+        self._is_enabled = True
 
     def disable(self) -> None:
         """Disable the guard, because the network identifies publishers."""
-        if self._are_needed:
-            self._are_needed = False
+        if self._is_enabled:
+            self._is_enabled = False
             with self._lock:
                 self._sent.clear()
 
@@ -96,7 +96,7 @@ class LoopGuard:
             data: Encoded payload.
             now: Monotonic time in seconds.
         """
-        if self._are_needed:
+        if self._is_enabled:
             key = _digest(data)
             with self._lock:
                 count, _at = self._sent.pop(key, (0, 0.0))

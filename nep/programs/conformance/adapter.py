@@ -98,7 +98,7 @@ class Adapter:
     """
 
     def __init__(self, lines: AdapterStreams) -> None:
-        self.lines = lines
+        self.streams = lines
         self.events: list[Mapping[str, Any]] = []
         """Messages received by the adapter's subscribers, in the order of the events."""
         self._replies: dict[int, Mapping[str, Any]] = {}
@@ -110,7 +110,7 @@ class Adapter:
 
     def _read(self) -> None:
         with suppress(OSError, ValueError):  # closed by `stop`
-            while line := self.lines.output.readline(_MAX_LINE_BYTES):
+            while line := self.streams.output.readline(_MAX_LINE_BYTES):
                 self._incoming.append(line)
         self._incoming.append(None)
 
@@ -130,8 +130,8 @@ class Adapter:
         self._count += 1
         line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
         try:
-            self.lines.input.write(line)
-            self.lines.input.flush()
+            self.streams.input.write(line)
+            self.streams.input.flush()
         except (OSError, ValueError) as error:
             raise AdapterError(_("can't write to the adapter: {error}").format(error=error)) from error
         return self._count
@@ -173,5 +173,5 @@ class Adapter:
 
     def stop(self) -> None:
         """Stop the adapter and the reading thread."""
-        self.lines.stop()
+        self.streams.stop()
         self._reader.join(5.0)

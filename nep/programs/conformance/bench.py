@@ -131,9 +131,9 @@ class Bench:
         Raises:
             AdapterError: The adapter reported an error, exited or did not reply.
         """
-        return self.finish(self.adapter.send_request(do, **members), do)
+        return self.wait_for_reply(self.adapter.send_request(do, **members), do)
 
-    def finish(self, number: int, do: str) -> Mapping[str, Any]:
+    def wait_for_reply(self, number: int, do: str) -> Mapping[str, Any]:
         """Wait for the reply to a request that `Adapter.send_request` sent, and return the reply.
 
         Args:
@@ -368,7 +368,7 @@ class Bench:
 
     def clear(self) -> None:
         """Close all publishers and subscribers that a rule opened; the adapter keeps running."""
-        self.master.change = lambda _request, reply: reply
+        self.master.reply_filter = lambda _request, reply: reply
         self.connect_delay_s = 0.0
         self._connecting.clear()
         for peer in self._peers():

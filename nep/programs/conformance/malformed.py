@@ -48,13 +48,13 @@ def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
     ):
         yield "extension", [first, _header(flags=EXTENSION), b"{}", part]
     yield "extension", [first, _header(flags=EXTENSION), b"{}", b"\x81\xa1a" + b"\x91" * 100 + b"\xc0"]
-    yield from _batches(first)
+    yield from _malformed_batches(first)
     for codec in (0, 6, 99, 255):
         yield "codec", [first, _header(codec), b"{}"]
         yield "codec", [first + _header(codec) + b"{}"]
 
 
-def _batches(first: bytes) -> Iterator[tuple[str, list[bytes]]]:
+def _malformed_batches(first: bytes) -> Iterator[tuple[str, list[bytes]]]:
     valid_batch = struct.pack("<IIQ", 1, 2, 1) + b"{}"
     yield "batch-form", [first, _header(flags=BATCH, size=len(valid_batch)), valid_batch]
     yield "batch-form", [first + _header(flags=BATCH | LATCHED, size=len(valid_batch)) + valid_batch]

@@ -20,7 +20,7 @@ from nep.protocol.wire import (
     HEADER_BYTES,
     Header,
     Hello,
-    Parts,
+    ParsedMessage,
     encode_form,
     hello_part,
     parse_hello,
@@ -35,7 +35,7 @@ def new_node(name: str) -> NodeRecord:
 
 
 @dataclass(frozen=True)
-class Filter:
+class FilterChange:
     """Change of a subscription filter, received by an XPUB socket.
 
     Attributes:
@@ -87,7 +87,7 @@ class ScriptedPublisher:
             secrets.randbits(62) | 1, topic, msg_type, self.codec.name, (f"tcp://127.0.0.1:{port}",)
         )
         self.seq = 0
-        self.filters: list[Filter] = []
+        self.filters: list[FilterChange] = []
         self.hellos: dict[bytes, Hello] = {}
         """Current hellos for the publisher's topic, by filter."""
         self.echoed_at: float | None = None
@@ -109,7 +109,7 @@ class ScriptedPublisher:
         self._replace_socket()
         bind_again(self.socket, endpoint)
 
-    def bind_elsewhere(self) -> None:
+    def bind_other_port(self) -> None:
         """Close all connections and bind to another port."""
         self._replace_socket()
         port = self.socket.bind_to_random_port("tcp://127.0.0.1")
@@ -125,7 +125,7 @@ class ScriptedPublisher:
         while not self.socket.closed and self.socket.poll(0):
             event = self.socket.recv()
             now = time.monotonic()
-            noted = Filter(now, event[:1] == b"\1", event[1:])
+            noted = FilterChange(now, event[:1] == b"\1", event[1:])
             self.filters.append(noted)
             hello = parse_hello(noted.prefix)
             if hello is None or hello.topic != self.topic:
@@ -266,7 +266,7 @@ class ScriptedSubscriber:
         return [parts for parts in self.received if parts[0] != self.hello]
 
     @property
-    def messages(self) -> list[Parts]:
+    def messages(self) -> list[ParsedMessage]:
         """Received messages of the subscriber's topic, with batches split into their messages.
 
         Raises `WireError` for malformed parts.

@@ -71,7 +71,7 @@ class ScriptedMaster:
         self._on_push = on_push
         self._encoder = ReplyEncoder()
         self.received: list[RecordedRequest] = []
-        self.change: ReplyFilter = lambda _request, reply: reply
+        self.reply_filter: ReplyFilter = lambda _request, reply: reply
         self.port = 0
         self._socket: zmq.Socket[bytes] | None = None
         self.start()
@@ -117,7 +117,7 @@ class ScriptedMaster:
             if message.call is None:
                 self._push(message)
 
-    def drop(self, node_id: str) -> None:
+    def expire_lease(self, node_id: str) -> None:
         """Remove a node from the graph, as if its lease had expired."""
         for message in self.graph.unregister_nodes([node_id]):
             self._push(message)
@@ -165,7 +165,7 @@ class ScriptedMaster:
 
     def _reply(self, request: RecordedRequest, message: OutgoingMessage) -> None:
         encoded = self._encoder.encode(message.body, message.call or 0)
-        reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
+        reply = self.reply_filter(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
             self._send(message.to, msgpack.packb(reply))
 

@@ -30,7 +30,7 @@ from nep.programs.doctor.facts import (
 )
 from nep.programs.doctor.finding import Finding
 from nep.programs.doctor.listen import probe_endpoint
-from nep.programs.doctor.network import loopback, masters
+from nep.programs.doctor.network import loopback_findings, master_findings
 from nep.programs.gateway.portmap import default_file
 from nep.protocol.graph_view import GraphView
 from nep.system import descriptors
@@ -96,7 +96,7 @@ def collect_in_steps(
     facts = replace(facts, loopback_problem=loopback_problem())
     yield ("loopback",), facts
     state = (_("Ports of programs of the original NEP"), default_file(0).parent)
-    facts = replace(facts, folders=tuple(_folder(purpose, path) for purpose, path in (state, *folders)))
+    facts = replace(facts, folders=tuple(_folder_fact(purpose, path) for purpose, path in (state, *folders)))
     yield ("folders",), facts
     facts = replace(
         facts,
@@ -110,12 +110,12 @@ def collect_in_steps(
     facts, master_pid, listening = _collect_master(facts)
     yield ("masters", "alerts", "clocks"), facts
     joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF_VALUES
-    ports = tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORT_PURPOSES.items())
+    ports = tuple(_port_fact(port, purpose, listening, master_pid) for port, purpose in PORT_PURPOSES.items())
     facts = replace(facts, ports=ports, is_gateway_enabled=joins)
     yield ("ports", "originals"), facts
     holder = facts.master_port.holder if facts.master_port is not None else None
     facts = replace(
-        facts, files=_files(holder.pid if holder is not None and holder.is_master else master_pid)
+        facts, files=_file_fact(holder.pid if holder is not None and holder.is_master else master_pid)
     )
     yield ("files",), facts
     yield ("programs",), replace(facts, programs=tuple(_programs(facts.view)))
@@ -126,7 +126,7 @@ def _collect_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int |
     number = int(address.rpartition(":")[2])
     view, answered_s, is_known = _query_graph(address)
     listening = processes.listening_ports()
-    master_port = _port(number, "the master's", listening) if _is_own_address(address) else None
+    master_port = _port_fact(number, "the master's", listening) if _is_own_address(address) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     elsewhere = view is None and master_port is not None and master_port.is_taken
@@ -160,11 +160,11 @@ def start_blocker(address: str | None = None) -> Finding | None:
     resolved_address = master_address(address)
     facts = Facts(time.time(), resolved_address, sys.platform, {}, "", loopback_problem=loopback_problem())
     if is_loopback(resolved_address):
-        port = _port(int(resolved_address.rpartition(":")[2]), "", processes.listening_ports())
+        port = _port_fact(int(resolved_address.rpartition(":")[2]), "", processes.listening_ports())
         facts = replace(facts, master_port=port)
     else:
         facts, *_more = _collect_master(facts)
-    for finding in (*loopback(facts), *masters(facts)):
+    for finding in (*loopback_findings(facts), *master_findings(facts)):
         if finding.severity == "error" and finding.id != "master:none":
             return finding
     return None
@@ -189,7 +189,7 @@ def _is_own_address(address: str) -> bool:
     return host in own_addresses
 
 
-def _port(
+def _port_fact(
     port: int, purpose: str, listening: Mapping[int, int | None], master_pid: int | None = None
 ) -> PortFact:
     if port in listening:
@@ -234,7 +234,7 @@ def _shadowing_file(folder: Path, package: Path) -> str:
     return ""
 
 
-def _files(master_pid: int | None) -> FileFact:
+def _file_fact(master_pid: int | None) -> FileFact:
     opened = limit = None
     if master_pid is not None:
         opened, limit = processes.open_files(master_pid)
@@ -264,7 +264,7 @@ def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
             yield ProgramFact(pid, name, opened, limit)
 
 
-def _folder(purpose: str, path: Path) -> FolderFact:
+def _folder_fact(purpose: str, path: Path) -> FolderFact:
     existing = path
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent

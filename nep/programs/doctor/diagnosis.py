@@ -10,8 +10,14 @@ from typing import Literal
 from nep.i18n import _
 from nep.programs.doctor.facts import Facts, FolderFact, PackageFact
 from nep.programs.doctor.finding import Finding, Severity
-from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, original_programs
-from nep.programs.doctor.original_ports import ports
+from nep.programs.doctor.network import (
+    alert_findings,
+    loopback_findings,
+    master_findings,
+    original_program_findings,
+    remote_clock_findings,
+)
+from nep.programs.doctor.original_ports import port_findings
 
 MIN_FILES = 1024
 FILES_WARNING_RATIO = 0.8
@@ -233,16 +239,16 @@ def _version_findings(facts: Facts) -> Iterator[Finding]:
 
 
 CHECKS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
-    "loopback": loopback,
-    "masters": masters,
-    "ports": ports,
+    "loopback": loopback_findings,
+    "masters": master_findings,
+    "ports": port_findings,
     "packages": _package_findings,
-    "originals": original_programs,
-    "alerts": master_alerts,
+    "originals": original_program_findings,
+    "alerts": alert_findings,
     "files": _file_findings,
     "programs": _program_findings,
     "folders": _folder_findings,
-    "clocks": clocks,
+    "clocks": remote_clock_findings,
     "clock": _clock_findings,
     "versions": _version_findings,
 }

@@ -14,7 +14,7 @@ UNSUPPORTED_VERSIONS = ("0.5.4.6", "0.5.4.7")
 _NATIVE_GENERATIONS = {"native", "gateway"}
 
 
-def loopback(facts: Facts) -> Iterator[Finding]:
+def loopback_findings(facts: Facts) -> Iterator[Finding]:
     """Check that programs on this computer can reach each other."""
     if facts.loopback_problem:
         yield Finding(
@@ -30,7 +30,7 @@ def loopback(facts: Facts) -> Iterator[Finding]:
         yield Finding("loopback", "ok", _("Programs on this computer can reach each other (127.0.0.1)."))
 
 
-def masters(facts: Facts) -> Iterator[Finding]:
+def master_findings(facts: Facts) -> Iterator[Finding]:
     """Check that exactly one master is running and replies."""
     port = facts.master_port
     holder = port.holder if port is not None else None
@@ -243,7 +243,7 @@ def _multiple_masters_findings(facts: Facts) -> Iterator[Finding]:
     )
 
 
-def original_programs(facts: Facts) -> Iterator[Finding]:
+def original_program_findings(facts: Facts) -> Iterator[Finding]:
     """Report programs of the original NEP, including versions that the gateway can't serve."""
     if facts.view is None:
         return
@@ -262,7 +262,7 @@ def original_programs(facts: Facts) -> Iterator[Finding]:
         yield Finding("originals", "info", template.format(count=len(served), names=names))
 
 
-def master_alerts(facts: Facts) -> Iterator[Finding]:
+def alert_findings(facts: Facts) -> Iterator[Finding]:
     """Report the alerts of the master, except those about ports, which `port_findings` checks."""
     if facts.view is None:
         return
@@ -272,7 +272,7 @@ def master_alerts(facts: Facts) -> Iterator[Finding]:
             yield Finding(alert.id, "warning", message, alert.hint)
 
 
-def clocks(facts: Facts) -> Iterator[Finding]:
+def remote_clock_findings(facts: Facts) -> Iterator[Finding]:
     """Report computers whose clocks are ahead of this computer's clock."""
     for clock in facts.clocks:
         yield Finding(

@@ -13,7 +13,7 @@ AIRPLAY_PORT = 7000
 _AIRPLAY_PROCESSES = ("ControlCe", "AirPlay", "rapportd")
 
 
-def ports(facts: Facts) -> Iterator[Finding]:
+def port_findings(facts: Facts) -> Iterator[Finding]:
     """Report the use of the ports to which programs of the original NEP connect."""
     if not facts.is_gateway_enabled:
         yield Finding(

@@ -232,9 +232,9 @@ class NativeNetwork:
 
     # ---- graph and alerts
 
-    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
+    def set_programs(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these original programs in the graph, and unregister all others."""
-        self._registrar.show(programs)
+        self._registrar.set_programs(programs)
 
     def tick(self) -> None:
         """Send statistics to the master and report dropped messages. Call once a second."""

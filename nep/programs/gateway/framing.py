@@ -85,7 +85,7 @@ class FrameFormat:
         """Prefix of each frame: the topic and a space, or b"" for bare frames."""
         return f"{self.topic} ".encode() if self.framing == "prefixed" else b""
 
-    def read(self, frame: bytes) -> bytes:
+    def decode_frame(self, frame: bytes) -> bytes:
         """Convert a frame to data of the native codec, with NaN and infinity in JSON replaced.
 
         Raises `FrameError` if the frame is invalid or of another version's format.
@@ -97,7 +97,7 @@ class FrameFormat:
             return _replace_nan(data)
         return data
 
-    def write(self, data: bytes | memoryview) -> bytes:
+    def encode_frame(self, data: bytes | memoryview) -> bytes:
         """Convert data of the native codec to a frame."""
         body = base64.b64encode(data) if self.codec == "image" else data
         return b"".join((self.prefix, body))

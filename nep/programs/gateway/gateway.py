@@ -21,7 +21,7 @@ from nep.programs.gateway.relay import AlertSink, NativeSide, Relay
 from nep.programs.gateway.request_server import Ports, RequestServer
 from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.system.descriptors import RESERVED_DESCRIPTORS, has_free_descriptors
-from nep.system.forks import close_in_child, watch
+from nep.system.forks import close_in_child, notify_after_fork
 
 _MAINTENANCE_S = 1.0
 """Interval in seconds at which exited programs are removed and ports that were in use are retried."""
@@ -48,7 +48,7 @@ class GatewayNetwork(NativeSide, AlertSink, Protocol):
     def tick(self) -> None:
         """Perform periodic work. Called once a second."""
 
-    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
+    def set_programs(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these original programs in the graph, and unregister all others."""
 
     def close(self) -> None:
@@ -78,12 +78,12 @@ class Gateway:
         ports: Ports | None = None,
         boot: float = 0.0,
     ) -> None:
-        self._outside = outside
+        self._network = outside
         self._processes = processes
         self._port_map = PortMap(file, boot)
         self._inbox = NativeInbox()
         self._ready = threading.Event()
-        self._ending = threading.Event()
+        self._stopping = threading.Event()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
         self._relay = Relay(self._context, outside, outside, self._program_names)
@@ -93,9 +93,9 @@ class Gateway:
         self._request_sockets: dict[zmq.Socket[bytes], int] = {}
         self._pairs: dict[zmq.Socket[bytes], ProxyPair] = {}
         self._maintain_at = 0.0
-        self._published_unserved: dict[TopicLine, dict[Role, str]] = {}
+        self._published_versions: dict[TopicLine, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
-        watch(self)
+        notify_after_fork(self)
 
     def forked(self) -> None:
         """Release the inherited ports in a forked child process. See `nep.system.forks`."""
@@ -111,7 +111,7 @@ class Gateway:
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Stop the thread and release all ports, waiting at most `timeout_s` seconds."""
-        self._ending.set()
+        self._stopping.set()
         self._inbox.wake()
         if self._thread.ident is not None:
             self._thread.join(timeout_s)
@@ -120,17 +120,17 @@ class Gateway:
 
     def _run(self) -> None:
         try:
-            self._outside.start(self._inbox)
+            self._network.start(self._inbox)
             self._restore()
             self._request_server.open()
             self._publish_state()
             self._ready.set()
-            while not self._ending.is_set():
+            while not self._stopping.is_set():
                 self._try_step()
         finally:
             self._relay.close()
             self._request_server.close()
-            self._outside.close()
+            self._network.close()
             self._context.term()
 
     def _try_step(self) -> None:
@@ -140,7 +140,7 @@ class Gateway:
         except Exception:
             _logger.exception("unexpected error in the gateway")
             self._poller = None
-            self._ending.wait(_ERROR_PAUSE_S)
+            self._stopping.wait(_ERROR_PAUSE_S)
 
     def _step(self) -> None:
         if self._poller is None:
@@ -155,7 +155,7 @@ class Gateway:
             if socket in self._request_sockets:
                 self._request_server.reply(socket, self._request_sockets[socket])
         for message in self._inbox.pop_all():
-            data = self._outside.data_of(message)
+            data = self._network.data_of(message)
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)
         if changed:
@@ -185,20 +185,24 @@ class Gateway:
             self._publish_state()
         if self._request_server.open():
             self._poller = None
-        if self._unsupported_versions() != self._published_unserved:
+        if self._unsupported_versions() != self._published_versions:
             self._publish_state()
-        self._outside.tick()
+        self._network.tick()
 
     def _program_names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         return self._programs.names(line, role)  # created after the relay, whose pairs it uses
 
     def _unsupported_versions(self) -> dict[TopicLine, dict[Role, str]]:
-        return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
+        return {
+            pair.line: dict(pair.unsupported_versions)
+            for pair in self._relay.pairs
+            if pair.unsupported_versions
+        }
 
     def _publish_state(self) -> None:
-        self._published_unserved = self._unsupported_versions()
+        self._published_versions = self._unsupported_versions()
         self._relay.set_languages(self._programs.languages())
-        self._outside.show(self._programs.programs())
+        self._network.set_programs(self._programs.programs())
         self._request_server.publish_members(self._programs.members())
 
     def _restore(self) -> None:
@@ -211,7 +215,7 @@ class Gateway:
         }:
             base = self._port_map.port_of(line)
             if base is not None and not self._open_line(line, base):
-                self._outside.report(
+                self._network.report(
                     f"port:{base}",
                     _("Another program is using port {first} or {second}, which “{topic}” needs").format(
                         first=base, second=base + 1, topic=line.topic
@@ -232,7 +236,7 @@ class Gateway:
             )
         registration = self._registration(request, line)
         self._port_map.add(registration)
-        self._programs.expect(registration)
+        self._programs.expect_connection(registration)
         self._save()
         self._programs.update([line])
         self._publish_state()
@@ -278,7 +282,7 @@ class Gateway:
         try:
             self._port_map.save()
         except OSError as error:
-            self._outside.report(
+            self._network.report(
                 "gateway:file",
                 _("Can't save the ports of programs of the original NEP: {strerror}").format(
                     strerror=error.strerror
@@ -286,4 +290,4 @@ class Gateway:
                 _("After a restart of the master, restart the programs of the original NEP."),
             )
         else:
-            self._outside.resolve("gateway:file")
+            self._network.resolve("gateway:file")

@@ -91,9 +91,9 @@ class GraphRegistrar:
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
 
-    def show(self, programs: tuple[OriginalProgram, ...]) -> None:
+    def set_programs(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these programs, and unregister all others."""
-        joins = {program.node_id: self._record(program) for program in programs}
+        joins = {program.node_id: self._join_request(program) for program in programs}
         for node_id in [shown_id for shown_id in self._joins if shown_id not in joins]:
             del self._joins[node_id]
             self._since.pop(node_id, None)
@@ -115,7 +115,7 @@ class GraphRegistrar:
 
     def close(self) -> None:
         """Remove all programs from the graph."""
-        self.show(())
+        self.set_programs(())
 
     def _cpu_load(self, node_id: str, pid: int | None) -> float | None:
         if pid is None:
@@ -124,7 +124,7 @@ class GraphRegistrar:
             self._loads[node_id] = self._load_of(pid)
         return self._loads[node_id].ratio()
 
-    def _record(self, program: OriginalProgram) -> Join:
+    def _join_request(self, program: OriginalProgram) -> Join:
         since_ns = self._since.setdefault(program.node_id, time.time_ns())
         language = program.language or ""
         node = NodeRecord(
@@ -143,12 +143,12 @@ class GraphRegistrar:
             node,
             self._epoch,
             tuple(
-                _publisher(_stable_id(program, link), link)
+                _publisher_record(_stable_id(program, link), link)
                 for link in links
                 if link.role in {"publisher", "server"}
             ),
             tuple(
-                _subscriber(_stable_id(program, link), link)
+                _subscriber_record(_stable_id(program, link), link)
                 for link in links
                 if link.role in {"subscriber", "client"}
             ),
@@ -170,14 +170,14 @@ class GraphRegistrar:
         return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
 
 
-def _publisher(id: int, link: TopicLink) -> PublisherRecord:
+def _publisher_record(id: int, link: TopicLink) -> PublisherRecord:
     if link.role == "server":
         endpoint = f"tcp://{LOOPBACK}:{link.port}"
         return PublisherRecord(id, topic_of(link.topic), SERVICE_TYPE, ORIGINAL_CODEC, (endpoint,))
     return PublisherRecord(id, link.topic, _type(link), link.codec)
 
 
-def _subscriber(id: int, link: TopicLink) -> SubscriberRecord:
+def _subscriber_record(id: int, link: TopicLink) -> SubscriberRecord:
     if link.role == "client":
         return SubscriberRecord(id, topic_of(link.topic), SERVICE_TYPE)
     return SubscriberRecord(id, link.topic, _type(link))

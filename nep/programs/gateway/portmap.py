@@ -104,7 +104,7 @@ class PortMap:
         return tuple(self._registrations.values())
 
     @property
-    def lines(self) -> Mapping[TopicLine, int]:
+    def base_ports(self) -> Mapping[TopicLine, int]:
         """Base ports by line."""
         return self._ports
 

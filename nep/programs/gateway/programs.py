@@ -85,7 +85,7 @@ class ProgramTable:
         self._processes = processes
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
-        self._was_joined: set[Registration] = set()
+        self._joined: set[Registration] = set()
         self._openings: dict[Registration, tuple[int, float]] = {}
 
     def update(self, lines: Iterable[TopicLine] | None = None) -> None:
@@ -96,14 +96,14 @@ class ProgramTable:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
                 if roles or self._was_briefly_connected(registration):
-                    self._was_joined.add(registration)
+                    self._joined.add(registration)
 
-    def expect(self, registration: Registration) -> None:
+    def expect_connection(self, registration: Registration) -> None:
         """Treat a program as not connected yet, because it has sent a new request.
 
         Earlier connections of the program to the line are ignored.
         """
-        self._was_joined.discard(registration)
+        self._joined.discard(registration)
         self._openings.pop(registration, None)
 
     def remove_ended(self) -> bool:
@@ -117,7 +117,7 @@ class ProgramTable:
     def _discard(self, ended: set[Registration]) -> None:
         if ended:
             self._port_map.remove(ended)
-            self._was_joined -= ended
+            self._joined -= ended
             for registration in ended:
                 self._roles.pop(registration, None)
                 self._openings.pop(registration, None)
@@ -212,7 +212,7 @@ class ProgramTable:
         for registration in registrations:
             pair = self._pair_of(registration.line)
             for role in self._roles.get(registration, ()):
-                version = pair.unserved.get(role) if pair is not None else None
+                version = pair.unsupported_versions.get(role) if pair is not None else None
                 if version is not None and len(self.names(registration.line, role)) == 1:
                     return version
         return None
@@ -249,4 +249,4 @@ class ProgramTable:
             started = self._processes.started(registration.pid)
             if started is None or abs(started - registration.started) > _START_TIME_TOLERANCE_S:
                 return True
-        return registration in self._was_joined and not self._roles.get(registration)
+        return registration in self._joined and not self._roles.get(registration)

@@ -105,16 +105,18 @@ class ProxyPair:
         self.ends = endpoints_of(line, base)
         self.filters: set[bytes] = set()
         self.openings = 0
-        self.unserved: dict[Role, str] = {}
+        self.unsupported_versions: dict[Role, str] = {}
         self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
-        self._high_water_mark = self._queue = _IMAGE_QUEUE_LENGTH if line.codec == "image" else _QUEUE_LENGTH
+        self._high_water_mark = self._queue_length = (
+            _IMAGE_QUEUE_LENGTH if line.codec == "image" else _QUEUE_LENGTH
+        )
         with contextlib.ExitStack() as undo:
             self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _MAX_FRAME_BYTES)
             self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _MAX_FILTER_BYTES)
             self.incoming.send(b"\x01")  # subscribe to everything
-            self._closing = undo.pop_all()
+            self._exit_stack = undo.pop_all()
 
     def _open(
         self,
@@ -126,8 +128,8 @@ class ProxyPair:
     ) -> zmq.Socket[bytes]:
         opened = context.socket(kind)
         undo.callback(opened.close, _LINGER_MS)
-        opened.setsockopt(zmq.SNDHWM, self._queue)
-        opened.setsockopt(zmq.RCVHWM, self._queue)
+        opened.setsockopt(zmq.SNDHWM, self._queue_length)
+        opened.setsockopt(zmq.RCVHWM, self._queue_length)
         opened.setsockopt(zmq.MAXMSGSIZE, max_bytes)  # larger messages disconnect the sender
         if end.is_bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
@@ -206,16 +208,18 @@ class ProxyPair:
             data: Frame converted to the native codec.
         """
         if self.has_subscribers:
-            self._send(self.frame_format.write(self._escape(data)) if self._needs_escaping else frame)
+            self._send(self.frame_format.encode_frame(self._escape(data)) if self._needs_escaping else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
         """Convert data of the native codec to a frame and send it to the subscribers of this line."""
         if self.has_subscribers:
-            self._send(self.frame_format.write(self._escape(bytes(data)) if self._needs_escaping else data))
+            self._send(
+                self.frame_format.encode_frame(self._escape(bytes(data)) if self._needs_escaping else data)
+            )
 
     def close(self) -> None:
         """Close both sockets. Pending frames are sent for up to 0.2 s."""
-        self._closing.close()
+        self._exit_stack.close()
 
     @property
     def _needs_escaping(self) -> bool:
@@ -229,7 +233,7 @@ class ProxyPair:
         return data
 
     def _send(self, frame: bytes) -> None:
-        mark = min(self._queue, max(1, MAX_BUFFERED_BYTES // max(1, len(frame))))
+        mark = min(self._queue_length, max(1, MAX_BUFFERED_BYTES // max(1, len(frame))))
         if mark != self._high_water_mark:  # libzmq applies it to connected subscribers, too
             self.outgoing.setsockopt(zmq.SNDHWM, mark)
             self._high_water_mark = mark

@@ -125,7 +125,7 @@ class Relay:
         if pair is not None:
             pair.close()
             self.update_endpoints((line.topic, line.codec))
-            for role in tuple(pair.unserved):
+            for role in tuple(pair.unsupported_versions):
                 self._clear_version_alert(pair, role)
 
     def close(self) -> None:
@@ -203,7 +203,7 @@ class Relay:
     def _relay_frame(self, pair: ProxyPair, frame: bytes) -> None:
         key = (pair.line.topic, pair.line.codec)
         try:
-            data = pair.frame_format.read(frame)
+            data = pair.frame_format.decode_frame(frame)
         except FrameError as error:
             self._reject(pair, error)
             return
@@ -247,14 +247,14 @@ class Relay:
             self._report_version_alert("subscriber", pair, "0.5.4.6")
         else:
             self._clear_version_alert(pair, "subscriber")
-        version = pair.unserved.get("publisher")
+        version = pair.unsupported_versions.get("publisher")
         if version is not None and pair.connections["publisher"]:
             self._report_version_alert("publisher", pair, version)
         else:
             self._clear_version_alert(pair, "publisher")
 
     def _report_version_alert(self, role: Role, pair: ProxyPair, version: str) -> None:
-        pair.unserved[role] = version
+        pair.unsupported_versions[role] = version
         names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
             template = _(
@@ -276,5 +276,5 @@ class Relay:
         )
 
     def _clear_version_alert(self, pair: ProxyPair, role: Role) -> None:
-        if pair.unserved.pop(role, None) is not None:
+        if pair.unsupported_versions.pop(role, None) is not None:
             self._alerts.resolve(f"version:{pair.line.topic}:{role}")

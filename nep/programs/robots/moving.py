@@ -204,14 +204,14 @@ def _unread_robots(
 ) -> Iterator[RobotControls]:
     # A driver of the kit publishes its answer topic first, then subscribes to commands, and publishes its
     # description last: a publisher of answers without a description is about to announce a robot.
-    announcing = {id for topic in description_topics(view) for id in _publishers(view, topic)}
+    announcing = {id for topic in description_topics(view) for id in _publisher_node_ids(view, topic)}
     programs: list[tuple[str, set[str]]] = [
-        (topic.removesuffix(_DESCRIPTION), _publishers(view, topic)) for topic in unread
+        (topic.removesuffix(_DESCRIPTION), _publisher_node_ids(view, topic)) for topic in unread
     ]
     programs += [
         (topic.removesuffix(_ANSWER), nodes)
         for topic, info in view.topics.items()
-        if info.msg_type == REPLY_TYPE and (nodes := _publishers(view, topic) - announcing)
+        if info.msg_type == REPLY_TYPE and (nodes := _publisher_node_ids(view, topic) - announcing)
     ]
     subscribed = _subscriptions(view) if programs else {}
     for home, nodes in programs:
@@ -221,7 +221,7 @@ def _unread_robots(
         yield RobotControls(home.strip("/") or home, frozenset(topics))
 
 
-def _publishers(view: GraphView, topic: str) -> set[str]:
+def _publisher_node_ids(view: GraphView, topic: str) -> set[str]:
     info = view.topics.get(topic)
     return {each.node_id for each in info.publishers} if info is not None else set()
 

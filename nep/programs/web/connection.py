@@ -32,7 +32,7 @@ else:
 _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008
 _INTERNAL_ERROR = 1011
-_NODE_CLOSE_S = 2.0
+_NODE_CLOSE_TIMEOUT_S = 2.0
 _CLOSE_TIMEOUT_S = 1.0
 _ids = itertools.count(1)
 
@@ -164,7 +164,7 @@ class PageConnection:
         self._node.log.info("the page connected from %s", self._connection.remote_address)
 
     async def _close_node(self) -> None:
-        closed = self._thread.submit(self._node.close, _NODE_CLOSE_S)
+        closed = self._thread.submit(self._node.close, _NODE_CLOSE_TIMEOUT_S)
         await asyncio.shield(asyncio.wrap_future(closed))
         self._thread.shutdown()  # returns at once: the thread is idle
 

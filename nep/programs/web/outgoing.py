@@ -18,7 +18,7 @@ from nep.backends.ros.definition import Definition, FieldKind
 from nep.errors import EncodeError
 from nep.messages.message import Message
 from nep.messages.nesting import is_json_too_deep
-from nep.programs.web.messages.fragments import cut
+from nep.programs.web.messages.fragments import split_text
 from nep.programs.web.messages.operations import Compression
 from nep.programs.web.messages.payloads import ros_bytes, ros_type_of, to_ros
 from nep.programs.web.messages.png import encode_png
@@ -117,7 +117,7 @@ def _text_frames(text: bytes, options: EncodingOptions) -> list[Frame]:
         text = encode_json({"op": "png", "data": encode_png(text)})
     if options.fragment_size is None or len(text) <= options.fragment_size:
         return [Frame(text, is_text=True)]
-    pieces = cut(text.decode(), options.fragment_size)
+    pieces = split_text(text.decode(), options.fragment_size)
     id_ = f"fragment:{next(_fragment_numbers)}"
     return [
         Frame(

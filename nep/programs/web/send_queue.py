@@ -53,14 +53,14 @@ class Feed:
         is_image = bool(msg_type) and codec_for(msg_type).name == "image"
         self._default_capacity = _MAX_QUEUED_IMAGES if is_image else MAX_QUEUED_MESSAGES
         self.sent = RateMeter(clock)
-        self.form = EncodingOptions()
+        self.options = EncodingOptions()
         self.dropped_count = 0
         """Number of messages dropped since the page was last notified of drops."""
         self.total_dropped_count = 0
         self.throttled_count = 0
         """Number of messages omitted because of the rate limit that the page requested."""
         self.size_bytes = 0
-        self._wishes: dict[OperationId, Subscribe] = {}
+        self._subscriptions: dict[OperationId, Subscribe] = {}
         self._throttle_s = 0.0
         self._capacity = self._default_capacity
         self._messages: deque[Message] = deque()
@@ -73,7 +73,7 @@ class Feed:
     @property
     def subscription_count(self) -> int:
         """Number of the page's subscriptions that share the feed."""
-        return len(self._wishes)
+        return len(self._subscriptions)
 
     def subscribe(self, request: Subscribe, *, as_pixels: bool) -> None:
         """Add a subscription, or replace the one with the same id.
@@ -84,10 +84,10 @@ class Feed:
             request: Subscription that the page requests.
             as_pixels: Send images as the pixels of ``sensor_msgs/Image``.
         """
-        if self._wishes and request.id not in self._wishes:
+        if self._subscriptions and request.id not in self._subscriptions:
             for message in tuple(self._latched.values()):
                 self.add(message)
-        self._wishes[request.id] = request
+        self._subscriptions[request.id] = request
         self._update_options(as_pixels=as_pixels)
 
     def unsubscribe(self, id_: OperationId) -> bool:
@@ -96,20 +96,20 @@ class Feed:
         Returns:
             False if there was no such subscription.
         """
-        was_subscribed = bool(self._wishes) if id_ is None else id_ in self._wishes
+        was_subscribed = bool(self._subscriptions) if id_ is None else id_ in self._subscriptions
         if id_ is None:
-            self._wishes.clear()
+            self._subscriptions.clear()
         else:
-            self._wishes.pop(id_, None)
-        if self._wishes:
-            self._update_options(as_pixels=self.form.as_pixels)
+            self._subscriptions.pop(id_, None)
+        if self._subscriptions:
+            self._update_options(as_pixels=self.options.as_pixels)
         return was_subscribed
 
     def _update_options(self, *, as_pixels: bool) -> None:
-        wishes = self._wishes.values()
+        wishes = self._subscriptions.values()
         sizes = [each.fragment_size for each in wishes if each.fragment_size is not None]
         compression = max((each.compression for each in wishes), key=COMPRESSIONS.index)
-        self.form = EncodingOptions(compression, min(sizes, default=None), as_pixels)
+        self.options = EncodingOptions(compression, min(sizes, default=None), as_pixels)
         self._throttle_s = min(each.throttle_s for each in wishes)
         longest = max(each.queue_length for each in wishes)
         self._capacity = longest or (1 if self._throttle_s else self._default_capacity)
@@ -184,7 +184,7 @@ class SendQueue:
         max_bytes: int = MAX_QUEUED_BYTES,
     ) -> None:
         self._on_overflow = on_overflow
-        self._is_overfull = False
+        self._has_overflowed = False
         self._max_bytes = max_bytes
         self._clock = clock
         self._frames: deque[Frame] = deque()
@@ -194,13 +194,13 @@ class SendQueue:
 
     def put(self, frames: list[Frame]) -> None:
         """Append messages that can't be dropped. Does nothing after an overflow."""
-        if self._is_overfull:
+        if self._has_overflowed:
             return
         self._frames.extend(frames)
         self._frames_bytes += sum(len(each.data) for each in frames)
         self._is_filled.set()
         if self._frames_bytes > MAX_CONTROL_BYTES and len(self._frames) > len(frames):
-            self._is_overfull = True
+            self._has_overflowed = True
             self._on_overflow()
 
     def add(self, feed: Feed, message: Message) -> None:

@@ -28,7 +28,7 @@ from nep.programs.web.context import ConnectedPage, Rejection, RejectionKind, We
 from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
 from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, server_origin
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
-from nep.programs.web.rosbridge.page import Page, authenticate
+from nep.programs.web.rosbridge.page import RosbridgePage, authenticate
 from nep.programs.web.served_pages import PageRequest, respond
 from nep.system.addresses import ANY_HOST
 from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
@@ -118,14 +118,14 @@ class WebServer:
         self.settings = settings
         self.counts = WebCounts()
         self.port = settings.port
-        self._pages: dict[Page | FoxglovePage, Access] = {}
+        self._pages: dict[RosbridgePage | FoxglovePage, Access] = {}
         """Connected pages, each with the access rules by which it was accepted."""
         self._lock = threading.Lock()
         """Lock for changes of `settings` while pages connect."""
         self._guard: MotionGuard | None = None
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All open connections, including those without a handshake."""
-        self._locked = 0
+        self._unauthenticated_count = 0
         self._blocked_pages = BlockedPages()
         self._rejections_lock = threading.Lock()
         self._rejections: tuple[Rejection, ...] = ()
@@ -238,7 +238,9 @@ class WebServer:
                 lambda page, _access: page.protocol == "rosbridge", "rosbridge was switched off"
             )
 
-    def _disconnect(self, is_chosen: Callable[[Page | FoxglovePage, Access], bool], reason: str) -> int:
+    def _disconnect(
+        self, is_chosen: Callable[[RosbridgePage | FoxglovePage, Access], bool], reason: str
+    ) -> int:
         pages = [
             page
             for page, access in self._pages.copy().items()
@@ -343,7 +345,7 @@ class WebServer:
                 self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                 self.settings.port,
                 process_request=self._process_request,
-                select_subprotocol=self._subprotocol,
+                select_subprotocol=self._select_subprotocol,
                 compression=None,
                 open_timeout=_OPEN_TIMEOUT_S,
                 close_timeout=_CLOSE_TIMEOUT_S,
@@ -402,7 +404,7 @@ class WebServer:
             rejection = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "other", _("the request has more than one Origin header")
             )
-        elif len(self._pages) + self._locked >= MAX_PAGES:
+        elif len(self._pages) + self._unauthenticated_count >= MAX_PAGES:
             rejection = _HandshakeRejection(
                 HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections")
             )
@@ -462,7 +464,7 @@ class WebServer:
             return None
         if is_given is False:
             return _HandshakeRejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
-        if self._locked >= _MAX_UNAUTHENTICATED:
+        if self._unauthenticated_count >= _MAX_UNAUTHENTICATED:
             return _HandshakeRejection(
                 HTTPStatus.UNAUTHORIZED,
                 "token",
@@ -470,7 +472,7 @@ class WebServer:
             )
         return None
 
-    def _subprotocol(
+    def _select_subprotocol(
         self, _connection: ServerConnection, offered: Sequence[Subprotocol]
     ) -> Subprotocol | None:
         """Return Foxglove's subprotocol if it is enabled and the client offers it, else None.
@@ -504,12 +506,12 @@ class WebServer:
 
     async def _serve_page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]
-        page: Page | FoxglovePage | None = None
+        page: RosbridgePage | FoxglovePage | None = None
         try:
             if not connection.is_unlocked:  # type: ignore[attr-defined]
                 with self._lock:
                     access, auth = self.settings.access, self._auth
-                if access.token and not await self._is_authenticated(connection, auth):
+                if access.token and not await self._authenticate(connection, auth):
                     return
             with self._lock:
                 if self._is_still_allowed(connection, access):
@@ -527,7 +529,7 @@ class WebServer:
             if page is not None:
                 self._pages.pop(page, None)
 
-    def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
+    def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> RosbridgePage | FoxglovePage:
         name = node_name(origin_of(connection), address_of(connection))
         channels = self.settings.foxglove
         report = partial(self._record_robot_rejection, connection)
@@ -541,7 +543,7 @@ class WebServer:
                 guard=guard,
                 on_robot_refused=report,
             )
-        return Page(connection, name, self._new_node, guard, self.counts, report)
+        return RosbridgePage(connection, name, self._new_node, guard, self.counts, report)
 
     def _is_still_allowed(self, connection: ServerConnection, previous_access: Access) -> bool:
         """Return True if the current rules allow a page accepted under the rules `previous_access`."""
@@ -551,13 +553,13 @@ class WebServer:
         is_refused = access.origin_rejection_reason(origin_of(connection), server_origin(connection))
         return not is_refused and (not access.token or access.token == previous_access.token)
 
-    async def _is_authenticated(self, connection: ServerConnection, auth: AuthVerifier) -> bool:
-        self._locked += 1
+    async def _authenticate(self, connection: ServerConnection, auth: AuthVerifier) -> bool:
+        self._unauthenticated_count += 1
         try:
             if await authenticate(connection, auth):
                 return True
         finally:
-            self._locked -= 1
+            self._unauthenticated_count -= 1
         message = _("a token is required; connect to ws://HOST:PORT/?token=TOKEN")
         self._record_rejection(connection, "token", message)
         await connection.close(_POLICY_VIOLATION, "the token is missing or wrong")

@@ -20,7 +20,7 @@ from nep.masters.process import NO_CONSOLE
 from nep.recordings.apart.frames import corruption_from_plain, file_info_from_plain, read_frame, write_frame
 from nep.recordings.file_reader import CACHE_BYTES, FileInfo
 from nep.recordings.formats.index import CorruptRange
-from nep.recordings.formats.records import RawMessage, messages_in
+from nep.recordings.formats.records import RawMessage, records_in
 from nep.recordings.reader import Recording
 
 if TYPE_CHECKING:
@@ -120,14 +120,14 @@ class _Pipe:
             reason = _("the process that reads the file can't start: {error}")
             raise RecordingError(str(path), reason.format(error=error)) from error
         self._lock = threading.Lock()
-        self._was_ended = False
+        self._is_closed = False
         self._replies: queue.Queue[dict[str, object] | None] = queue.Queue(2)
         self._thread = threading.Thread(target=self._read, name="recording-answers", daemon=True)
         self._thread.start()
 
     @property
     def has_ended(self) -> bool:
-        return self._was_ended or self._process.poll() is not None
+        return self._is_closed or self._process.poll() is not None
 
     def _read(self) -> None:
         out = self._process.stdout
@@ -148,7 +148,7 @@ class _Pipe:
     ) -> dict[str, Any]:
         # Raises `RecordingError`, `ClosedError`.
         with self._lock:
-            self._check(path)
+            self._check_open(path)
             stdin: IO[bytes] | None = self._process.stdin
             with suppress(OSError, ValueError):  # the reply is then missing, too
                 if stdin is not None:
@@ -161,7 +161,7 @@ class _Pipe:
                     raise RecordingTooLargeError(str(path), _("reading the file takes too long")) from None
                 if reply is None:
                     self._replies.put(None)
-                    self._check(path)
+                    self._check_open(path)
                     self._kill()
                     reason = _("the process that reads the file stopped; the file may be damaged")
                     raise RecordingError(str(path), reason)
@@ -179,13 +179,13 @@ class _Pipe:
             raise kind(str(reply.get("path") or path), str(reply["error"]))
         return reply
 
-    def _check(self, path: Path) -> None:
-        if self._was_ended:
+    def _check_open(self, path: Path) -> None:
+        if self._is_closed:
             raise ClosedError(f"recording '{path.name}'")
 
     def close(self) -> None:
         # Also interrupts a thread that waits for a reply.
-        self._was_ended = True
+        self._is_closed = True
         self._kill()
 
     def _kill(self) -> None:
@@ -247,7 +247,7 @@ class _RemoteFile:
             most=max_count,
         )
         while reply["cursor"]:
-            for record in messages_in(reply["messages"]):
+            for record in records_in(reply["messages"]):
                 if isinstance(record, RawMessage):
                     yield record
             max_count = min(_GROWTH * max_count, _MAX_BATCH)
@@ -257,7 +257,7 @@ class _RemoteFile:
         if not groups:
             return []
         reply = self._request("newest", at_ns=_clamp_time(at_ns), groups=[list(each) for each in groups])
-        messages = (each for each in messages_in(reply["messages"]) if isinstance(each, RawMessage))
+        messages = (each for each in records_in(reply["messages"]) if isinstance(each, RawMessage))
         return [next(messages, None) if has_message else None for has_message in reply["are_there"]]
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:

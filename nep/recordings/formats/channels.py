@@ -35,7 +35,7 @@ from nep.recordings.formats.schemas import schema_of
 
 METADATA_PREFIX = "nep."
 """Prefix of nep's keys in the metadata of channels."""
-_U32, _U64 = 2**32 - 1, 2**64 - 1
+_MAX_U32, _MAX_U64 = 2**32 - 1, 2**64 - 1
 Role = str
 RECORDER_TOPICS: Mapping[Role, str] = {
     "figures": "/nep/recording/figures",
@@ -118,9 +118,9 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
     extra: dict[str, Any] = {}
     if extension:
         extra["extension"] = dict(extension)
-    if seq is not None and not 0 <= seq <= _U32:
+    if seq is not None and not 0 <= seq <= _MAX_U32:
         extra["seq"] = seq
-    if stamp is not None and not 0 <= stamp <= _U64:
+    if stamp is not None and not 0 <= stamp <= _MAX_U64:
         extra["stamp_ns"] = stamp
     if is_self_contained:
         kind = message.kind
@@ -139,8 +139,8 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
             packed = _pack_extra(extra)
             before += bytes_field_head(EXTRA_FIELD, len(packed)) + packed
         before += bytes_field_head(_DATA_FIELD[form], message.size_bytes)
-    sequence = 0 if seq is None else seq & _U32
-    publish_ns = log_ns if stamp is None else max(0, min(stamp, _U64))
+    sequence = 0 if seq is None else seq & _MAX_U32
+    publish_ns = log_ns if stamp is None else max(0, min(stamp, _MAX_U64))
     return Encoding(form, before, sequence, publish_ns, is_decodable, is_self_contained)
 
 
@@ -149,7 +149,9 @@ def _pack_extra(extra: Mapping[str, Any]) -> bytes:
         return pack(extra)
     except ValueError:  # an extension or number that can't have been received from a wire
         filtered = {key: value for key, value in extra.items() if key != "extension"}
-        numbers = {key: max(-(2**63), min(each, _U64)) for key, each in filtered.items() if type(each) is int}
+        numbers = {
+            key: max(-(2**63), min(each, _MAX_U64)) for key, each in filtered.items() if type(each) is int
+        }
         return pack(filtered | numbers)
 
 
@@ -182,7 +184,7 @@ def _is_decodable(message: Message) -> bool:
 
 def _determine_image_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     encoding = message.extension.get("encoding")
-    time = timestamp_field(1, max(0, min(stamp_ns, _U64)))
+    time = timestamp_field(1, max(0, min(stamp_ns, _MAX_U64)))
     layout = raw_layout(encoding)
     if layout is None:
         info = image_info(message.raw)
@@ -192,13 +194,13 @@ def _determine_image_form(message: Message, stamp_ns: int) -> tuple[str, bool, b
         return "picture", True, time + bytes_field_head(3, len(kind)) + kind
     shape = message.extension.get("shape")
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
-    if len(sides) != 2 or not all(type(side) is int and 0 < side <= _U32 for side in sides):
+    if len(sides) != 2 or not all(type(side) is int and 0 < side <= _MAX_U32 for side in sides):
         return "wrapped", False, b""
     height, width = sides
     step = message.size_bytes // height
     if width * _pixel_bytes(layout.dtype, layout.channels) * height != message.size_bytes:
         return "wrapped", False, b""
-    if encoding not in _VIEWABLE_LAYOUTS or step > _U32:
+    if encoding not in _VIEWABLE_LAYOUTS or step > _MAX_U32:
         return "wrapped", True, b""
     name = str(encoding).encode()
     sizes = fixed_field(2, width) + fixed_field(3, height) + bytes_field_head(4, len(name)) + name

@@ -32,12 +32,12 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    messages_in,
-    pack_offsets,
+    pack_channel_map,
     read_chunk_head,
     read_chunk_info,
     read_message_index,
     read_record,
+    records_in,
 )
 from nep.recordings.formats.walk import RecordLocation, walk_records
 
@@ -236,7 +236,7 @@ def read_index(
     if file.read(len(MAGIC)) != MAGIC:
         raise RecordingError(str(path), _("not an MCAP file"))
     work_budget = budget or open_budget(path, size)
-    footer = _footer(file, size)
+    footer = _read_footer(file, size)
     index = None if footer is None else _SummaryReader(file, path, size, work_budget).read(footer)
     if index is None:
         data_end = size if footer is None else size - _FOOTER_BYTES
@@ -247,7 +247,7 @@ def read_index(
     return index
 
 
-def _footer(file: BinaryIO, size: int) -> bytes | None:
+def _read_footer(file: BinaryIO, size: int) -> bytes | None:
     # With the magic after it; None if the file was not closed.
     if size < len(MAGIC) + _FOOTER_BYTES:
         return None
@@ -487,8 +487,8 @@ class _Scanner:
         if run is None:
             return
         run.compressed_bytes = run.uncompressed_bytes = run.length
-        run.packed_counts = pack_offsets(self._counts)
-        run.packed_offsets = pack_offsets(dict.fromkeys(self._counts, 0))
+        run.packed_counts = pack_channel_map(self._counts)
+        run.packed_offsets = pack_channel_map(dict.fromkeys(self._counts, 0))
         self._counts = {}
         self._index.chunks.append(run)
 
@@ -508,7 +508,7 @@ class _Scanner:
         if self._chunk is None:
             return
         chunk, self._chunk = self._chunk, None
-        chunk.packed_offsets, self._offsets = pack_offsets(self._offsets), {}
+        chunk.packed_offsets, self._offsets = pack_channel_map(self._offsets), {}
         channels = self._index.definitions.channels
         if not chunk.packed_offsets or not all(each in channels for each in chunk.channels):
             damage = _index_from_records(self._file, chunk, self._index.definitions, self._budget)
@@ -561,7 +561,7 @@ def _index_from_records(
         )
     budget.spend(len(chunk))
     channels, counts = info.index_offsets, dict[int, int]()
-    for number, record in enumerate(messages_in(chunk), 1):
+    for number, record in enumerate(records_in(chunk), 1):
         if number % 1_000 == 0:
             budget.spend(1_000 * RECORD_COST_BYTES)
         if isinstance(record, RawMessage):
@@ -570,7 +570,7 @@ def _index_from_records(
             definitions.add(*record)
     for channel in counts:
         channels.setdefault(channel, 0)
-    info.packed_offsets, info.packed_counts = pack_offsets(channels), pack_offsets(counts)
+    info.packed_offsets, info.packed_counts = pack_channel_map(channels), pack_channel_map(counts)
     return []
 
 

@@ -23,11 +23,11 @@ from nep.recordings.formats.records import (
     ChunkInfo,
     Opcode,
     message_count,
+    pack_channel_map,
     pack_chunk,
     pack_chunk_info,
     pack_message_head,
     pack_message_index,
-    pack_offsets,
     pack_record,
 )
 from nep.system.lazy_import import lazy_module
@@ -56,15 +56,15 @@ class ChannelTable:
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
         """Create a table."""
         self.definitions: dict[int, ChannelDefinition] = {}
-        self._numbers: dict[ChannelDefinition, int] = {}
+        self._ids: dict[ChannelDefinition, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._next = 1
         for number, definition in (definitions or {}).items():
             self._add(number, definition)
 
-    def number(self, definition: ChannelDefinition) -> int | None:
+    def channel_id(self, definition: ChannelDefinition) -> int | None:
         """Return the id of a channel, assigning one if needed; None if there are too many channels."""
-        number = self._numbers.get(definition)
+        number = self._ids.get(definition)
         if number is None:
             if self._next > MAX_CHANNELS:
                 return None
@@ -72,14 +72,14 @@ class ChannelTable:
             self._add(number, definition)
         return number
 
-    def add_numbered(self, number: int, definition: ChannelDefinition) -> None:
+    def add_with_id(self, number: int, definition: ChannelDefinition) -> None:
         """Add a channel with a given id, unless the id is already assigned."""
         if number not in self.definitions:
             self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
         """Return True if a channel already has an id."""
-        return definition in self._numbers
+        return definition in self._ids
 
     def _add(self, number: int, definition: ChannelDefinition) -> None:
         # The schema gets its number here, because other threads may call `records` concurrently.
@@ -87,7 +87,7 @@ class ChannelTable:
         if key[1]:
             self._schemas.setdefault(key, len(self._schemas) + 1)
         self.definitions[number] = definition
-        self._numbers[definition] = number
+        self._ids[definition] = number
         self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
@@ -299,7 +299,7 @@ class FileWriter:
         for number, index in indexes.items():
             offsets[number] = offset
             offset += len(index)
-        info.packed_offsets, info.index_bytes = pack_offsets(offsets), offset - info.offset - info.length
+        info.packed_offsets, info.index_bytes = pack_channel_map(offsets), offset - info.offset - info.length
         self._write(*record, b"".join(indexes.values()))
         if self.chunks is not None:
             self.chunks.append(info)

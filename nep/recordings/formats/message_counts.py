@@ -135,7 +135,7 @@ class TopicCounter:
             self.late += 1
             numbers.first = min(numbers.first, seq)
 
-    def count_skipped(self, publisher: int | None, count: int, size_bytes: int) -> None:
+    def count_dropped(self, publisher: int | None, count: int, size_bytes: int) -> None:
         """Count received messages of a publisher that are not recorded because the queue is full.
 
         Args:
@@ -159,6 +159,6 @@ class TopicCounter:
         return TopicStats(self.received, lost, self.late, self.undecodable, self.unkept, self.size_bytes)
 
 
-def changed(counters: Mapping[str, TopicCounter]) -> Iterable[tuple[str, TopicCounter]]:
+def changed_counters(counters: Mapping[str, TopicCounter]) -> Iterable[tuple[str, TopicCounter]]:
     """Return the (topic, counter) pairs whose counts have changed since they were last written."""
     return [(topic, each) for topic, each in counters.items() if each.is_changed]

@@ -38,10 +38,10 @@ MESSAGE_FIELDS_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
 MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, length of the compression's name
 _SIZE = struct.Struct("<Q")
-_ENTRIES = struct.Struct("<HI")  # channel, bytes of the entries
+_INDEX_FIELDS = struct.Struct("<HI")  # channel, bytes of the entries
 _ENTRY = struct.Struct("<QQ")
 _OFFSET = struct.Struct("<HQ")
-_INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the index offsets
+_CHUNK_INDEX_FIELDS = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the index offsets
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
 MAX_CHUNK_BYTES = 2**31
@@ -140,7 +140,7 @@ def pack_message_head(channel: int, sequence: int, log_ns: int, publish_ns: int,
     )
 
 
-def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
+def records_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
     """Iterate over the records of a chunk: messages, and other records as (opcode, content).
 
     Stops without an error at the end or at invalid bytes, because the last record may be truncated.
@@ -261,14 +261,14 @@ def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
 
 def message_count(index: bytes | memoryview) -> int:
     """Return the number of messages in an encoded message index."""
-    return max(0, len(index) - _INDEX_HEAD) // _ENTRY.size
+    return max(0, len(index) - _INDEX_HEAD_BYTES) // _ENTRY.size
 
 
 def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntry]]:
     """Parse a message index record; return the channel id and the entries. Raises `ValueError`."""
     try:
-        channel, size = _ENTRIES.unpack_from(content)
-        entries_view = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
+        channel, size = _INDEX_FIELDS.unpack_from(content)
+        entries_view = memoryview(content)[_INDEX_FIELDS.size : _INDEX_FIELDS.size + size]
         if len(entries_view) != size:
             raise ValueError("size")
         return channel, [IndexEntry(*each) for each in _ENTRY.iter_unpack(entries_view)]
@@ -337,7 +337,7 @@ class ChunkInfo:
         pairs = sorted(_OFFSET.iter_unpack(self.packed_offsets), key=_second, reverse=True)
         for channel, offset in pairs:
             if after <= offset < end:
-                counts[channel] = max(0, end - offset - _INDEX_HEAD) // _ENTRY.size
+                counts[channel] = max(0, end - offset - _INDEX_HEAD_BYTES) // _ENTRY.size
                 end = offset
         return counts
 
@@ -347,11 +347,11 @@ class ChunkInfo:
         return len(self.packed_offsets) // _OFFSET.size
 
 
-_INDEX_HEAD = HEAD_BYTES + _ENTRIES.size
+_INDEX_HEAD_BYTES = HEAD_BYTES + _INDEX_FIELDS.size
 _second = itemgetter(1)
 
 
-def pack_offsets(offsets: Mapping[int, int]) -> bytes:
+def pack_channel_map(offsets: Mapping[int, int]) -> bytes:
     """Encode one number per channel: index offsets (`packed_offsets`) or counts (`packed_counts`)."""
     return b"".join([_OFFSET.pack(*each) for each in offsets.items()])
 
@@ -359,12 +359,12 @@ def pack_offsets(offsets: Mapping[int, int]) -> bytes:
 def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
     """Parse a chunk index record. Raises `ValueError`."""
     try:
-        start_ns, end_ns, offset, length, size = _INFO.unpack_from(content)
-        position = _INFO.size + size
+        start_ns, end_ns, offset, length, size = _CHUNK_INDEX_FIELDS.unpack_from(content)
+        position = _CHUNK_INDEX_FIELDS.size + size
         if size % _OFFSET.size or position > len(content):
             raise ValueError("size")
         index_bytes, letters = _INDEX_LENGTH.unpack_from(content, position)
-        packed_offsets = bytes(content[_INFO.size : position])
+        packed_offsets = bytes(content[_CHUNK_INDEX_FIELDS.size : position])
         position += _INDEX_LENGTH.size
         compression = str(content[position : position + letters], "ascii")
         sizes = _SIZES.unpack_from(content, position + letters)
@@ -377,7 +377,9 @@ def pack_chunk_info(info: ChunkInfo) -> bytes:
     """Encode a chunk index record."""
     letters = info.compression.encode("ascii")
     rest = (
-        _INFO.pack(info.start_ns, info.end_ns, info.offset, info.length, len(info.packed_offsets))
+        _CHUNK_INDEX_FIELDS.pack(
+            info.start_ns, info.end_ns, info.offset, info.length, len(info.packed_offsets)
+        )
         + info.packed_offsets
         + _INDEX_LENGTH.pack(info.index_bytes, len(letters))
         + letters

@@ -19,7 +19,7 @@ STILL = SavedMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {ne
 
 def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
     acting = session.acting
-    acting.shelf.set_message(STILL)
+    acting.saved_messages.set_message(STILL)
     with nep.node("robot") as node:
         heard = node.new_sub("/cmd_vel", "json")
         node.new_server("sum", lambda asked: {"sum": asked["a"] + asked["b"]}, threads=1)
@@ -36,7 +36,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         tick_until(session, lambda: acting.calls.in_flight is None)
         assert acting.calls.records[-1].reply == {"sum": 5}
         assert call_text(acting.calls.records[-1]).startswith("replied in ")
-        assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
+        assert acting.saved_messages.requests["sum"] == '{"a": 2, "b": 3}'
         sent, called = list(acting.sent.records)[1:]
         assert (sent.origin, sent.name, sent.result_text) == (
             "publish",
@@ -47,12 +47,12 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert (called.origin, called.name, called.is_error) == ("service", "sum", False)
         assert called.text == '{"a": 2, "b": 3}'
         assert acting.sent.total == 2
-        assert acting.repeat(sent.number) == acting.repeat(called.number) == ""
+        assert acting.resend(sent.number) == acting.resend(called.number) == ""
         is_there, again = heard.listen(timeout_s=20.0)
         assert is_there
         assert again["id"] != first["id"]
         tick_until(session, lambda: acting.sent.total == 4)
-        assert acting.repeat(armed.number) == "This can't be sent again."
+        assert acting.resend(armed.number) == "This can't be sent again."
         assert acting.send(STILL, rate_hz=20.0) == ""
         is_there, second = heard.listen(timeout_s=20.0)
         assert is_there
@@ -62,7 +62,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.outbox.repeated_messages == ()
         while heard.receive(0.0) is not None:
             pass
-        assert acting.repeat(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
+        assert acting.resend(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
         tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent.records))
@@ -88,31 +88,31 @@ def test_invalid_message_is_rejected_with_reason_without_arming(session: Session
     assert not acting.arming.is_on
 
 
-def test_shelf_is_saved_to_file_and_file_damage_is_reported(tmp_path: Path) -> None:
+def test_saved_messages_are_written_to_file_and_file_damage_is_reported(tmp_path: Path) -> None:
     first = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    first.acting.shelf.set_message(STILL)
+    first.acting.saved_messages.set_message(STILL)
     first.acting.check()
     first.close()
     path = tmp_path / FILE_NAME
     again = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    assert again.acting.shelf.messages == (STILL,)
+    assert again.acting.saved_messages.messages == (STILL,)
     assert not again.acting.arming.is_on
     again.close()
     told = json.loads(path.read_text("utf-8"))
     path.write_text(json.dumps({**told, "messages": [*told["messages"], 7]}), "utf-8")
     third = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    assert third.acting.shelf.messages == (STILL,)
+    assert third.acting.saved_messages.messages == (STILL,)
     assert any("1 message can't be read" in each.detail for each in third.alerts.active)
     assert (tmp_path / "messages.damaged.json").is_file()
     third.close()
 
 
-def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
+def test_file_of_saved_messages_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / FILE_NAME
     data = json.dumps({"format": 99, "messages": []})
     path.write_text(data, "utf-8")
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    session.acting.shelf.set_message(STILL)
+    session.acting.saved_messages.set_message(STILL)
     session.acting.check()
     session.close()
     assert path.read_text("utf-8") == data

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.run.acting.arming import MAX_S, MAX_TARGETS, MIN_S, Arming, Target
+from app.core.run.acting.arming import MAX_ARMED_S, MAX_TARGETS, MIN_ARMED_S, Arming, Target
 
 TOPIC = Target("topic", "/cmd_vel")
 
@@ -52,12 +52,12 @@ def test_request_of_previous_arming_is_rejected_after_rearming() -> None:
 
 def test_target_count_and_duration_are_limited_and_targets_can_be_removed() -> None:
     arming, _now = made()
-    for seconds, left in ((-1, MIN_S), (1e9, MAX_S), (300, 300)):
+    for seconds, left in ((-1, MIN_ARMED_S), (1e9, MAX_ARMED_S), (300, 300)):
         arming.arm(seconds)
         assert arming.remaining_s == left
     names = [Target("topic", f"/t{number}") for number in range(MAX_TARGETS + 1)]
     assert [arming.allow(each) for each in names] == [True] * MAX_TARGETS + [False]
-    arming.forbid(names[0])
+    arming.deny(names[0])
     assert not arming.allows(names[0])
     assert arming.allow(names[-1])
 

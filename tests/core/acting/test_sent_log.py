@@ -6,7 +6,7 @@ from app.core.run.acting.sent_log import MAX_ENTRIES, MAX_TEXT_BYTES, SentLog, S
 
 
 def entry(at_s: float, words: str = "Still, heard by 1", text: str = "{}", source: str = "{}") -> SentRecord:
-    return SentRecord(at_s, "publish", "/cmd_vel", words, text=text, source=source, repeat=lambda: "")
+    return SentRecord(at_s, "publish", "/cmd_vel", words, text=text, source=source, resend=lambda: "")
 
 
 def test_repeated_message_is_one_entry_with_count_and_newest_text() -> None:
@@ -53,5 +53,5 @@ def test_large_message_is_listed_without_its_content() -> None:
     for text in (at_the_limit, over_it, over_it + "x"):
         log.add(entry(1.0, text=text, source=text), 1)
     kept, gone = log.records
-    assert (kept.text, kept.repeat is not None) == (at_the_limit, True)
-    assert (gone.text, gone.source, gone.repeat, gone.count) == ("", "", None, 2)
+    assert (kept.text, kept.resend is not None) == (at_the_limit, True)
+    assert (gone.text, gone.source, gone.resend, gone.count) == ("", "", None, 2)

@@ -275,7 +275,7 @@ def test_example_opens_without_its_file_path(document: Document, tmp_path: Path)
 
 
 def test_recovered_work_stays_journalled(document: Document, journals: Path) -> None:
-    document.others = {"description": "what it does"}
+    document.unknown_fields = {"description": "what it does"}
     document.apply_edit(STARTED)
     assert document.is_on_disk
     _as_if_dead(journals)
@@ -283,7 +283,7 @@ def test_recovered_work_stays_journalled(document: Document, journals: Path) -> 
     after = Document(lambda: Journal(journals))
     after.recover(unsaved)
     assert after.workspace == STARTED
-    assert after.others == {"description": "what it does"}
+    assert after.unknown_fields == {"description": "what it does"}
     assert after.dirty
     assert not unsaved.journal.exists()
     assert len(list(journals.glob("*.json"))) == 1

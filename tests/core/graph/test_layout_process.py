@@ -7,13 +7,13 @@ import pytest
 
 from app.core.graph import layout_process, layout_thread
 from app.core.graph.layout import LayoutSizes, arrange
-from app.core.graph.layout_process import MAX_HERE, LayoutProcess, is_large
+from app.core.graph.layout_process import MAX_INLINE_NODES, LayoutProcess, is_large
 from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
 from app.core.network.nodes import NodeEntry
 from tests.nep.programs import eventually
 
-KEYS = [f"n{number}" for number in range(MAX_HERE + 1)]
+KEYS = [f"n{number}" for number in range(MAX_INLINE_NODES + 1)]
 LARGE = NodeGraph(
     tuple(DrawnNode(key, key, "", "program", NodeEntry(key, key)) for key in KEYS),
     tuple(GraphLine("topic", (a,), (b,), (f"/{a}",)) for a, b in zip(KEYS[::3], KEYS[1::3], strict=False)),

@@ -67,9 +67,9 @@ def test_latency_is_computed_once_on_arrival() -> None:
 def test_missed_messages_are_counted_and_rewind_clears_history() -> None:
     history = MessageHistory()
     history.process(Batch([message(1), message(2)], dropped=7), 0)
-    assert (numbers(history), history.missed) == ([1, 2], 7)
+    assert (numbers(history), history.dropped_count) == ([1, 2], 7)
     history.reset()
-    assert (len(history), history.size_bytes, history.first, history.missed, history.at(0)) == (
+    assert (len(history), history.size_bytes, history.first, history.dropped_count, history.at(0)) == (
         0,
         0,
         0,
@@ -102,12 +102,12 @@ def test_shallow_history_requests_no_larger_queue_and_no_past_messages() -> None
     assert log == []
     feed.register("/a", deep)
     assert log == ["/a 8192"]
-    feed.add({"/a": Batch([message(1)])})
+    feed.dispatch({"/a": Batch([message(1)])})
     assert numbers(shallow) == numbers(deep) == [1]
     feed.unregister("/a", deep)
     feed.unregister("/a", deep)
     assert log == ["/a 8192", "/a None"]
-    feed.add({"/a": Batch([message(2)])})
+    feed.dispatch({"/a": Batch([message(2)])})
     assert (numbers(shallow), numbers(deep)) == ([1, 2], [1])
     feed.unregister("/a", shallow)
     assert log == ["/a 8192", "/a None", "closed"]

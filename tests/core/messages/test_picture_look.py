@@ -8,10 +8,10 @@ import pytest
 from app.core.messages.image_style import (
     COLOUR_MAPS,
     PLAIN,
-    PictureLook,
+    PictureStyle,
     apply_colour_map,
     apply_tones,
-    parse_look,
+    parse_style,
 )
 from app.core.messages.picture import decode
 from nep.messages.message import Message
@@ -32,16 +32,16 @@ def test_default_appearance_returns_image_unchanged() -> None:
 
 def test_brightness_and_contrast_are_applied_and_clipped() -> None:
     grey = np.array([[0, 64, 128, 192, 255]], np.uint8)
-    assert apply_tones(PictureLook(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
-    assert apply_tones(PictureLook(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
-    assert apply_tones(PictureLook(contrast=2), grey).tolist() == [[0, 1, 129, 255, 255]]
-    assert apply_tones(PictureLook(contrast=0.1), grey).tolist() == [[115, 121, 128, 134, 140]]
+    assert apply_tones(PictureStyle(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
+    assert apply_tones(PictureStyle(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
+    assert apply_tones(PictureStyle(contrast=2), grey).tolist() == [[0, 1, 129, 255, 255]]
+    assert apply_tones(PictureStyle(contrast=0.1), grey).tolist() == [[115, 121, 128, 134, 140]]
 
 
 @pytest.mark.parametrize("name", COLOUR_MAPS)
 def test_pixel_colours_match_the_colour_scale(name) -> None:
     depth = np.array([[100, 600, 1100]], np.uint16)
-    bgra, scale = apply_colour_map(PictureLook(colours=name), depth)
+    bgra, scale = apply_colour_map(PictureStyle(colours=name), depth)
     assert (scale.low, scale.high) == (100.0, 1100.0)
     assert bgra[0, 0, 2::-1].tolist() == scale.colours[0].tolist()
     assert bgra[0, 1, 2::-1].tolist() == scale.colours[127].tolist()
@@ -50,7 +50,7 @@ def test_pixel_colours_match_the_colour_scale(name) -> None:
 
 def test_custom_range_clips_values_outside() -> None:
     depth = np.array([[0.0, 1.0, 2.0, 9.0, np.nan, np.inf]], np.float32)
-    bgra, scale = apply_colour_map(PictureLook(colours="grey", low=1.0, high=3.0), depth)
+    bgra, scale = apply_colour_map(PictureStyle(colours="grey", low=1.0, high=3.0), depth)
     assert (scale.low, scale.high) == (1.0, 3.0)
     assert bgra[0, :, 0].tolist() == [0, 0, 127, 255, 0, 0]
 
@@ -71,23 +71,23 @@ def test_constant_nan_and_extreme_values_have_a_colour_scale(numbers, ends) -> N
 
 
 def test_single_limit_outside_the_data_range_collapses_the_colour_scale() -> None:
-    _bgra, scale = apply_colour_map(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
+    _bgra, scale = apply_colour_map(PictureStyle(low=50.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == 50.0
-    _bgra, scale = apply_colour_map(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
+    _bgra, scale = apply_colour_map(PictureStyle(high=-5.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == -5.0
 
 
 def test_decoded_image_reports_its_appearance_and_colour_scale() -> None:
     plain, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0)
     assert plain is not None
-    assert (plain.scale, plain.look) == (None, PLAIN)
-    look = PictureLook(colours="jet", brightness=0.1)
+    assert (plain.scale, plain.style) == (None, PLAIN)
+    look = PictureStyle(colours="jet", brightness=0.1)
     shown, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0, None, look)
     assert shown is not None
     assert shown.scale is not None
-    assert (shown.scale.low, shown.scale.high, shown.look) == (0.0, 255.0, look)
+    assert (shown.scale.low, shown.scale.high, shown.style) == (0.0, 255.0, look)
     assert shown.pixel(1, 0) == 255  # the value, regardless of its colour
-    colours, _error = decode(message(np.zeros((2, 2, 3), np.uint8)), 0.0, None, PictureLook(brightness=1.0))
+    colours, _error = decode(message(np.zeros((2, 2, 3), np.uint8)), 0.0, None, PictureStyle(brightness=1.0))
     assert colours is not None
     assert colours.scale is None
     assert colours.bgra[..., :3].min() == 255
@@ -96,13 +96,13 @@ def test_decoded_image_reports_its_appearance_and_colour_scale() -> None:
 @pytest.mark.parametrize(
     ("saved", "look"),
     [
-        (PictureLook(0.25, 2.0, "turbo", 1.0, 9.0).to_json(), PictureLook(0.25, 2.0, "turbo", 1.0, 9.0)),
+        (PictureStyle(0.25, 2.0, "turbo", 1.0, 9.0).to_json(), PictureStyle(0.25, 2.0, "turbo", 1.0, 9.0)),
         (None, PLAIN),
-        ({"brightness": 7, "contrast": 0, "colours": "none such"}, PictureLook(1.0, 0.1)),
+        ({"brightness": 7, "contrast": 0, "colours": "none such"}, PictureStyle(1.0, 0.1)),
         ({"brightness": "x", "contrast": float("nan"), "low": 10**400, "high": True}, PLAIN),
         ({"low": 9.0, "high": 1.0}, PLAIN),
-        ({"low": 9.0}, PictureLook(low=9.0)),
+        ({"low": 9.0}, PictureStyle(low=9.0)),
     ],
 )
 def test_saved_appearance_is_restored_and_invalid_values_become_defaults(saved, look) -> None:
-    assert parse_look(saved) == look
+    assert parse_style(saved) == look

@@ -45,7 +45,7 @@ def test_partial_findings_are_available_while_doctor_runs() -> None:
     assert doctor.partial_findings is None
     doctor.start()
     assert went.wait(30)
-    assert (doctor.partial_findings, doctor.looked_at, doctor.things) == ((FINE,), 1, 3)
+    assert (doctor.partial_findings, doctor.check_count, doctor.total_checks) == ((FINE,), 1, 3)
     assert (doctor.finished_s, doctor.findings) == (None, ())
     go_on.set()
     doctor.close()

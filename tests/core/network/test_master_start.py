@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 import nep
-from app.core.network.master import AGAIN_AT_MOST_S, DISCOVERY_TIMEOUT_S, MasterChangeDetector, MasterStarter
+from app.core.network.master import DISCOVERY_TIMEOUT_S, MAX_RETRY_S, MasterChangeDetector, MasterStarter
 from nep.protocol.graph_view import GraphView
 from tests.nep.programs import eventually
 
@@ -35,7 +35,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
 
     def ask() -> None:
         before = start._thread
-        start.ensure_running()
+        start.ensure_with_backoff()
         if start._thread is not before:
             asked.append(now[0])
             start.close()
@@ -44,7 +44,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
         ask()
         now[0] += 0.5
     assert asked == [0.0, 2.0, 6.0, 14.0, 30.0, 60.0, 90.0]
-    assert asked[-1] - asked[-2] == AGAIN_AT_MOST_S
+    assert asked[-1] - asked[-2] == MAX_RETRY_S
     assert len(told) == 1
     assert f"(process {os.getpid()}) uses port " in told[0]
     assert "NEP_MASTER=" in told[0]
@@ -57,7 +57,7 @@ def test_no_master_is_started_when_one_is_running(master) -> None:
     start = MasterStarter(master.address, told.append)
     start.ensure()
     start.close()
-    assert (told, start.has_started, start.first) == ([], False, False)
+    assert (told, start.has_started, start.is_first_master) == ([], False, False)
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def the_one_started(address: str) -> None:
     start.ensure()
     start.ensure()  # must not start a second master
     eventually(lambda: start.has_started)
-    assert start.first
+    assert start.is_first_master
     assert nep.is_running(address, 5)
     start.close()
     assert told == []

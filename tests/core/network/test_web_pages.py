@@ -37,7 +37,7 @@ class Studio:
         return self.servers[-1]
 
     def wait(self) -> FakeWebServer:
-        self.web.started(self.events.get(timeout=30))
+        self.web.on_started(self.events.get(timeout=30))
         return self.servers[-1]
 
     def switch_on(self) -> FakeWebServer:
@@ -110,7 +110,7 @@ def test_occupied_port_names_its_program_and_suggests_a_free_port(studio: Studio
         web = WebPages(master_address(), studio.events.put, addresses=tuple)
         web.port = taken.getsockname()[1]
         web.set_protocol_enabled("rosbridge", on=True)
-        web.started(studio.events.get(timeout=30))
+        web.on_started(studio.events.get(timeout=30))
         assert (web.state, web.protocols) == ("off", frozenset())
         assert str(web.port) in web.sentence
         assert web.free_port > web.port
@@ -123,7 +123,7 @@ def test_start_without_optional_libraries_gives_install_advice(studio: Studio) -
 
     web = WebPages(master_address(), studio.events.put, start=start, addresses=tuple)
     web.set_protocol_enabled("rosbridge", on=True)
-    web.started(studio.events.get(timeout=30))
+    web.on_started(studio.events.get(timeout=30))
     assert (web.state, web.protocols, web.free_port) == ("off", frozenset(), 0)
     assert web.sentence.startswith("The web server")
     assert "pip install" in web.sentence

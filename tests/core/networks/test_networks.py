@@ -209,9 +209,9 @@ def test_rate_is_measured_from_arrivals_where_network_reports_no_rate() -> None:
     topics = Topics(("", 0), "ros")
     topics.update(graph("/a", "/b"), 0.0)
     topics["/a"].is_watched = True
-    before = topics.count(0.0, {})
+    before = topics.measure_rates(0.0, {})
     topics.add("/a", Batch([message(100)] * 4, dropped=6), 1.0)
-    before = topics.count(2.0, before)
+    before = topics.measure_rates(2.0, before)
     assert topics["/a"].measured_rates == (5.0, 500.0)
     topics.update(graph("/a", "/b"), 2.0)
     assert (topics["/a"].rate_hz, topics["/a"].bandwidth_Bps) == (5.0, 500.0), (
@@ -221,7 +221,7 @@ def test_rate_is_measured_from_arrivals_where_network_reports_no_rate() -> None:
     topics.update(graph("/a", rate_hz=9.0, revision=2), 3.0)
     assert topics["/a"].rate_hz == 9.0, "who publishes knows better"
     topics.unwatch("/a")
-    assert (topics["/a"].measured_rates, topics.count(1.0, before)) == (None, {})
+    assert (topics["/a"].measured_rates, topics.measure_rates(1.0, before)) == (None, {})
 
 
 def test_every_network_kind_is_a_back_end_with_install_advice(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,7 +39,7 @@ def shown(session: Session, robot: nep.Node) -> Iterator[NodeParameters]:
     tick_until(session, lambda: entry(session, robot) is not None)
     tick_until(session, lambda: entry_of(session, robot).can_set_parameters)
     made.show(entry(session, robot))
-    tick_until(session, lambda: _refreshed(made).heard)
+    tick_until(session, lambda: _refreshed(made).has_received)
     yield made
     made.close()
 
@@ -66,7 +66,7 @@ def values(shown: NodeParameters) -> dict[str, object]:
 def settled(session: Session, shown: NodeParameters) -> str:
     """Wait until the node has replied, and return its rejection, or ""."""
     tick_until(session, lambda: not _refreshed(shown).setting)
-    return shown.refusal
+    return shown.rejection_reason
 
 
 def test_parameters_have_limits_and_updates_are_received(
@@ -105,11 +105,11 @@ def test_parameter_is_set_and_rejection_has_message_of_node(
         assert said in settled(session, shown)
     for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]"):
         shown.set("speed", text)
-        assert (shown.refusal, shown.setting) == ("enter a number", "")
+        assert (shown.rejection_reason, shown.setting) == ("enter a number", "")
     shown.set("gait", "fly")
     assert "use 'walk' or 'run'" in settled(session, shown)
     shown.set("serial", "8")
-    assert (shown.refusal, shown.setting) == ("only its own node can set it", "")
+    assert (shown.rejection_reason, shown.setting) == ("only its own node can set it", "")
     shown.set("no such", "8")
     assert (robot.parameters["speed"], robot.parameters["gait"], robot.parameters["serial"]) == (
         1.0,
@@ -145,7 +145,7 @@ def test_node_that_ends_during_request_is_reported(
     robot.close()
     tick_until(session, lambda: entry_of(session, robot).gone_s is not None)
     shown.set("speed", "1")
-    assert (shown.refusal, shown.setting) == ("the node has disappeared", "")
+    assert (shown.rejection_reason, shown.setting) == ("the node has disappeared", "")
     assert values(shown)["serial"] == "7", "what was known stays to be read"
 
 
@@ -155,20 +155,20 @@ def test_parameter_change_without_master_is_rejected_not_queued(
     shown._has_master = lambda: False
     shown.set("speed", "1")
     assert shown.setting == ""
-    assert "no master responds" in shown.refusal
+    assert "no master responds" in shown.rejection_reason
 
 
 def test_showing_another_node_or_none_clears_parameters(session: Session, shown: NodeParameters) -> None:
     watching, revision = shown.watching, shown.revision
     shown.show(NodeEntry("x", "without"))
-    assert (shown.node, shown.all, shown.watching, shown.heard) == (None, (), None, False)
+    assert (shown.node, shown.all, shown.watching, shown.has_received) == (None, (), None, False)
     assert shown.revision > revision
     assert watching is not None
     assert not session._watches.is_watched(watching.topics[0])  # type: ignore[attr-defined]
     shown.show(None)
     shown.refresh(0.0)
     shown.set("speed", "1")
-    assert shown.refusal == ""
+    assert shown.rejection_reason == ""
 
 
 def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
@@ -190,7 +190,7 @@ def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
         loud.publish({"parameters": [{"name": "a", "value": "x" * 30_000, "type": "str"}]})
         tick_until(session, lambda: not _refreshed(shown).problem)
         shown.set("a", "y")
-        assert "too long" in shown.refusal
+        assert "too long" in shown.rejection_reason
         assert (strange.name, strange.kind, strange.minimum, strange.choices) == ("['x']", "5", None, ())
         loud.publish_bytes(b"{no json")
         tick_until(session, lambda: _refreshed(shown).problem)

@@ -95,7 +95,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
 
 if __name__ == "__main__":
     OtherSource.poll_interval_s = 0.1
-    networks.COUNT_INTERVAL_S, source.POLL_INTERVAL_S = 0.3, 0.5  # shorter than in the window
+    networks.COUNT_INTERVAL_S, source.RESPONSE_TIMEOUT_S = 0.3, 0.5  # shorter than in the window
     with tempfile.TemporaryDirectory() as made:
         sys.stdout.write(json.dumps(look(sys.argv[1], Path(made))))
     threads = [each.name for each in threading.enumerate() if each.name.startswith("studio-")]

@@ -107,16 +107,16 @@ def test_recording_starts_reports_stats_and_ends(made):
 
 def test_events_are_sent_only_while_recording(made):
     client = made.client
-    client.write_entry("runs", {"id": "1"})
+    client.add_event("runs", {"id": "1"})
     assert not made.lines
     client.record(Path("a.mcap"))
-    client.write_entry("runs", {"id": "2"})
+    client.add_event("runs", {"id": "2"})
     made.say("ended", path="a.mcap", status=status())
-    client.write_entry("runs", {"id": "3"})
+    client.add_event("runs", {"id": "3"})
     client.set_ring(RingChoice(Path("ring")))
-    client.write_entry("runs", {"id": "3"}, "recording")
+    client.add_event("runs", {"id": "3"}, "recording")
     made.lines[0].is_full = True  # the event is sent again after a second, so this is no error
-    client.write_entry("alarms", {"id": "4"})
+    client.add_event("alarms", {"id": "4"})
     said = [(each["role"], each["value"]) for each in made.lines[0].orders if each["op"] == "say"]
     assert said == [("runs", {"id": "2"}), ("alarms", {"id": "4"})]
     assert not made.told()

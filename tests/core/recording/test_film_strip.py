@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from mcap.writer import Writer
 
-from app.core.recording.film_strip import film_strip, select_part
+from app.core.recording.film_strip import read_preview, select_part
 from app.core.recording.opener import LocalOpener
 from nep.errors import BadTopicError
 from nep.messages.message import Message
@@ -24,7 +24,7 @@ def look(tmp_path):
     messages = [picture(seq) if seq % 10 == 5 else json_message(seq) for seq in range(COUNT)]
     messages[35] = Message("/camera", b"\xff\xd8none", "image", "image", stamp_ns=5, seq=9, publisher=9)
     record(tmp_path / "a.mcap", [messages])
-    made = film_strip(tmp_path / "a.mcap", 4, 10, (24, 16), LocalOpener())
+    made = read_preview(tmp_path / "a.mcap", 4, 10, (24, 16), LocalOpener())
     assert made is not None
     return made
 
@@ -41,13 +41,13 @@ def test_film_strip_has_thumbnails_in_equal_intervals_and_message_counts(look):
 
 def test_film_strip_without_images_has_counts_and_unreadable_or_empty_file_has_no_film_strip(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1)]])
-    look = film_strip(tmp_path / "a.mcap", 4, 3, (24, 16), LocalOpener())
+    look = read_preview(tmp_path / "a.mcap", 4, 3, (24, 16), LocalOpener())
     assert look is not None
     assert (look.pictures, look.counts) == ((), (1, 0, 0))
     (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
     record(tmp_path / "empty.mcap", [])
     for name in ("none", "empty", "gone"):
-        assert film_strip(tmp_path / f"{name}.mcap", 4, 3, (24, 16), LocalOpener()) is None
+        assert read_preview(tmp_path / f"{name}.mcap", 4, 3, (24, 16), LocalOpener()) is None
 
 
 def test_part_includes_both_ends_and_matching_topics(look):
@@ -68,15 +68,15 @@ def test_topic_sizes_are_exact_and_part_size_is_proportional(look):
     both = {"/odom", "/camera"}
     for topic in look.topics:
         assert look.size_of(topic) == pytest.approx(sum(sizes[topic.name]))
-    count, size = look.about(look.start_ns, look.end_ns, both)
+    count, size = look.estimate_messages(look.start_ns, look.end_ns, both)
     assert (count, size) == (COUNT, pytest.approx(sum(map(sum, sizes.values()))))
     middle = (look.start_ns + look.end_ns) // 2
-    halves = [look.about(*ends, both) for ends in ((0, middle), (middle, 2**64))]
+    halves = [look.estimate_messages(*ends, both) for ends in ((0, middle), (middle, 2**64))]
     assert [each[0] for each in halves] == [pytest.approx(COUNT / 2, abs=2)] * 2
     assert sum(each[1] for each in halves) == pytest.approx(size)
-    assert look.about(look.start_ns, look.end_ns, ()) == (0, 0)
-    assert look.about(middle, middle - 1, both)[0] == pytest.approx(0)
-    assert look.about(2**64, 2**65, both) == (0, 0)
+    assert look.estimate_messages(look.start_ns, look.end_ns, ()) == (0, 0)
+    assert look.estimate_messages(middle, middle - 1, both)[0] == pytest.approx(0)
+    assert look.estimate_messages(2**64, 2**65, both) == (0, 0)
 
 
 def test_sizes_of_recording_without_statistics_are_sampled(tmp_path):
@@ -89,7 +89,7 @@ def test_sizes_of_recording_without_statistics_are_sampled(tmp_path):
         for at_ns in range(1, 100):
             writer.add_message(channels[1], at_ns, b"1" * 50, at_ns)
         writer.finish()
-    look = film_strip(path, 0, 10, (24, 16), LocalOpener())
+    look = read_preview(path, 0, 10, (24, 16), LocalOpener())
     assert look is not None
     assert [(each.name, look.size_of(each)) for each in look.topics] == [
         ("/few", 2),
@@ -97,5 +97,5 @@ def test_sizes_of_recording_without_statistics_are_sampled(tmp_path):
         ("/none", None),
     ]
     unknown = replace(look, message_bytes={"/few": 2.0})
-    assert unknown.about(0, 100, ("/few",)) == (1, 2)
-    assert unknown.about(0, 100, ("/few", "/many")) == (100, None)
+    assert unknown.estimate_messages(0, 100, ("/few",)) == (1, 2)
+    assert unknown.estimate_messages(0, 100, ("/few", "/many")) == (100, None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts import Alerts
-from app.core.recording.film_strip import film_strip
+from app.core.recording.film_strip import read_preview
 from app.core.recording.folder import RecordingInfo, read_info
 from app.core.recording.opener import LocalOpener, process_opener
 from app.core.recording.replay.opening import MAX_TOPICS, open_recording
@@ -114,4 +114,4 @@ def test_recording_with_too_many_topics_is_rejected_with_explanation(tmp_path: P
     path.write_bytes(hostile.many_channels(MAX_TOPICS + 1))
     with pytest.raises(RecordingError, match=str(MAX_TOPICS)):
         open_recording(path, lambda _share: None)
-    assert film_strip(path, 4, 3, (24, 16), LocalOpener()) is None
+    assert read_preview(path, 4, 3, (24, 16), LocalOpener()) is None

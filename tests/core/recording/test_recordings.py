@@ -38,7 +38,7 @@ class Recorded:
             Settings(self.home), self.alerts, "here:1", print,
             start=self._start, clock=lambda: self.now, now=lambda: NOW,
         )  # fmt: skip
-        made.on_made = lambda path, kind: self.made.append((path.name, kind))
+        made.on_created = lambda path, kind: self.made.append((path.name, kind))
         return made
 
     def _start(self, _number: int, _address: str, _post: Callable[[object], object]) -> OrdersOnly:
@@ -147,7 +147,7 @@ def test_flight_recorder_is_off_by_default_and_restored_at_next_start(made):
     later = made.again()
     later.start()
     assert made.lines[1].orders[0]["op"] == "ring"
-    later.set_ring_settings(replace(later.wish, is_on=False))
+    later.set_ring_settings(replace(later.ring_settings, is_on=False))
     assert made.orders() == ["ring", "ring", "end_ring"]
 
 

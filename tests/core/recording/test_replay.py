@@ -212,8 +212,8 @@ def test_play_at_end_restarts_from_beginning(shown, whole):
 
 def test_stepping_through_missing_topic_does_nothing(shown):
     shown.replay.select_topic("/nowhere")
-    assert shown.replay.chosen == "/a"
-    shown.replay.chosen = "/nowhere"
+    assert shown.replay.selected_topic == "/a"
+    shown.replay.selected_topic = "/nowhere"
     before = shown.replay.player.position_ns
     shown.replay.step(forward=True)
     shown.tick()

@@ -335,7 +335,7 @@ def test_motion_commands_need_confirmation_even_under_another_name(session: Sess
     assert acting.question is None
     session.tick()
     assert acting.question is None  # the denied question isn't repeated
-    acting.forbid(Target("topic", "/a"))
+    acting.deny(Target("topic", "/a"))
     session.tick()
     assert [sent.route.name for sent in sending.outbox.active_topics] == ["/arm/command"]
     for place in range(MAX_TARGETS + 5):

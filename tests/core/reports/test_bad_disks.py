@@ -42,7 +42,7 @@ told["crash"] = str(reports.add(Crash("studio", "x" * 9000)))
 run = StudioRun(disk / "runs", disk / "log")
 run.start()
 told["noted"] = run.is_recorded
-told["left"] = [str(each) for each in run.left()]
+told["left"] = [str(each) for each in run.pop_crashes()]
 told["offered"] = [each.part for each in reports.take_new()]
 run.finish()
 told["files"] = sorted(each.name for each in disk.rglob("*") if each.is_file())
@@ -84,7 +84,7 @@ class Lines(logging.Handler):
 logging.getLogger().addHandler(Lines())
 disk = Path(sys.argv[1])
 with StudioRun(disk / "runs", disk / "log") as run:
-    noted, left = run.is_recorded, run.left()
+    noted, left = run.is_recorded, run.pop_crashes()
 reports = CrashReports(disk / "log" / "crashes")
 print(json.dumps({"noted": noted, "left": len(left), "lines": len(lines), "new": len(reports.take_new()),
                   "all": len(reports.all())}))

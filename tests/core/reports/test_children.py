@@ -13,7 +13,7 @@ from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.core.network.master import MasterStarter
 from app.core.reports.crash import Crash
-from app.core.robots.launcher import TAIL_LETTERS, LaunchFailed
+from app.core.robots.launcher import TAIL_CHARS, LaunchFailed
 from app.core.run.runner import Runner
 from tests.blocks.samples import block, number, started, workspace
 from tests.core.robots.test_launcher import World
@@ -120,7 +120,7 @@ def test_crashed_robot_process_without_output_has_default_message(crashes, world
 
 @pytest.mark.parametrize("code", [1, -signal.SIGTERM])
 def test_robot_process_that_exits_with_output_is_not_a_crash(crashes, world: World, code: int) -> None:
-    assert died(world, b"x" * 5000, code).detail == "x" * TAIL_LETTERS
+    assert died(world, b"x" * 5000, code).detail == "x" * TAIL_CHARS
     assert crashes() == []
 
 

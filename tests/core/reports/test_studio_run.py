@@ -62,7 +62,7 @@ def test_clean_exit_leaves_no_files(place: Place) -> None:
     assert len(place.files()) == 3  # mark, lock, trace
     run.finish()
     assert place.files() == []
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -73,29 +73,29 @@ def test_native_crash_is_reported_once_with_its_location(place: Place, number: s
     code = f"def deep_inside(): os.kill(os.getpid(), signal.{number})\ndeep_inside()\n"
     assert place.ends(code) == -getattr(signal, number)
     place.log.joinpath("studio.log").write_text("the last line\n")
-    (crash,) = place.run().left()
+    (crash,) = place.run().pop_crashes()
     assert crash.part == "studio"
     assert how in crash.cause
     assert "deep_inside" in crash.text
     assert "the last line" in crash.text
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
     assert place.files() == ["studio.log"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_kill_by_the_system_is_reported_as_exit_without_message(place: Place) -> None:
     assert place.ends("os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
-    (crash,) = place.run().left()
+    (crash,) = place.run().pop_crashes()
     assert "without a word" in crash.cause
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_expected_exit_is_reported_only_if_it_crashed(place: Place) -> None:
     assert place.ends("run.expect_exit(); os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
     assert place.ends("run.expect_exit(); os.kill(os.getpid(), signal.SIGSEGV)") == -signal.SIGSEGV
-    assert len(place.run().left()) == 1
+    assert len(place.run().pop_crashes()) == 1
 
 
 def test_running_studio_is_not_reported_as_crash_until_it_is_killed(place: Place) -> None:
@@ -104,11 +104,11 @@ def test_running_studio_is_not_reported_as_crash_until_it_is_killed(place: Place
     with place.process("sys.stdin.read()") as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "begun\n"
-        assert place.run().left() == []
-        assert own.left() == []
+        assert place.run().pop_crashes() == []
+        assert own.pop_crashes() == []
         other.kill()
         other.wait(60)
-        (crash,) = own.left()
+        (crash,) = own.pop_crashes()
         assert "without a word" in crash.cause
     assert own.is_recorded
     own.finish()
@@ -127,28 +127,28 @@ def entry(place: Place, **other: object) -> Path:
 @pytest.mark.parametrize(("kept", "version"), [("0.0.9", "0.0.9"), (None, ""), ("9\n9", ""), (["9"], "")])
 def test_crash_before_an_update_has_its_version(place: Place, kept: object, version: str) -> None:
     entry(place, version=kept)
-    (crash,) = place.run().left()
+    (crash,) = place.run().pop_crashes()
     assert crash.version == version
     assert f"It was version {version or 'not known'}, begun " in crash.text
 
 
 def test_exit_by_computer_restart_is_not_a_crash(place: Place) -> None:
     entry(place)
-    assert len(place.run().left()) == 1
+    assert len(place.run().pop_crashes()) == 1
     entry(place, began_s=1000.0)
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
     assert place.files() == []
 
 
 def test_reused_pid_is_recognized_by_process_start_time(place: Place) -> None:
     """On a disk without file locks, a process is identified by its PID and start time."""
     entry(place, pid=os.getpid(), began_s=4_000_000_000.0)
-    assert place.run().left() == [], "as old as the mark says: it lives"
+    assert place.run().pop_crashes() == [], "as old as the mark says: it lives"
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as younger:
         import psutil
 
         entry(place, pid=younger.pid, began_s=max(psutil.boot_time(), younger_begin(younger.pid) - 100))
-        found = place.run().left()
+        found = place.run().pop_crashes()
         younger.communicate(b"\n", 60)
     assert len(found) == 1
 
@@ -163,7 +163,7 @@ def younger_begin(pid: int) -> float:
 def test_damaged_run_marker_file_is_deleted(place: Place, text: str) -> None:
     place.runs.mkdir()
     (place.runs / "mark.json").write_text(text)
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
     assert place.files() == []
 
 
@@ -174,14 +174,14 @@ def test_uncaught_exception_is_reported_immediately_and_only_once(place: Place) 
     told = report.path.read_text("utf-8")
     assert "how: ZeroDivisionError: by nothing" in told
     assert "test_studio_run.py" in told
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
 
 
 def test_system_exit_is_not_a_crash(place: Place) -> None:
     with pytest.raises(SystemExit), place.run():
         raise SystemExit(0)
     assert CrashReports(place.log / "crashes").all() == []
-    assert place.run().left() == []
+    assert place.run().pop_crashes() == []
 
 
 def test_unwritable_run_folder_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -190,7 +190,7 @@ def test_unwritable_run_folder_is_logged_once(tmp_path: Path, caplog: pytest.Log
     run.start()
     run.expect_exit()
     assert not run.is_recorded
-    assert run.left() == []
+    assert run.pop_crashes() == []
     run.finish()
     assert len(caplog.records) == 1
     assert getattr(caplog.records[0], "in_console", False), "the window does not complain"

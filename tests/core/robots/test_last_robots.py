@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.robots.last_robots import KEPT, MAX_ROBOTS, LastRobots
+from app.core.robots.last_robots import MAX_ROBOTS, ROBOTS_SETTING, LastRobots
 from app.core.storage.settings import Settings
 
 
@@ -14,17 +14,17 @@ class Launcher:
     """Fake launcher that records requested robots and starts none."""
 
     def __init__(self) -> None:
-        self.wanted: dict[str, str] = {}
+        self.models_by_name: dict[str, str] = {}
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
-        self.wanted[name] = model
+        self.models_by_name[name] = model
 
 
 def next_start(folder: Path) -> dict[str, str]:
     """Return the robots that a start of Studio requests, as models by name."""
     launcher = Launcher()
     LastRobots(Settings(folder)).start(launcher)
-    return launcher.wanted
+    return launcher.models_by_name
 
 
 def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: Path) -> None:
@@ -34,22 +34,22 @@ def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: 
     launcher.start_virtual_robot("Turtle", "diffdrive")
     robots.save(launcher)
     assert next_start(tmp_path) == {"Pepper": "pepper", "Turtle": "diffdrive"}
-    del launcher.wanted["Pepper"]
+    del launcher.models_by_name["Pepper"]
     robots.save(launcher)
     assert next_start(tmp_path) == {"Turtle": "diffdrive"}
-    launcher.wanted.clear()
+    launcher.models_by_name.clear()
     robots.save(launcher)
     assert next_start(tmp_path) == {}
 
 
 def test_start_without_restoring_robots_keeps_the_saved_list(tmp_path: Path) -> None:
-    Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
+    Settings(tmp_path).set(ROBOTS_SETTING, {"Pepper": "pepper"})
     LastRobots(Settings(tmp_path)).save(Launcher())
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 
 def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
-    Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
+    Settings(tmp_path).set(ROBOTS_SETTING, {"Pepper": "pepper"})
     robots = LastRobots(Settings(tmp_path))
     assert robots.is_restart_enabled
     robots.set_restart_enabled(False)
@@ -62,10 +62,10 @@ def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
     "kept", [None, [], {"": "pepper"}, {"Pepper": "toaster"}, {"Pepper": 3}, {"Pepper": ["pepper"]}]
 )
 def test_damaged_list_of_last_robots_starts_no_robot(tmp_path: Path, kept: object) -> None:
-    Settings(tmp_path).set(KEPT, kept)
+    Settings(tmp_path).set(ROBOTS_SETTING, kept)
     assert next_start(tmp_path) == {}
 
 
 def test_number_of_restored_robots_is_limited(tmp_path: Path) -> None:
-    Settings(tmp_path).set(KEPT, {f"Pepper {number}": "pepper" for number in range(500)})
+    Settings(tmp_path).set(ROBOTS_SETTING, {f"Pepper {number}": "pepper" for number in range(500)})
     assert len(next_start(tmp_path)) == MAX_ROBOTS

@@ -98,7 +98,7 @@ def test_start_does_not_wait_when_no_master_ran_before(world: World) -> None:
     world.there = None
     world.launcher.start_virtual_robot()
     assert not world.started
-    world.launcher._master.first = True
+    world.launcher._master.is_first_master = True
     world.after(0.03)
     assert len(world.started) == 1
 

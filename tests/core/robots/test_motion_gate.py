@@ -107,13 +107,13 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     assert permission.question.names == ("the robot on /Fido/go",)
 
 
-def test_shelf_message_needs_permission_and_repetition_ends_when_a_real_robot_connects(
+def test_saved_message_needs_permission_and_repetition_ends_when_a_real_robot_connects(
     session: Session, master
 ) -> None:
     acting, permission = session.acting, session.fleet.permission
     moved: list[tuple[object, str]] = []
     acting.on_moved = lambda robots, by: moved.append((robots, by))
-    acting.shelf.set_message(ORDER)
+    acting.saved_messages.set_message(ORDER)
     assert acting.send(ORDER, rate_hz=20.0) == ""
     tick_until(session, lambda: acting.outbox.repeated_messages)
     with real_robot(session, master.address) as told:

@@ -13,7 +13,7 @@ from app.core.robots.motion.permission import (
     MayNotMoveError,
     MotionPermission,
     actions_by_robot,
-    risky_actions,
+    risky_action_titles,
 )
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, thing_description
@@ -99,7 +99,7 @@ def test_robot_actions_of_a_program_are_read_from_its_source(rover) -> None:
     program = program_of(source)
     assert program.actions == {"Rover": ("move", "look")}
     assert actions_by_robot(program, [rover]) == [(rover, ("move", "look"))]
-    assert risky_actions(rover, ["move", "move", "light", "unknown"]) == ("“move”",)
+    assert risky_action_titles(rover, ["move", "move", "light", "unknown"]) == ("“move”",)
 
 
 @pytest.mark.parametrize("source", ["robot(name).do('move')", "robot('Rover').do(what)", "r.do('move')"])

@@ -5,7 +5,15 @@ from __future__ import annotations
 import pytest
 
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import MAX_QUEUED, MAX_S, SOUND_SETTING, Notes, RobotSound, RobotVoices, Speaker
+from app.core.robots.voices import (
+    MAX_NOTES_S,
+    MAX_QUEUED,
+    SOUND_SETTING,
+    Notes,
+    RobotSound,
+    RobotVoices,
+    Speaker,
+)
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
@@ -194,7 +202,7 @@ def test_invalid_sound_is_silent(wrong) -> None:
 
 def test_sound_duration_is_limited() -> None:
     notes = RobotSound.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
-    assert sum(seconds for _hz, seconds in notes) <= MAX_S
+    assert sum(seconds for _hz, seconds in notes) <= MAX_NOTES_S
 
 
 def test_no_speech_without_a_speaker() -> None:

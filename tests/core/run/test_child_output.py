@@ -50,7 +50,7 @@ def output(*chunks: bytes) -> OutputReader:
 def test_protocol_lines_are_assembled_and_other_bytes_counted() -> None:
     read = output(b'{"is": "re', b'ady"}\nnoise\n\n{"is": 1}', b"\n", b"tail")
     assert list(read) == [b'{"is": "ready"}', b'{"is": 1}']
-    assert read.strange_bytes == len("noise\n") + len("tail")
+    assert read.unexpected_bytes == len("noise\n") + len("tail")
 
 
 def test_oversized_line_is_discarded_to_its_end() -> None:
@@ -81,7 +81,7 @@ def test_output_flood_is_counted_exactly_in_constant_memory(
     finally:
         tracemalloc.stop()
     assert lines == lines_in_it * count
-    assert read.strange_bytes == (0 if lines_in_it else count * len(chunk))
+    assert read.unexpected_bytes == (0 if lines_in_it else count * len(chunk))
     assert peak < 5 * MAX_LINE_LENGTH
 
 

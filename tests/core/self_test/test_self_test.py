@@ -40,7 +40,7 @@ from pathlib import Path
 from app.core.self_test import SelfTest, prepare
 
 test = SelfTest(prepare(Path(sys.argv[1]), os.environ, is_root=False), {})
-log = test.place.home / "studio.log"
+log = test.environment.home / "studio.log"
 handler = logging.FileHandler(log, encoding="utf-8")
 logging.getLogger().addHandler(handler)
 

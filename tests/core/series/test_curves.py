@@ -64,7 +64,7 @@ class Case:
             messages.append(
                 Message(topic, data, "json", "json", stamp_ns=stamp_ns, seq=self.seqs[topic], publisher=1)
             )
-        self.feed.add({topic: Batch(messages, dropped)})
+        self.feed.dispatch({topic: Batch(messages, dropped)})
         self.curves.advance()
 
 
@@ -136,8 +136,8 @@ def test_losses_after_message_with_invalid_time_are_counted() -> None:
     case.curve("/a.x")
     seqs = ((1, ORIGIN), (2, 2**64 - 1), (5, ORIGIN + 10**8), (5 + 4, ORIGIN + 2 * 10**8))
     made = [Message("/a", b'{"x": 2}', "json", "json", stamp_ns=s, seq=n, publisher=1) for n, s in seqs]
-    case.feed.add({"/a": Batch(made)})
-    assert (case.curves.lost, case.curves.unread_count) == (2 + 3, 1)
+    case.feed.dispatch({"/a": Batch(made)})
+    assert (case.curves.lost, case.curves.skipped_count) == (2 + 3, 1)
 
 
 def test_plotted_value_can_change_between_number_and_state() -> None:
@@ -170,7 +170,7 @@ def test_message_with_invalid_time_stamp_is_skipped(stamp_ns) -> None:
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}))
     bad = Message("/a", b'{"x": 2}', "json", "json", stamp_ns=stamp_ns, seq=2, publisher=1)
-    case.feed.add({"/a": Batch([bad])})
+    case.feed.dispatch({"/a": Batch([bad])})
     case.seqs["/a"] = 2
     case.send("/a", (0.2, {"x": 3}))
     assert points(x) == [(0.0, 1, False), (0.2, 3, True)]
@@ -179,7 +179,7 @@ def test_message_with_invalid_time_stamp_is_skipped(stamp_ns) -> None:
 def test_message_without_time_stamp_uses_arrival_time() -> None:
     case = Case()
     x = case.curve("/a.x")
-    case.feed.add({"/a": Batch([Message("/a", b'{"x": 2}', "json", "json")])})
+    case.feed.dispatch({"/a": Batch([Message("/a", b'{"x": 2}', "json", "json")])})
     assert points(x) == [(0.0, 2, False)]
 
 

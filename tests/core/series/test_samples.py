@@ -78,7 +78,7 @@ def test_batches_at_any_times_stay_sorted_and_every_sample_is_kept_or_counted(gi
     times = samples.times
     assert bool(np.all(times[1:] >= times[:-1]))
     assert bool(np.all(np.isfinite(samples.values)))
-    assert len(samples) + samples.undone == len(wanted), "each is kept, or counted"
+    assert len(samples) + samples.removed_count == len(wanted), "each is kept, or counted"
     assert not len(samples) or not samples.gaps[0]
 
 
@@ -110,7 +110,7 @@ def test_clock_set_back_discards_the_samples_after_that_time() -> None:
     samples.add(50.5, 7.0)
     assert len(samples) == 52
     assert rows_of(samples)[-1] == (50.5, 7.0, True)
-    assert samples.undone == 49
+    assert samples.removed_count == 49
 
 
 def test_sample_with_future_time_stamp_is_removed_by_the_next_valid_sample() -> None:
@@ -216,7 +216,7 @@ def test_memory_is_released_when_the_limit_is_lowered() -> None:
     assert samples.times.base.nbytes < 8192 * 8 * 4
     assert samples.values[-1] == 1.0
     samples.extend(times + 300, times, np.zeros(len(times), dtype=bool))
-    assert samples.begun + len(samples) == 400_001
+    assert samples.evicted_count + len(samples) == 400_001
 
 
 def test_drawn_points_are_stable_while_the_plot_scrolls() -> None:
@@ -275,10 +275,13 @@ def test_oldest_samples_are_evicted_and_counted_with_correct_stats() -> None:
         rows += values.tolist()
         samples.line(0, 4000, 3)  # builds the pyramid in between
     assert len(samples) <= 8192
-    assert samples.begun + len(samples) == 40_000
-    assert samples.values.tolist() == rows[samples.begun :]
+    assert samples.evicted_count + len(samples) == 40_000
+    assert samples.values.tolist() == rows[samples.evicted_count :]
     found = samples.stats(0, 1e9)
-    assert (found.minimum, found.maximum) == (min(rows[samples.begun :]), max(rows[samples.begun :]))
+    assert (found.minimum, found.maximum) == (
+        min(rows[samples.evicted_count :]),
+        max(rows[samples.evicted_count :]),
+    )
     assert samples.size_bytes < 8192 * 80
 
 

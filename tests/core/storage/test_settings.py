@@ -104,19 +104,19 @@ def test_settings_folder_is_configurable(tmp_path: Path, monkeypatch: pytest.Mon
 def test_unsaved_changes_are_tracked_until_the_file_is_writable(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
     settings.set("theme", "light")
-    assert settings.not_kept is None
+    assert settings.write_error is None
     settings.path.unlink()
     settings.path.mkdir()  # stands for a disk that can't be written
     with pytest.raises(SettingsError):
         settings.set("theme", "dark")
     with pytest.raises(SettingsError):
         settings.set("text_percent", 125)
-    assert settings.not_kept is not None
+    assert settings.write_error is not None
     assert (settings.get("theme", ""), settings.get("text_percent", 0)) == ("dark", 125)
     settings.path.rmdir()
     Settings(tmp_path).set("layout", "developer")  # another Studio, once the disk can be written again
     settings.set("text_percent", 125)
-    assert settings.not_kept is None
+    assert settings.write_error is None
     again = Settings(tmp_path)
     assert (again.get("theme", ""), again.get("text_percent", 0), again.get("layout", "")) == (
         "dark", 125, "developer",

@@ -12,7 +12,7 @@ from installers.inventory.parts import (
     Part,
     _texts_of_python,
     editor_parts,
-    others,
+    other_parts,
     own_text,
     parts_of,
 )
@@ -37,7 +37,7 @@ def test_every_bundled_distribution_is_listed_once_with_its_licence(parts: list[
 
 
 def test_every_part_has_its_licence_text(parts: list[Part]) -> None:
-    assert {each.name for each in (*parts, *others(RESOURCES)) if not each.texts} <= WITHOUT_TEXT
+    assert {each.name for each in (*parts, *other_parts(RESOURCES)) if not each.texts} <= WITHOUT_TEXT
 
 
 def test_licence_file_name_with_trailing_version_is_recognised(parts: list[Part]) -> None:

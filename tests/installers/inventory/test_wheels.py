@@ -81,9 +81,9 @@ def test_licence_text_is_found_in_old_and_new_wheels_and_the_topmost_wins(
     (info / "METADATA").write_text("Name: made-up\nVersion: 1\n", "utf-8")
     (info / "RECORD").write_text("".join(f"{name},,\n" for name in reversed(names)), "utf-8")
     found = metadata.Distribution.at(info)
-    assert wheels._file(found, "LICENSE.txt") == (("LICENSE.txt", tmp_path / names[0]),)
+    assert wheels._licence_text(found, "LICENSE.txt") == (("LICENSE.txt", tmp_path / names[0]),)
     with pytest.raises(InventoryError, match="made-up has no 'COPYING' any more"):
-        wheels._file(found, "COPYING")
+        wheels._licence_text(found, "COPYING")
 
 
 def test_system_package_is_not_treated_as_a_wheel() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from installers.context import Context
-from installers.macos.information import APP_ICON, DOCUMENT_ICON, information, write_sentences
+from installers.macos.information import APP_ICON, DOCUMENT_ICON, information, write_localised_texts
 
 VERSION = "0.1.0"
 PROGRAM, LIBRARY = 2, 6
@@ -111,7 +111,7 @@ def made_up_app(folder: Path) -> Path:
     link(resources / "PySide6", "../Frameworks/PySide6")
     put(resources / APP_ICON, ICON)
     put(resources / DOCUMENT_ICON, ICON)
-    write_sentences(resources)
+    write_localised_texts(resources)
     return app
 
 

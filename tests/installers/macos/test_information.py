@@ -11,14 +11,14 @@ import pytest
 import nep
 from app.core.documents.file_format import SUFFIX
 from installers.macos.information import (
-    DOCUMENTED,
+    DOCUMENTED_KEYS,
     LANGUAGES,
     apple_version,
+    documentation_url,
     information,
-    sentences,
-    source_of,
-    write_information,
-    write_sentences,
+    localised_texts,
+    write_info_plist,
+    write_localised_texts,
 )
 from nep.version import __version__
 
@@ -47,15 +47,15 @@ def test_recording_type_is_imported_but_not_claimed_as_document() -> None:
 @pytest.mark.parametrize("machine", ["arm64", "x86_64"])
 def test_every_plist_key_is_documented_by_apple(machine: str) -> None:
     told = information(__version__, machine)
-    assert told.keys() == DOCUMENTED, "all that are listed are used, and no others"
-    pages = {source_of(key) for key in told}
+    assert told.keys() == DOCUMENTED_KEYS, "all that are listed are used, and no others"
+    pages = {documentation_url(key) for key in told}
     for within in ("CFBundleDocumentTypes", "UTExportedTypeDeclarations", "UTImportedTypeDeclarations"):
-        pages |= {source_of(key, within) for each in told[within] for key in each}
+        pages |= {documentation_url(key, within) for each in told[within] for key in each}
     assert all(re.fullmatch(r"https://developer\.apple\.com/documentation/[a-z/-]+", each) for each in pages)
     with pytest.raises(KeyError, match="NSHighResolutionCapabel"):
-        source_of("NSHighResolutionCapabel")
+        documentation_url("NSHighResolutionCapabel")
     with pytest.raises(KeyError, match="UTTypeConformsTo"):
-        source_of("UTTypeConformsTo", "CFBundleDocumentTypes")
+        documentation_url("UTTypeConformsTo", "CFBundleDocumentTypes")
 
 
 def test_declared_types_conform_to_public_data() -> None:
@@ -66,7 +66,7 @@ def test_declared_types_conform_to_public_data() -> None:
 
 
 def test_bundle_version_matches_the_version_of_nep(tmp_path: Path) -> None:
-    read = plistlib.loads(write_information(tmp_path / "Info.plist", __version__, "arm64").read_bytes())
+    read = plistlib.loads(write_info_plist(tmp_path / "Info.plist", __version__, "arm64").read_bytes())
     assert read == information(__version__, "arm64")
     assert read["CFBundleShortVersionString"] == read["CFBundleVersion"] == apple_version(__version__)
 
@@ -107,14 +107,14 @@ def test_every_permission_prompt_has_a_sentence_in_each_language(tmp_path: Path)
         "NSCameraUsageDescription",
         "NSMicrophoneUsageDescription",
     }
-    write_sentences(tmp_path)
+    write_localised_texts(tmp_path)
     for language in LANGUAGES:
         read = plistlib.loads((tmp_path / f"{language}.lproj" / "InfoPlist.strings").read_bytes())
-        assert read == sentences(language)
+        assert read == localised_texts(language)
         assert asked <= read.keys()
         for key in asked:
             assert re.fullmatch(r"[^.。]+[.。]", read[key]), read[key]
-    english, *others = (sentences(language) for language in LANGUAGES)
+    english, *others = (localised_texts(language) for language in LANGUAGES)
     for other in others:
         assert english.keys() == other.keys()
         assert all(english[key] != other[key] for key in english)
@@ -123,8 +123,8 @@ def test_every_permission_prompt_has_a_sentence_in_each_language(tmp_path: Path)
 def test_type_names_are_translated_into_each_language() -> None:
     told = information(__version__, "arm64")
     for kind in (*told["UTExportedTypeDeclarations"], *told["UTImportedTypeDeclarations"]):
-        assert sentences("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
-        assert all(sentences(language)[kind["UTTypeDescription"]] for language in LANGUAGES)
+        assert localised_texts("en")[kind["UTTypeDescription"]] == kind["UTTypeDescription"]
+        assert all(localised_texts(language)[kind["UTTypeDescription"]] for language in LANGUAGES)
 
 
 def test_plist_languages_match_those_of_studio() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from installers.macos.information import information
-from installers.macos.layout import check, made_for_newer
+from installers.macos.layout import binaries_for_newer_macos, check
 from tests.installers.macos.made_up_app import (
     LIBRARY,
     PROGRAM,
@@ -152,9 +152,9 @@ def test_version_mismatch_is_detected(tmp_path: Path) -> None:
 
 def test_libraries_that_need_a_newer_macos_are_reported(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
-    assert made_for_newer(app, "arm64") == {}
+    assert binaries_for_newer_macos(app, "arm64") == {}
     newer = put(app / "Contents/Frameworks/a.so", fat(header(macos=(15, 2)), header(machine="x86_64")))
-    assert made_for_newer(app, "arm64") == {newer: "15.2"}
+    assert binaries_for_newer_macos(app, "arm64") == {newer: "15.2"}
     assert check(app, VERSION, "arm64") == []  # only a report: macOS loads the library anyway
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from installers.context import PackageError
-from installers.macos.film_libraries import FILMS, leave_out_films
+from installers.macos.film_libraries import FFMPEG_LIBRARIES, remove_ffmpeg
 from installers.macos.layout import check
 from installers.macos.mach_o import read
 from tests.installers.macos.made_up_app import VERSION, context, header, link, made_up_app, put
@@ -58,7 +58,7 @@ def test_video_libraries_are_removed_and_image_libraries_kept(tmp_path: Path) ->
     link(app / CV2 / ".dylibs", "__dot__dylibs")
     link(app / "Contents/Frameworks/libx264.164.dylib", "cv2/__dot__dylibs/libx264.164.dylib")
     kept = pictures.read_bytes(), user.read_bytes()
-    assert leave_out_films(context(tmp_path), app) > 0
+    assert remove_ffmpeg(context(tmp_path), app) > 0
     assert {path.name for path in folder.iterdir()} == {"libavcodec.61.dylib", "libavif.16.dylib"}
     assert exported(films) == {"avcodec_open2"}
     (made,) = read(films)
@@ -70,14 +70,14 @@ def test_video_libraries_are_removed_and_image_libraries_kept(tmp_path: Path) ->
 def test_application_without_video_libraries_saves_no_space(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / CV2 / "cv2.abi3.so", header())
-    assert leave_out_films(context(tmp_path), app) == 0
+    assert remove_ffmpeg(context(tmp_path), app) == 0
 
 
 def test_video_libraries_in_an_unexpected_folder_raise(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     put(app / "Contents/Frameworks/libavcodec.61.dylib", header())
     with pytest.raises(PackageError, match="FFmpeg is not where OpenCV brings it"):
-        leave_out_films(context(tmp_path), app)
+        remove_ffmpeg(context(tmp_path), app)
 
 
 @pytest.mark.parametrize(
@@ -85,4 +85,4 @@ def test_video_libraries_in_an_unexpected_folder_raise(tmp_path: Path) -> None:
     [("libavcodec.61.19.101.dylib", True), ("libpostproc.58.dylib", True), ("libavif.16.3.0.dylib", False)],
 )
 def test_avif_libraries_are_not_treated_as_video_libraries(name: str, is_film: bool) -> None:
-    assert (FILMS.match(name) is not None) == is_film
+    assert (FFMPEG_LIBRARIES.match(name) is not None) == is_film

@@ -58,7 +58,7 @@ def test_request_is_parsed_or_rejected_with_a_message(data, port):
 def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
     shape = FrameFormat("t", framing, codec)
     try:
-        understood = isinstance(shape.read(frame), bytes)
+        understood = isinstance(shape.decode_frame(frame), bytes)
     except FrameError as error:
         understood = bool(str(error))
     assert understood

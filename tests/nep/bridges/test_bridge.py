@@ -446,11 +446,11 @@ def test_pattern_route_closes_when_idle_and_reopens(monkeypatch):
         hears = on_b.new_sub("/s/x")
         for number in range(3):
             pub = on_a.new_pub("/r/x")
-            eventually(lambda: any(each.is_found and each.is_subscribed for each in bridge.routes))
+            eventually(lambda: any(each.is_from_pattern and each.is_subscribed for each in bridge.routes))
             pub.publish(number)
             assert hears.listen(timeout_s=30.0) == (True, number)
             pub.close()
-            eventually(lambda: not any(each.is_found for each in bridge.routes))
+            eventually(lambda: not any(each.is_from_pattern for each in bridge.routes))
             assert len(bridge.routes) == 2, "what is named stays"
             eventually(lambda: not on_b.graph().topics["/s/x"].publishers)
             assert "/r/x" not in on_a.graph().topics

@@ -192,7 +192,7 @@ class _Told:
         self.report = _DelayReport(["t"], 10.0)
         self.report._subscribers["t"] = self
         for each in ages:
-            self.report._ages["t"].add_latency(time.monotonic(), each[0], 1, each[1])
+            self.report._latency_windows["t"].add_latency(time.monotonic(), each[0], 1, each[1])
 
     lost = 0
 

@@ -9,14 +9,14 @@ from rich.cells import cell_len
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
-    duration,
     format_bandwidth,
     format_rate,
+    format_rounded_duration,
+    format_size,
     print_error_message,
     show_alerts,
     show_json,
     show_table,
-    size,
 )
 from nep.protocol.graph_view import Alert, SubscriberInfo, TopicInfo
 
@@ -42,14 +42,14 @@ def test_rates_are_formatted(value, text):
     ],
 )
 def test_sizes_are_formatted(value, text):
-    assert size(value) == text
+    assert format_size(value) == text
 
 
 @pytest.mark.parametrize(
     ("seconds", "text"), [(-1, "0 s"), (59, "59 s"), (300, "5 min"), (7200, "2.0 h"), (200_000, "2.3 d")]
 )
 def test_durations_are_formatted(seconds, text):
-    assert duration(seconds) == text
+    assert format_rounded_duration(seconds) == text
 
 
 def test_table_has_a_header_and_one_row_per_entry(capsys):

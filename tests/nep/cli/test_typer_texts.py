@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from nep.cli.app import app
-from nep.cli.typer_texts import translated
+from nep.cli.typer_texts import translate_usage_error
 from tests.pseudo import untranslated
 
 OURS = ("nep", "topic", "echo", "pub", "hz", "list", "root", "payload", "count", "json", "timeout", "mastr")
@@ -33,8 +33,8 @@ def test_command_line_errors_are_translated(line: str) -> None:
 
 
 def test_unknown_typer_text_stays_in_english() -> None:
-    assert translated("Something else entirely.") == "Something else entirely."
-    assert translated("Missing argument '{x}'.") == "Missing argument '{x}'."
+    assert translate_usage_error("Something else entirely.") == "Something else entirely."
+    assert translate_usage_error("Missing argument '{x}'.") == "Missing argument '{x}'."
 
 
 @pytest.mark.parametrize("line", ["--help", "topic --help", "topic echo --help"])

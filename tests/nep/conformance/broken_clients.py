@@ -207,25 +207,25 @@ class StampInSeconds(Client):
 
 @breaks("reads-parts")
 class ReadsOnePartOnly(Client):
-    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.Parts]:
+    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.ParsedMessage]:
         return super().parsed(sub, parts) if len(parts) == 1 else []
 
 
 @breaks("reads-one-part")
 class ReadsPartsOnly(Client):
-    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.Parts]:
+    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.ParsedMessage]:
         return super().parsed(sub, parts) if len(parts) > 1 else []
 
 
 @breaks("reads-batches")
 class ReadsTheFirstOfABatch(Client):
-    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.Parts]:
+    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.ParsedMessage]:
         return super().parsed(sub, parts)[:1]
 
 
 @breaks("reads-alone")
 class IgnoresWhatIsAlone(Client):
-    def message(self, sub: Sub, read: wire.Parts, *, is_alone: bool) -> None:
+    def message(self, sub: Sub, read: wire.ParsedMessage, *, is_alone: bool) -> None:
         if not is_alone:
             super().message(sub, read, is_alone=False)
 
@@ -253,7 +253,7 @@ class NeverSaysWhatItRead(Client):
 
 @breaks("receives-in-order")
 class DeliversTwice(Client):
-    def deliver(self, sub: Sub, read: wire.Parts) -> None:
+    def deliver(self, sub: Sub, read: wire.ParsedMessage) -> None:
         super().deliver(sub, read)
         if read.header.seq == 250:
             super().deliver(sub, read)
@@ -470,7 +470,7 @@ class EndsOnUndecodablePayloads(Client):
 
 @breaks("large")
 class OneMegabyteAtMost(Client):
-    def deliver(self, sub: Sub, read: wire.Parts) -> None:
+    def deliver(self, sub: Sub, read: wire.ParsedMessage) -> None:
         if len(read.payload) < 2**20:
             super().deliver(sub, read)
 
@@ -500,7 +500,7 @@ class ConnectsTwice(Client):
 
     deliver_twice = False
 
-    def deliver(self, sub: Sub, read: wire.Parts) -> None:
+    def deliver(self, sub: Sub, read: wire.ParsedMessage) -> None:
         for _turn in range(1 + self.deliver_twice):
             super().deliver(sub, read)
 
@@ -561,7 +561,7 @@ class ServiceOfAnotherType(Client):
 
 @breaks("service-answer")
 class AnswersAsRefused(Client):
-    def answer(self, call: service_wire.CallHeader) -> service_wire.Reply:
+    def answer(self, call: service_wire.ReceivedCall) -> service_wire.Reply:
         return super().answer(call)._replace(kind=service_wire.CallKind.REJECTED)
 
 

@@ -422,13 +422,13 @@ class Client(Connections, Services):
             if self.is_its_topic(sub, each.topic):
                 self.message(sub, each, is_alone=is_alone)
 
-    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.Parts]:
+    def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.ParsedMessage]:
         return read_parts(parts)
 
     def is_its_topic(self, sub: Sub, topic: str) -> bool:
         return topic == sub.record["topic"] or topic in sub.topics
 
-    def message(self, sub: Sub, read: wire.Parts, *, is_alone: bool) -> None:
+    def message(self, sub: Sub, read: wire.ParsedMessage, *, is_alone: bool) -> None:
         header = read.header
         source = sub.sources.setdefault(header.publisher, Source(""))
         if self.is_leap(source, header.seq):
@@ -455,7 +455,7 @@ class Client(Connections, Services):
     def found_again(self) -> int:
         return 1
 
-    def deliver(self, sub: Sub, read: wire.Parts) -> None:
+    def deliver(self, sub: Sub, read: wire.ParsedMessage) -> None:
         header, payload = read.header, bytes(read.payload)
         codec = codec_by_number(header.codec)
         assert codec is not None

@@ -54,12 +54,12 @@ class Services:
             reply = self.answer(call)
         except ValueError:
             reply = service_wire.error_reply(service_wire.CallKind.REJECTED, "", "not JSON")
-        socket.send_multipart([sender, *service_wire.NATIVE.reply(call.number, reply)])
+        socket.send_multipart([sender, *service_wire.NATIVE.encode_reply(call.number, reply)])
 
     def refuse_call(self, error: WireError) -> None:
         pass
 
-    def answer(self, call: service_wire.CallHeader) -> service_wire.Reply:
+    def answer(self, call: service_wire.ReceivedCall) -> service_wire.Reply:
         return service_wire.Reply(service_wire.CallKind.REPLY, call.data, call.codec)
 
     def do_call(self, service: str, value: Any, timeout_s: float) -> dict[str, Any]:
@@ -67,7 +67,7 @@ class Services:
         record = {**self.new_id(), "topic": topic, "msg_type": "service"}
         (found,) = self.ask("subscriber+", subscriber=record)["what"]["publishers"]
         self.tell("subscriber-", node_id=self.node["id"], id=record["id"])
-        call = service_wire.NATIVE.call(1, 1, self.timeout(timeout_s), json.dumps(value).encode())
+        call = service_wire.NATIVE.encode_call(1, 1, self.timeout(timeout_s), json.dumps(value).encode())
         with self._context.socket(zmq.DEALER) as socket:
             handshakes = Handshakes(socket)
             self.call_at(socket, found["publisher"]["endpoints"][0], call)

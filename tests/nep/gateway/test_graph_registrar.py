@@ -52,7 +52,7 @@ def publishes(topic, codec="json", msg_type="json"):
 
 
 def test_originals_are_listed_as_nodes_with_language_and_wire(desk, listing):
-    listing.show(
+    listing.set_programs(
         (
             program("a", publishes("t")),
             program("b", TopicLink("t", "json", "json", "subscriber"), language="javascript"),
@@ -69,22 +69,22 @@ def test_originals_are_listed_as_nodes_with_language_and_wire(desk, listing):
 
 
 def test_departed_programs_are_removed(desk, listing):
-    listing.show((program("a", publishes("t")),))
-    listing.show((program("a"),))
+    listing.set_programs((program("a", publishes("t")),))
+    listing.set_programs((program("a"),))
     assert not desk.view().topics
-    listing.show(())
+    listing.set_programs(())
     assert not desk.view().nodes
 
 
 def test_unchanged_program_is_not_registered_again(desk, listing):
-    listing.show((program("a", publishes("t")),))
+    listing.set_programs((program("a", publishes("t")),))
     told = len(desk.replies)
-    listing.show((program("a", publishes("t")),))
+    listing.set_programs((program("a", publishes("t")),))
     assert len(desk.replies) == told
 
 
 def test_rate_is_counted_once_per_topic(desk, listing):
-    listing.show((program("a", publishes("t")), program("b", publishes("t"), pid=2)))
+    listing.set_programs((program("a", publishes("t")), program("b", publishes("t"), pid=2)))
     for _ in range(5):
         listing.renew()
         desk.now += 1.0
@@ -102,7 +102,7 @@ def test_cpu_load_of_an_original_is_read_from_the_system(desk):
     now = iter([0.0, 1.0])
     loads = {1: CpuLoad(lambda: used[1], lambda: next(now))}
     listing = GraphRegistrar(desk.submit, EPOCH, loads.__getitem__)
-    listing.show((program("a", publishes("t")), program("b", pid=None)))
+    listing.set_programs((program("a", publishes("t")), program("b", pid=None)))
     listing.renew()
     assert {node.cpu_ratio for node in desk.view().nodes.values()} == {None}
     used[1] = 0.5
@@ -116,17 +116,19 @@ def test_missing_process_and_first_reading_have_no_cpu_load():
 
 
 def test_equivalent_type_names_are_not_a_conflict(desk, listing):
-    listing.show((program("a", publishes("t")), program("b", publishes("t", msg_type="dictionary"), pid=2)))
+    listing.set_programs(
+        (program("a", publishes("t")), program("b", publishes("t", msg_type="dictionary"), pid=2))
+    )
     assert not desk.view().alerts
 
 
 def test_invalid_native_topic_name_is_left_out_of_the_graph(desk, listing):
-    listing.show((program("a", publishes("not a topic"), publishes("t")),))
+    listing.set_programs((program("a", publishes("not a topic"), publishes("t")),))
     assert set(desk.view().topics) == {"t"}
 
 
 def test_services_of_originals_are_listed_with_the_server_port(desk, listing):
-    listing.show(
+    listing.set_programs(
         (
             program("a", TopicLink("weather", "json", "service", "server", 9000)),
             program("b", TopicLink("weather", "json", "service", "client", 9000), pid=2),
@@ -138,5 +140,5 @@ def test_services_of_originals_are_listed_with_the_server_port(desk, listing):
     assert [view.nodes[each.node_id].name for each in service.servers] == ["a"]
     assert [each.endpoints for each in service.servers] == [("tcp://127.0.0.1:9000",)]
     assert [view.nodes[each.node_id].name for each in service.clients] == ["b"]
-    listing.show(())
+    listing.set_programs(())
     assert desk.view().services == {}

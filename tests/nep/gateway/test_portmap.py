@@ -19,7 +19,7 @@ def test_port_map_persists_after_a_restart(tmp_path):
     before.add(registration())
     before.save()
     after = PortMap(tmp_path / "deep" / "map.json")
-    assert dict(after.lines) == {JSON_A: 9000, JSON_B: 9002}
+    assert dict(after.base_ports) == {JSON_A: 9000, JSON_B: 9002}
     assert after.registrations == (registration(),)
     assert [entry.name for entry in (tmp_path / "deep").iterdir()] == ["map.json"]
 
@@ -31,7 +31,7 @@ def test_port_map_persists_after_a_restart(tmp_path):
 def test_damaged_port_map_file_gives_an_empty_map(tmp_path, text):
     file = tmp_path / "map.json"
     file.write_text(text)
-    assert not PortMap(file).lines
+    assert not PortMap(file).base_ports
 
 
 def test_repeated_registration_is_stored_once_and_other_programs_separately():

@@ -136,7 +136,7 @@ def test_implausible_clock_is_treated_as_unknown(clock: tuple[int, ...]) -> None
 )
 def test_malformed_clock_is_rejected_and_named(clock: object) -> None:
     graph = graph_of("c1", "c2")
-    what = encoding.write(renewal(graph, 0, None))
+    what = encoding.to_plain(renewal(graph, 0, None))
     assert isinstance(what, dict)
     body = pack({"do": "renew", "call": 7, "what": what | {"clock": clock}})
     assert parse_renewal(body) is None, "it goes the long way,"

@@ -15,7 +15,7 @@ from nep.masters.master import Master
 from nep.masters.snapshot import GraphSnapshotBuilder
 from nep.messages.packing import pack
 from nep.protocol import encoding
-from nep.protocol.encoding import ReplyEncoder, write
+from nep.protocol.encoding import ReplyEncoder, to_plain
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import (
     GraphReply,
@@ -127,14 +127,14 @@ def test_renewal_restarts_the_lease() -> None:
 )
 def test_unusual_renewal_falls_back_to_the_normal_path(change: dict[str, object]) -> None:
     graph = graph_of(2)
-    what = write(renewal(0, graph))
+    what = to_plain(renewal(0, graph))
     assert isinstance(what, dict)
     said = parse_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
     assert said is None or graph.renew_fast(said, 1.0, said.node_id) is None
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(write))
+@given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(to_plain))
 def test_invalid_renewal_is_not_parsed_by_the_fast_path(junk: object) -> None:
     bodies_of_junk = [junk] if isinstance(junk, bytes) else []
     begins = encoding.encode_request(Renew("n0", 1, 1), 7)

@@ -166,7 +166,7 @@ def test_decoded_image_has_the_size_in_its_header_despite_corruption(
         changed[at : at + 1] = bytes([byte])
     try:
         file = parse_header(bytes(changed[:end]))
-        read = image_codec.read_file(file)
+        read = image_codec.decode_file(file)
     except DecodeError:
         return
     assert read.shape[:2] == (file.height, file.width)

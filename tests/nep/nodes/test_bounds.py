@@ -188,7 +188,9 @@ def test_original_node_names_are_escaped_and_truncated() -> None:
     line = TopicLine("t", "bare", "json", "many2many")
     registration = Registration(line, CONTROLS, "publisher", "json", "A", None, None, None)
     link = TopicLink("t", "json", "json", "publisher")
-    listing.show((OriginalProgram(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),))
+    listing.set_programs(
+        (OriginalProgram(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),)
+    )
     (node,) = graph.view().nodes.values()
     assert not any(map(first_control, (node.id, node.name, node.language)))
     assert node.name.startswith("Arm\\x1b[2J\\u202e\\n\\u2028Arm")

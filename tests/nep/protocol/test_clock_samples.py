@@ -183,6 +183,6 @@ def test_clock_uncertainty_grows_only_between_different_clocks() -> None:
     assert difference.uncertainty_at(20_000) == 1001
     assert difference.uncertainty_at(-(10**12)) == 1000
     assert SAME_CLOCK.uncertainty_at(10**18) == 0
-    assert PublisherClock().seconds() is None
-    assert PublisherClock(SAME_CLOCK).seconds() == (0.0, 0.0)
+    assert PublisherClock().difference_s() is None
+    assert PublisherClock(SAME_CLOCK).difference_s() == (0.0, 0.0)
     assert MAX_OFFSET_NS > 10 * 365 * 86_400 * S

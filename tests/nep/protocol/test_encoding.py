@@ -61,7 +61,7 @@ def read_slowly(kind: type, value: object) -> object:
 
 def said(kind: type, value: object) -> str:
     try:
-        return repr(encoding.read(kind, value))
+        return repr(encoding.from_plain(kind, value))
     except WireError as error:
         return error.reason
 
@@ -87,15 +87,15 @@ def test_fast_decoding_matches_slow_decoding_of_any_map(kind: type, value: dict[
 
 def test_decoded_value_is_independent_of_its_source_map() -> None:
     value = dict(TOPIC)
-    read = encoding.read(TopicInfo, value)
+    read = encoding.from_plain(TopicInfo, value)
     value["name"] = "other"
     assert (read.name, value["publishers"]) == ("t", [PUBLISHER])
-    assert read.publishers == (encoding.read(PublisherInfo, PUBLISHER),)
+    assert read.publishers == (encoding.from_plain(PublisherInfo, PUBLISHER),)
 
 
 @pytest.mark.parametrize(("item", "kept"), [(2, 2.0), (2.5, 2.5), (None, None)])
 def test_int_is_converted_in_float_fields(item: object, kept: object) -> None:
-    encoding.read(TopicInfo, TOPIC)
-    read = encoding.read(TopicInfo, TOPIC | {"rate_hz": item})
+    encoding.from_plain(TopicInfo, TOPIC)
+    read = encoding.from_plain(TopicInfo, TOPIC | {"rate_hz": item})
     assert read.rate_hz == kept
     assert type(read.rate_hz) is type(kept)

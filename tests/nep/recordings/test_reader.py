@@ -238,7 +238,7 @@ def test_messages_of_overlapping_chunks_are_read_in_order(tmp_path, everything):
         table_of = opened.info.channels
     writer = FileWriter(tmp_path / "b.mcap")
     for number, definition in table_of.items():
-        writer.table.add_numbered(number, definition)
+        writer.table.add_with_id(number, definition)
     rnd = random.Random(2)
     times = [rnd.randrange(1000) for _each in range(300)]
     for at, log_ns in enumerate(times):

@@ -45,13 +45,13 @@ def test_calls_and_replies_match_the_vectors(vector: dict[str, Any]) -> None:
     number, payload = int(means["number"]), bytes.fromhex(means["payload"])
     if means["kind"] == CallKind.CALL:
         timeout_s = means["timeout_ms"] / 1000 or None
-        assert NATIVE.call(number, means["codec"], timeout_s, payload) == parts
+        assert NATIVE.encode_call(number, means["codec"], timeout_s, payload) == parts
         assert NATIVE.read_call(parts) == (number, means["codec"], timeout_s, payload)
         with pytest.raises(WireError):
             NATIVE.read_reply(parts)
     else:
         reply = Reply(CallKind(means["kind"]), payload, means["codec"])
-        assert NATIVE.reply(number, reply) == parts
+        assert NATIVE.encode_reply(number, reply) == parts
         assert NATIVE.read_reply(parts) == (number, reply)
         with pytest.raises(WireError):
             NATIVE.read_call(parts)

@@ -58,18 +58,18 @@ def test_update_keeps_modules_of_the_running_program(held, tmp_path: Path) -> No
 
 
 @only_linux
-def test_removed_program_keeps_its_modules(held) -> None:
+def test_running_program_can_import_its_modules_after_its_file_is_deleted(held) -> None:
     held.file.unlink()
     assert made_by(held.archive, "late") == "old late"
 
 
-def test_import_from_a_removed_program_exits_if_the_archive_is_not_kept_open(program) -> None:
+def test_import_from_a_deleted_program_exits_if_the_archive_is_not_kept_open(program) -> None:
     program.file.unlink()
     with pytest.raises(SystemExit):
         program.archive.extract("late")
 
 
-def test_keep_archive_open_ignores_a_program_already_removed(program) -> None:
+def test_keep_archive_open_ignores_a_program_already_deleted(program) -> None:
     program.file.unlink()
     assert not keep_archive_open()
     assert program.archive._filename == str(program.file)

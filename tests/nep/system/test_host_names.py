@@ -50,7 +50,7 @@ def test_numeric_addresses_are_not_resolved(address: str, known: str) -> None:
     book = Book()
     name = MasterNameResolver(address, lambda _known: None, book.look_up)
     name.resolve(1.0)
-    assert name.known == known
+    assert name.address == known
     assert name.wait(0.0)
     assert book.asked == []
 

@@ -438,7 +438,10 @@ def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
         greeted = subscriptions.handle_event(b"\1" + hello_part(number, "t", acknowledges_echoes=True), 0)
         assert (greeted is not None) == (number < MAX_SUBSCRIBERS)
     assert (
-        len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
+        len(subscriptions.counts_at_hello)
+        == len(subscriptions.hellos)
+        == len(subscriptions.windows)
+        == MAX_SUBSCRIBERS
     )
     assert subscriptions.rejections.count == 1000
     assert (

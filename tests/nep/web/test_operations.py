@@ -9,7 +9,7 @@ import pytest
 
 from nep.programs.web.limits import MAX_FRAGMENTED_OPERATIONS, MAX_MESSAGE_BYTES, MIN_FRAGMENT_SIZE
 from nep.programs.web.messages import operations as op
-from nep.programs.web.messages.fragments import FragmentBuffer, cut
+from nep.programs.web.messages.fragments import FragmentBuffer, split_text
 from tests import hostile
 
 EXAMPLES = (
@@ -106,7 +106,7 @@ def part(id_: str, data: str, number: int, total: int) -> op.Fragment:
 
 
 def test_fragments_are_joined_in_any_order() -> None:
-    pieces = cut("abcdefgh", 3)
+    pieces = split_text("abcdefgh", 3)
     buffer = FragmentBuffer()
     order = (2, 0, 0, 1)
     assert [buffer.add(part("f", pieces[n], n, 3)) for n in order] == [None, None, None, "abcdefgh"]

@@ -57,7 +57,7 @@ def test_throttled_subscription_keeps_the_newest_message() -> None:
 def test_subscriptions_of_a_page_to_one_topic_are_combined() -> None:
     both = feed(throttle_s=0.5, queue_length=2, fragment_size=900, compression="png")
     both.subscribe(Subscribe("t", "/t", "", 0.1, 5, 300, "cbor"), as_pixels=False)
-    assert (both.form.compression, both.form.fragment_size) == ("cbor", 300)
+    assert (both.options.compression, both.options.fragment_size) == ("cbor", 300)
     for number in range(10):
         both.add(message(number))
     assert len(both) == 5
@@ -65,7 +65,7 @@ def test_subscriptions_of_a_page_to_one_topic_are_combined() -> None:
     assert both.next_at == pytest.approx(1.1)
     assert both.unsubscribe("t")
     assert not both.unsubscribe("t")
-    assert both.form.compression == "png"
+    assert both.options.compression == "png"
     assert both.unsubscribe(None)
     assert both.subscription_count == 0
 

@@ -86,9 +86,9 @@ def test_rize_replies_are_parsed(robot):
 
 
 def test_ready_message_of_a_robot_is_parsed():
-    assert rize.ready({"robot": "ready", "name": "Pepper"}) == "Pepper"
-    assert rize.ready({"robot": "connection_error", "name": "Pepper"}) is None
-    assert rize.ready(["x"]) is None
+    assert rize.announced_name({"robot": "ready", "name": "Pepper"}) == "Pepper"
+    assert rize.announced_name({"robot": "connection_error", "name": "Pepper"}) is None
+    assert rize.announced_name(["x"]) is None
 
 
 # ---- tests of every driver -------------------------------------------------------------------------------

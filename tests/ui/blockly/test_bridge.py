@@ -7,7 +7,7 @@ from app.ui.blockly.bridge import BlocklyBridge
 
 def test_bridge_sends_json_to_the_page(qtbot):
     bridge = BlocklyBridge(dict)
-    with qtbot.waitSignal(bridge.told) as told:
+    with qtbot.waitSignal(bridge.command_sent) as told:
         bridge.send_command("errors", {"a": "“no”"})
     name, payload = told.args
     assert name == "errors"
@@ -16,7 +16,7 @@ def test_bridge_sends_json_to_the_page(qtbot):
 
 def test_bridge_provides_the_initial_state_to_the_page():
     bridge = BlocklyBridge(lambda: {"language": "de"})
-    assert json.loads(bridge.beginning()) == {"language": "de"}
+    assert json.loads(bridge.initial_settings()) == {"language": "de"}
 
 
 def test_bridge_forwards_page_calls_as_signals(qtbot):

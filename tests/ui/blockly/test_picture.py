@@ -34,7 +34,7 @@ def them(view, person) -> Person:
 
 def taken(qtbot, view: BlocklyView, kind: str, white: bool = True) -> bytes:
     got: list[bytes] = []
-    view.picture(kind, white, got.append)
+    view.render_picture(kind, white, got.append)
     qtbot.waitUntil(lambda: bool(got), timeout=WAIT_MS)
     return got[0]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from app.core.messages import image_streams as images_module
-from app.core.messages.image_style import PictureLook
+from app.core.messages.image_style import PictureStyle
 from app.core.messages.picture import Picture
 from app.core.network.watches import Watches
 from nep.messages.message import Message
@@ -71,8 +71,8 @@ class Images(images_module.Images):
         super().set_size(stream, size)
         self.decode_pending()
 
-    def set_look(self, stream: images_module.ImageStream, look: PictureLook) -> None:
-        super().set_look(stream, look)
+    def set_style(self, stream: images_module.ImageStream, look: PictureStyle) -> None:
+        super().set_style(stream, look)
         self.decode_pending()
 
     def _start_decoding(self) -> None:

@@ -113,8 +113,8 @@ class Session(session_module.Session):
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
             make_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
-        self.runs.coming = lambda: self.starting_robots
-        self.runs.also_stops = self.acting.disarm
+        self.runs.starting_robots = lambda: self.starting_robots
+        self.runs.before_stop = self.acting.disarm
         self.doctor = Doctor()
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_present, self.clock)
         self.images = Images(self.watch, self.clock)

@@ -39,7 +39,7 @@ def test_setting_is_saved_and_a_value_of_another_type_is_ignored(settings: Setti
     settings.set("theme", "dark")
     settings.set("theme", ["a", {"b": None}])
     assert settings.get("theme", []) == ["a", {"b": None}]
-    assert (settings.not_kept, settings.damaged) == (None, None)
+    assert (settings.write_error, settings.damaged) == (None, None)
 
 
 @pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, b"bytes"])

@@ -50,18 +50,18 @@ def tried(state: str = "running", **more: object) -> Invocation:
 )
 def test_card_shows_the_current_state_of_the_action(card, made, words) -> None:
     card.show_invocation(made)
-    assert card.words.text() == words
+    assert card.text_label.text() == words
     assert card.try_button.text() == "Cancel"
 
 
 def test_remaining_time_is_counted_down(card) -> None:
     card.show_invocation(tried(left_s=7.3))
-    assert card.left.text() == "8 s left"
-    assert card.left.isVisible()
+    assert card.remaining_label.text() == "8 s left"
+    assert card.remaining_label.isVisible()
     card.show_invocation(tried(left_s=-0.1))
-    assert card.left.text() == "0 s left"
+    assert card.remaining_label.text() == "0 s left"
     card.show_invocation(tried())
-    assert not card.left.isVisible()
+    assert not card.remaining_label.isVisible()
 
 
 def test_timeout_is_shown_as_a_sentence_below_the_card(card) -> None:
@@ -82,7 +82,7 @@ def test_replaced_action_names_its_replacement_and_stopped_action_shows_no_text(
 
 def test_robot_reply_is_shown_next_to_the_result(card) -> None:
     card.show_invocation(tried("succeeded", output={"moved": 0.5, "seconds": 1.4}, elapsed_s=1.5))
-    assert card.words.text() == "moved 0.50 m"
+    assert card.text_label.text() == "moved 0.50 m"
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_feedback_in_per_cent_is_a_progress_bar(field) -> None:
 
 def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
     card.show_tries(tries)
-    return [f"{row.given}: {row.result}" for row in card.tries.rows]
+    return [f"{row.input_text}: {row.result}" for row in card.tries.rows]
 
 
 def test_last_tries_are_listed_with_buttons_that_restore_their_input_values(card) -> None:

@@ -242,7 +242,7 @@ def test_history_is_filtered_and_exported_as_csv(panel, tmp_path) -> None:
     assert panel.pages.currentIndex() == 1
     panel.filter.setText("silent")
     assert panel.model.rowCount() == 1
-    panel._write(tmp_path / "h.csv", None)
+    panel._write_history(tmp_path / "h.csv", None)
     lines = (tmp_path / "h.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "at,alarm,lasted_s,times,did"
     assert ",'=cmd|' /C calc'!A0,4.000,2,restart replied" in lines[1]

@@ -79,7 +79,7 @@ def test_panel_that_fails_to_close_or_save_state_does_not_block_closing_the_wind
     monkeypatch.setattr(topics.panel, "save_state", explode)
     monkeypatch.setattr(topics.panel, "dispose", explode)
     shut: list[bool] = []
-    window.on_shut = lambda: shut.append(True)
+    window.on_closed = lambda: shut.append(True)
     with caplog.at_level(logging.ERROR):
         window.close()
     assert shut == [True]

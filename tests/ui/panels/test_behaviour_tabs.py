@@ -222,7 +222,7 @@ def test_esc_cancels_renaming(tabs) -> None:
 
 def test_rejected_tab_name_shows_the_reason_and_stays_editable(tabs) -> None:
     renamed = heard(tabs.renamed)
-    tabs.why_not = lambda key, name: f"{key} can't be {name}" if name == "Taken" else ""
+    tabs.name_problem = lambda key, name: f"{key} can't be {name}" if name == "Taken" else ""
     QTest.keyClick(tabs.tabs["a"], Qt.Key.Key_F2)
     QTest.keyClicks(tabs.field, "Taken")
     QTest.keyClick(tabs.field, Qt.Key.Key_Return)

@@ -16,13 +16,13 @@ def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_l
     wait.set_ready(ready=False)
     now[0] += LOADING_TEXT_DELAY_S - 0.01
     wait.set_ready(ready=False)
-    assert wait.words.isHidden()
+    assert wait.text_label.isHidden()
     now[0] += 0.02
     wait.set_ready(ready=False)
-    assert not wait.words.isHidden()
-    assert wait.words.text() == "Loading blocks…"
-    assert wait.words.geometry() == place.rect()
+    assert not wait.text_label.isHidden()
+    assert wait.text_label.text() == "Loading blocks…"
+    assert wait.text_label.geometry() == place.rect()
     wait.set_ready(ready=True)
-    assert wait.words.isHidden()
+    assert wait.text_label.isHidden()
     wait.set_ready(ready=False)  # its process died: the delay starts again
-    assert wait.words.isHidden()
+    assert wait.text_label.isHidden()

@@ -167,17 +167,17 @@ def test_lines_are_filtered_by_node_and_text(qtbot, panel, window) -> None:
     assert panel.filter.accessibleName() == "Showing: Everything of Turtle"
     panel.set_node("")
     panel.focus_filter()
-    qtbot.keyClicks(panel.words, "PEPPER walks")
+    qtbot.keyClicks(panel.find_field, "PEPPER walks")
     assert lines(panel) == ["info Pepper [app.robots.driver.tasks] walks 1 m"]
-    qtbot.keyClicks(panel.words, " nowhere")
+    qtbot.keyClicks(panel.find_field, " nowhere")
     assert lines(panel) == []
     assert panel.empty.isVisible()
     panel.clear_filters()
     assert len(lines(panel)) == 8
     panel.focus_filter()
-    qtbot.keyClicks(panel.words, "x")
-    qtbot.keyClick(panel.words, Qt.Key.Key_Escape)
-    assert (panel.words.isVisible(), len(lines(panel))) == (False, 8)
+    qtbot.keyClicks(panel.find_field, "x")
+    qtbot.keyClick(panel.find_field, Qt.Key.Key_Escape)
+    assert (panel.find_field.isVisible(), len(lines(panel))) == (False, 8)
 
 
 def test_scroll_position_is_kept_while_reading_older_lines(qtbot, panel, window) -> None:

@@ -209,7 +209,7 @@ def test_suggested_topic_name_is_applied_to_the_panel_that_opened_the_doctor(
     window.session.doctor.expect_topic("/robot/deph")
     asker.paused = False
     panel.set_stalled_panel(asker)
-    assert panel.missed.value == "/robot/deph"
+    assert panel.topic_choice.value == "/robot/deph"
     assert panel.terminal.text() == "In a terminal: nep doctor /robot/deph"
     assert names(panel) == ["Use /robot/depth"]
     window.session.doctor.found = (Finding("topic", "ok", "Messages of /robot/depth come here."),)
@@ -296,8 +296,8 @@ def test_each_finding_has_one_button(qtbot, panel, window, finding, button, comm
 
 def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
     panel.set_stalled_panel(asker)
-    panel.missed.set_value("/odom")
-    panel.missed.activated.emit(panel.missed.currentIndex())
+    panel.topic_choice.set_value("/odom")
+    panel.topic_choice.activated.emit(panel.topic_choice.currentIndex())
     assert window.session.doctor.expected_topic == "/odom"
     assert "paused" not in panel.rows[0].accessibleName()
     panel.copy.click()

@@ -445,13 +445,13 @@ def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
 
     def is_coming() -> bool:
         panel.refresh()
-        return panel._coming is not None
+        return panel._pending_scene is not None
 
     qtbot.waitUntil(is_coming, timeout=20_000)
-    coming = panel._coming
+    coming = panel._pending_scene
     assert panel.canvas.scene is before
     panel.refresh()
-    assert (panel.canvas.scene, panel._coming) == (coming, None)
+    assert (panel.canvas.scene, panel._pending_scene) == (coming, None)
     assert coming is not None
     assert coming.graph == panel._requested_graph
 
@@ -596,9 +596,9 @@ def test_empty_graph_suggests_next_steps(qtbot, qapp) -> None:
     assert isinstance(made, GraphPanel)
     press(button(made, "Open the connection doctor"))
     assert window.asked_why == [(made, "")]
-    assert made.picture() == b""
+    assert made.to_svg() == b""
     made.canvas.show_scene(GraphScene(made.theme, NodeGraph(), GraphLayout(), LayoutSizes(), "here"))
-    assert made.picture() == b"", "also once nothing was laid out"
+    assert made.to_svg() == b"", "also once nothing was laid out"
     made.save(Path("nowhere.svg"), SVG_KIND)
     assert window.toasts == []
     window.session.master = MasterState("none", "127.0.0.1:7780")

@@ -32,7 +32,7 @@ def panel(asked: Window) -> Iterator[HealthPanel]:
 
 
 def said(panel: HealthPanel) -> dict[str, str]:
-    return {row.title.text(): row.words.text() for row in panel.rows}
+    return {row.title.text(): row.text_label.text() for row in panel.rows}
 
 
 def test_healthy_robot_shows_a_row_per_fact_and_no_problems(panel, asked) -> None:
@@ -41,7 +41,7 @@ def test_healthy_robot_shows_a_row_per_fact_and_no_problems(panel, asked) -> Non
     assert panel.chip.text == ""
     assert not panel.step.isVisible()
     assert panel.rows[0].accessibleName() == "Connection"
-    assert panel.rows[0].accessibleDescription() == panel.rows[0].words.text()
+    assert panel.rows[0].accessibleDescription() == panel.rows[0].text_label.text()
     asked.session.fleet.links[0].last_stop, asked.session.fleet.links[0].last_stop_status = (
         "not confirmed, at 8:41",
         "error",

@@ -330,7 +330,7 @@ def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
     view.show_image(stream_of(replace(picture(4, 4), message=message)))  # type: ignore[arg-type]
     image = view.grab().toImage()
     assert {image.pixelColor(x, 20).name() for x in range(0, 200, 3)} == {"#ffffff", "#000000"}
-    view.place.set_zoom(1.9)
+    view.placement.set_zoom(1.9)
     view.update()
     image = view.grab().toImage()
     colours = {image.pixelColor(x, y).name() for x in range(190, 210) for y in range(190, 210)}
@@ -342,19 +342,19 @@ def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
 def test_pixel_values_and_boxes_follow_rotation_and_flipping(view, turned: int, flipped: bool) -> None:
     view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
-        view.place.flip(horizontally=True)
-    view.place.rotate(turned)
-    ball = view.place.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
+        view.placement.flip(horizontally=True)
+    view.placement.rotate(turned)
+    ball = view.placement.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
     assert under(view, ball.toPoint()).endswith("210 62 58  #D23E3A")
     image = view.grab().toImage()
     assert image.pixelColor(ball.toPoint()).name() == "#d23e3a"
-    box = view.place.to_view(view.area()).mapRect(QRectF(0.5, 0.25, 0.25, 0.25))
+    box = view.placement.to_view(view.area()).mapRect(QRectF(0.5, 0.25, 0.25, 0.25))
     assert image.pixelColor(round(box.center().x()), round(box.bottom())).name() == "#ffc53d"
 
 
 def test_drag_and_arrow_keys_pan_a_zoomed_image(qtbot, view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
-    view.place.set_zoom(5.0)
+    view.placement.set_zoom(5.0)
     before = under(view, QPoint(100, 100))
     QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
     QTest.mouseMove(view, QPoint(150, 130))
@@ -370,20 +370,20 @@ def test_double_click_toggles_between_fit_and_actual_size(view) -> None:
     QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
     assert view.scale() == pytest.approx(1.0)
     QTest.mouseDClick(view, Qt.MouseButton.LeftButton, pos=QPoint(200, 200))
-    assert view.place.zoom is None
+    assert view.placement.zoom is None
 
 
 def test_image_is_decoded_at_display_size_and_in_full_under_the_mouse(view) -> None:
     stream = stream_of(picture(640, 320))
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size == (400, 200)
-    view.place.rotate(90)
+    view.placement.rotate(90)
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size == (400, 200)
-    view.place.set_zoom(3.0)
+    view.placement.set_zoom(3.0)
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size == (1920, 960)
-    view.place.set_zoom(None)
+    view.placement.set_zoom(None)
     view.mouse = QPointF(200, 200)
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size is None
@@ -418,7 +418,7 @@ def test_pixel_value_is_formatted_as_colour_or_number() -> None:
 def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
-    view, place = panel.view, panel.view.place
+    view, place = panel.view, panel.view.placement
     QTest.keyClicks(view, "++")
     assert view.scale() == pytest.approx(1.25**3, rel=0.01)  # fitted at 125 %
     QTest.keyClick(view, Qt.Key.Key_Minus, Qt.KeyboardModifier.ControlModifier)
@@ -460,7 +460,7 @@ def test_image_is_saved_as_received_and_the_toast_opens_its_folder(qtbot, qapp, 
     panel = made(qtbot, window)
     panel.job = SnapshotJob(panel, lambda: tmp_path / "kept")
     panel.job.saved.connect(panel._on_saved)
-    panel.view.place.rotate(90)
+    panel.view.placement.rotate(90)
     QTest.keyClicks(panel.view, "s")
     qtbot.waitUntil(lambda: bool(window.toasts))
     (file,) = (tmp_path / "kept").iterdir()
@@ -507,7 +507,7 @@ def test_zoom_rotation_and_flip_are_restored_with_the_layout(qtbot, qapp) -> Non
     QTest.keyClicks(panel.view, "+rh")
     again = made(qtbot, window)
     again.restore_state(panel.save_state())
-    assert again.view.place == panel.view.place
+    assert again.view.placement == panel.view.placement
     assert again.actions_of["across"].isChecked()
     again.restore_state({"topic": 3, "place": "nonsense"})
 
@@ -516,13 +516,13 @@ def test_zoom_rotation_and_flip_are_kept_per_topic(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     QTest.keyClicks(panel.view, "+rh")
-    first, place = panel.subtitle(), panel.view.place
+    first, place = panel.subtitle(), panel.view.placement
     assert place.zoom is not None
     panel.show_topic("/robot/depth")
-    assert panel.view.place == PicturePlacement()
+    assert panel.view.placement == PicturePlacement()
     assert not panel.actions_of["across"].isChecked()
     panel.show_topic(first)
-    assert panel.view.place is place
+    assert panel.view.placement is place
     assert panel.actions_of["across"].isChecked()
 
 

@@ -67,20 +67,20 @@ def test_depth_image_has_a_colour_bar_with_selectable_colours_and_range(panel, w
     assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (500.0, 4500.0)
     usual = shown(panel).copy()
     press(panel.tune)
-    assert panel.look_bar.isVisible()
-    panel.look_bar.colours.set_value("turbo")
-    panel.look_bar.colours.activated.emit(panel.look_bar.colours.currentIndex())
+    assert panel.style_bar.isVisible()
+    panel.style_bar.colours.set_value("turbo")
+    panel.style_bar.colours.activated.emit(panel.style_bar.colours.currentIndex())
     ticks(window, panel)
     assert not np.array_equal(shown(panel), usual)  # the same image with another colour map
-    press(panel.look_bar.own_range)
-    assert panel.look_bar.low.isVisible()
-    assert (panel.look_bar.low.text(), panel.look_bar.high.text()) == ("500", "4500")
-    panel.look_bar.low.setText("1000")
-    panel.look_bar.high.setText("2000")
-    panel.look_bar.high.editingFinished.emit()
+    press(panel.style_bar.own_range)
+    assert panel.style_bar.low.isVisible()
+    assert (panel.style_bar.low.text(), panel.style_bar.high.text()) == ("500", "4500")
+    panel.style_bar.low.setText("1000")
+    panel.style_bar.high.setText("2000")
+    panel.style_bar.high.editingFinished.emit()
     ticks(window, panel)
     assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (1000.0, 2000.0)
-    press(panel.look_bar.again)
+    press(panel.style_bar.again)
     ticks(window, panel)
     assert np.array_equal(shown(panel), usual)
 
@@ -89,32 +89,32 @@ def test_brightness_and_contrast_apply_to_a_frozen_image(panel, window) -> None:
     panel.show_topic(CAMERA)
     sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
     assert panel.view.picture.scale is None
-    assert not panel.look_bar.colours.isEnabled()  # colour maps need a single-channel image
+    assert not panel.style_bar.colours.isEnabled()  # colour maps need a single-channel image
     panel.freeze.setChecked(True)
-    panel.look_bar.brightness.setValue(panel.look_bar.brightness.maximum())
+    panel.style_bar.brightness.setValue(panel.style_bar.brightness.maximum())
     ticks(window, panel)
     assert shown(panel)[..., :3].min() == 255
-    panel.look_bar.brightness.reset.emit()  # like a double click
-    panel.look_bar.contrast.setValue(0)
+    panel.style_bar.brightness.reset.emit()  # like a double click
+    panel.style_bar.contrast.setValue(0)
     ticks(window, panel)
     assert shown(panel)[0, 0, :3].tolist() == [125, 125, 125]
 
 
 def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic(DEPTH)
-    panel.look_bar.contrast.setValue(150)
+    panel.style_bar.contrast.setValue(150)
     panel.tune.setChecked(True)
     panel.overlays.set_visible(MARKS, visible=True)
-    look = panel.look_bar.look
+    look = panel.style_bar.picture_style
     panel.show_topic(CAMERA)
-    assert panel.look_bar.look != look
+    assert panel.style_bar.picture_style != look
     panel.show_topic(DEPTH)
-    assert panel.look_bar.look == look
+    assert panel.style_bar.picture_style == look
     again = window.make(PANEL)
     qtbot.addWidget(again)
     assert isinstance(again, ImagePanel)
     again.restore_state(panel.save_state())
-    assert again.look_bar.look == look
+    assert again.style_bar.picture_style == look
     assert again.tune.isChecked()
     assert again.overlays.selected == (MARKS,)
     again.restore_state({"look": {"contrast": "much"}, "layers": [3], "topic": DEPTH})

@@ -67,7 +67,7 @@ def arm(window: Window, panel: ImagePanel) -> Subscriber:
 def at(panel: ImagePanel, x: float, y: float) -> QPoint:
     """Convert a position in the 320 x 240 image to view pixels."""
     view = panel.view
-    return view.place.to_view(view.area()).map(QPointF(x / 320, y / 240)).toPoint()
+    return view.placement.to_view(view.area()).map(QPointF(x / 320, y / 240)).toPoint()
 
 
 def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT) -> PicturePoint:
@@ -86,7 +86,7 @@ def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot,
     assert points.isVisible()
     assert panel.actions_of["point"].isChecked()
     assert points.target == Target("topic", POINTS)
-    assert points.strip.words.text() == "Clicks aren't sent until you arm sending"
+    assert points.strip.text_label.text() == "Clicks aren't sent until you arm sending"
     assert unsaid(panel) == []
     QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, 16, 8))
     press(points.close_button)
@@ -111,12 +111,12 @@ def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot,
     click(qtbot, window, panel, 200.5, 100.5, MIDDLE)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 200, "y": 100, "button": "middle", **told})
     assert points.strip.counts.text() == "2 points sent, received by 1"
-    assert session.acting.repeat(entry.number) == ""
+    assert session.acting.resend(entry.number) == ""
     assert heard.listen(timeout_s=20.0)[1]["x"] == 16
     session.runs.stop()
     ticks(window, panel)
     assert not panel.view.accepts_clicks
-    assert session.acting.repeat(entry.number).endswith(" isn't armed. Arm it first.")
+    assert session.acting.resend(entry.number).endswith(" isn't armed. Arm it first.")
 
 
 def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, window, panel) -> None:
@@ -195,7 +195,7 @@ def test_drag_double_click_and_click_outside_the_image_publish_no_point(qtbot, w
     QTest.mouseClick(view, RIGHT, none, at(panel, 30, 30))
     QTest.mouseClick(view, LEFT, none, at(panel, 40, 40))
     QTest.mouseDClick(view, LEFT, none, at(panel, 40, 40))
-    assert view.place.zoom is not None, "a double click still zooms"
+    assert view.placement.zoom is not None, "a double click still zooms"
     start = at(panel, 160, 120)
     QTest.mousePress(view, LEFT, none, start)
     QTest.mouseMove(view, start + QPoint(QApplication.startDragDistance() + 1, 0))
@@ -280,9 +280,9 @@ def test_robot_command_topic_requires_confirmation_and_a_source_change_disarms(q
     ticks(window, panel)
     assert not points.is_armed
     assert not panel.view.accepts_clicks
-    press(points.let)
+    press(points.arm_button)
     ticks(window, panel)
-    press(points.strip.let)
+    press(points.strip.allow_button)
     ticks(window, panel)
     assert points.is_armed
     acting.disarm()
@@ -301,7 +301,7 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
     panel.actions_of["point"].trigger()
     window.session.acting.arm()
     ticks(window, panel)
-    assert panel.points.let.isVisible()
+    assert panel.points.arm_button.isVisible()
     data = ("robot", "camera", "point", "json", "geometry_msgs/Point", "geometry_msgs/PointStamped")
     assert untranslated_in(panel.points, *data) == []
     assert clipped(panel.points) == []

@@ -46,7 +46,7 @@ def panel(qtbot, window) -> Iterator[InspectorPanel]:
 
 
 def choose(panel: InspectorPanel, *path: str | int) -> None:
-    panel.tree.setCurrentIndex(panel.model.reveal(path))
+    panel.tree.setCurrentIndex(panel.model.index_of_path(path))
 
 
 def test_without_a_topic_the_inspector_links_to_the_topics_panel(panel, window) -> None:
@@ -73,8 +73,8 @@ def test_newest_message_is_shown_as_a_tree_with_its_metadata(panel, window) -> N
     assert panel.body.page == TREE
     choose(panel, "robots", "Pepper", "pose", "y")
     assert panel.foot.path.text() == "robots.Pepper.pose.y"
-    assert panel.foot.facts.text().startswith("seq 18\u2009204   ")
-    assert "latency" in panel.foot.facts.text()
+    assert panel.foot.info.text().startswith("seq 18\u2009204   ")
+    assert "latency" in panel.foot.info.text()
     assert panel.live.text == "live"
 
 
@@ -115,8 +115,8 @@ def test_latched_message_shows_no_latency(panel, window) -> None:
     window.session.topics.values_revision += 1
     panel.show_topic("/blackboard")
     panel.refresh()
-    assert "seq 1" in panel.foot.facts.text()
-    assert "latency" not in panel.foot.facts.text()
+    assert "seq 1" in panel.foot.info.text()
+    assert "latency" not in panel.foot.info.text()
 
 
 def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
@@ -127,7 +127,7 @@ def test_latency_of_a_shown_message_does_not_grow(panel, window) -> None:
     said = panel._message_info(panel._shown_message)
     panel._shown_message.stamp_ns -= 600 * 10**9  # as if ten minutes old
     panel._set_mode("raw")
-    assert panel.foot.facts.text() == said
+    assert panel.foot.info.text() == said
     assert panel._message_info(panel._shown_message) == said
 
 
@@ -155,8 +155,8 @@ def test_changing_metadata_does_not_relayout_the_window(qapp, panel, window) -> 
         if number == 2:  # the first messages fill the panel and change its layout
             layouts.count = 0
             told.clear()
-        told.add(panel.foot.facts.text())
-        assert panel.foot.facts.accessibleName() == panel.foot.facts.text()
+        told.add(panel.foot.info.text())
+        assert panel.foot.info.accessibleName() == panel.foot.info.text()
     assert len(told) == 6
     assert layouts.count == 0
 
@@ -171,13 +171,13 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
         now[0] = 1.0 + number / 30
         window.session.send("/odom", {"n": number})
         ticks(window, panel)
-        said.append((panel.model.value()["n"], panel.foot.facts.text()))
+        said.append((panel.model.value()["n"], panel.foot.info.text()))
     assert [number for number, _facts in said[:3]] == [0, 1, 2]  # the first ones immediately
     assert 20 <= len(set(said)) <= 24
     now[0] += 0.1
     ticks(window, panel)
     assert panel.model.value()["n"] == 60
-    assert panel.foot.facts.text().split("   ")[:2] == message_info(panel._shown_message).split("   ")[:2]
+    assert panel.foot.info.text().split("   ")[:2] == message_info(panel._shown_message).split("   ")[:2]
 
 
 def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel, window) -> None:
@@ -193,20 +193,20 @@ def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel,
         panel.freeze.setChecked(True)
         panel.freeze.setChecked(False)
         assert panel.model.value() == {"n": number}
-        assert panel.foot.facts.text().split("   ")[1] == size
+        assert panel.foot.info.text().split("   ")[1] == size
 
 
 def test_next_message_keeps_expanded_items_and_marks_changes(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", blackboard(0))
     panel.refresh()
-    joints = panel.model.reveal(("robots", "Pepper", "joints"))
+    joints = panel.model.index_of_path(("robots", "Pepper", "joints"))
     panel.tree.expand(joints)
     window.session.send("/blackboard", blackboard(1))
     panel.refresh()
-    assert panel.tree.isExpanded(panel.model.reveal(("robots", "Pepper", "joints")))
-    assert panel.model.node(panel.model.reveal(("stamp",))).changed_s is not None
-    assert panel.model.node(panel.model.reveal(("note",))).changed_s is None
+    assert panel.tree.isExpanded(panel.model.index_of_path(("robots", "Pepper", "joints")))
+    assert panel.model.node(panel.model.index_of_path(("stamp",))).changed_s is not None
+    assert panel.model.node(panel.model.index_of_path(("note",))).changed_s is None
 
 
 def test_undecodable_message_is_shown_as_bytes_with_the_reason(panel, window) -> None:
@@ -471,14 +471,14 @@ def test_message_is_compared_with_the_previous_message_and_only_changes_can_be_s
     panel.refresh()
     panel.compare.setChecked(True)
     assert panel.strip.isVisible()
-    assert panel.strip.words.text() == "Previous message: 1 changed, 1 added, 1 removed"
+    assert panel.strip.text_label.text() == "Previous message: 1 changed, 1 added, 1 removed"
     marks = {node.key: node.mark for node in top(panel)}
     assert marks == {"same": "", "n": "changed", "new": "added", "gone": "removed"}
     panel.strip.only.setChecked(True)
     assert [node.key for node in top(panel)] == ["n", "new", "gone"]
     window.session.send("/blackboard", {"same": 1, "n": 2, "new": {"x": 1}})
     panel.refresh()
-    assert panel.strip.words.text() == "Previous message: no difference"
+    assert panel.strip.text_label.text() == "Previous message: no difference"
     assert top(panel) == []
     panel.compare.setChecked(False)
     assert panel.strip.isHidden()
@@ -490,7 +490,7 @@ def test_pinned_message_is_kept_as_the_reference_of_the_comparison(panel, window
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
     panel.pin.setChecked(True)
-    assert panel.strip.words.text() == "Pinned message: no difference"
+    assert panel.strip.text_label.text() == "Pinned message: no difference"
     for number in (2, 3):
         window.session.send("/blackboard", {"n": number})
         panel.refresh()

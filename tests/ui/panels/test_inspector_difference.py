@@ -149,6 +149,6 @@ def test_only_requested_items_of_a_long_list_are_compared() -> None:
     model.fetchMore(rows)
     assert model.rowCount(rows) == 500
     assert Watched.asked - before == 500
-    assert model.reveal(("rows", 700)).isValid()
+    assert model.index_of_path(("rows", 700)).isValid()
     assert model.rowCount(rows) == 701
-    assert not model.reveal(("rows", 100_000)).isValid()
+    assert not model.index_of_path(("rows", 100_000)).isValid()

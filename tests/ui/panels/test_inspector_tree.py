@@ -20,7 +20,7 @@ def model() -> TreeModel:
 
 
 def at(model: TreeModel, *path: str | int) -> QModelIndex:
-    index = model.reveal(path)
+    index = model.index_of_path(path)
     assert index.isValid(), path
     return index
 
@@ -150,7 +150,7 @@ def test_chevron_and_keyboard_expand_and_collapse(qtbot, model) -> None:
 def test_field_paths_resolve_to_their_values(model) -> None:
     assert model.node(at(model, "list", 1)).path == "list[1]"
     assert model.node(at(model, "robots", "Pepper", "pose", "x")).path == "robots.Pepper.pose.x"
-    assert not model.reveal(("robots", "nobody")).isValid()
+    assert not model.index_of_path(("robots", "nobody")).isValid()
 
 
 def test_search_finds_keys_and_values_in_tree_order() -> None:

@@ -159,7 +159,7 @@ def test_rows_of_a_lost_network_are_grey_and_show_the_reason(qtbot, window: Wind
     nodes.refresh()
     for panel, key in ((topics, "ros /camera"), (nodes, "ros /arm  ")):
         assert panel.networks.isVisibleTo(panel)
-        assert panel.networks.words.text() == f"ROS 1: {REASON}."
+        assert panel.networks.text_label.text() == f"ROS 1: {REASON}."
         assert panel.model.cell_at(panel.model.index_of(key).row(), 0).role == "textDisabled"
     assert topics.model.cell_at(topics.model.index_of("/odom").row(), 0).role == "text"
     topics.networks.button.click()

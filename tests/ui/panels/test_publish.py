@@ -33,8 +33,8 @@ def window(qapp) -> Window:
 @pytest.fixture
 def panel(qtbot, window) -> PublishPanel:
     acting = window.session.acting
-    acting.shelf.set_message(LOOK)
-    acting.shelf.set_message(STILL)
+    acting.saved_messages.set_message(LOOK)
+    acting.saved_messages.set_message(STILL)
     made = window.make(PANEL, (760, 640))
     qtbot.addWidget(made)
     for widget in made.header_widgets():
@@ -66,7 +66,7 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     ticks(window, panel)
     assert not form.sentence.isVisible()
     assert form.send.isEnabled()
-    kept = acting_of(window).shelf.get("a")
+    kept = acting_of(window).saved_messages.get("a")
     assert kept is not None
     assert kept.payload() == {"yaw": -12.5, "pitch": 4.0, "speed": 0.3}
     form.edit.edit.undo()
@@ -100,7 +100,7 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     assert panel.form.send.text() == "Send"
     assert panel.form.last.text().endswith("received by 1")
     assert [token.text() for token in panel.strip.tokens] == ["/cmd_vel"]
-    assert panel.strip.words.text() == "5:00 left"
+    assert panel.strip.text_label.text() == "5:00 left"
     press(panel.form.repeat)
     assert heard.listen(timeout_s=20.0)[0]
     ticks(window, panel, 7)
@@ -112,7 +112,7 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     assert acting.outbox.repeated_messages == ()
     ticks(window, panel, 7)
     assert states(panel)[1] == "not armed"
-    assert panel.strip.words.text() == "Sending is off"
+    assert panel.strip.text_label.text() == "Sending is off"
 
 
 def test_stop_change_of_source_and_closing_disarm(window, panel) -> None:
@@ -142,7 +142,7 @@ def test_robot_command_topic_requires_another_confirmation(window, panel) -> Non
     session, acting = window.session, acting_of(window)
     topic = session.fleet.connected[0].robot.topics.command
     heard = session.source.listen(topic, "json")
-    acting.shelf.set_message(replace(STILL, topic=topic))
+    acting.saved_messages.set_message(replace(STILL, topic=topic))
     panel.list.select_key("b")
     ticks(window, panel)
     press(panel.form.send)
@@ -155,7 +155,7 @@ def test_robot_command_topic_requires_another_confirmation(window, panel) -> Non
     assert heard.receive(0.0) is None
     press(panel.form.send)
     ticks(window, panel)
-    press(panel.strip.let)
+    press(panel.strip.allow_button)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
     press(panel.form.send)  # still armed: no second question
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
@@ -221,7 +221,7 @@ def test_topic_names_are_suggested_and_their_type_is_adopted(panel) -> None:
 def test_saved_messages_are_duplicated_deleted_and_restored_by_undo(window, panel) -> None:
     panel.list.select_key("b")
     QTest.keyClick(panel.list, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
-    names = [each.name for each in acting_of(window).shelf.messages]
+    names = [each.name for each in acting_of(window).saved_messages.messages]
     assert names == ["Look at Aiko", "Stand still", "Stand still 2"]
     assert panel.message is not None
     assert panel.message.name == "Stand still 2"
@@ -238,7 +238,7 @@ def test_saved_messages_are_filtered_and_an_empty_list_offers_a_new_message(wind
     panel.filter.setText("cmd")
     assert panel.list.model().rowCount() == 1
     panel.filter.clear()
-    for each in acting_of(window).shelf.messages:
+    for each in acting_of(window).saved_messages.messages:
         panel.delete(each.id)
     assert panel.pages.currentIndex() == 0
     press(button(panel.empty, "New"))

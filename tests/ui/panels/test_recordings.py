@@ -81,7 +81,7 @@ def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
 
 
 def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, window, folder):
-    assert panel.empty.isVisible() or panel._has_looked, "until the folder was looked at, it says so"
+    assert panel.empty.isVisible() or panel._has_scanned, "until the folder was looked at, it says so"
     seen(qtbot, panel, "arm", "camera", "cut")
     facts = {each.path.stem: each for each in panel._scan.files}
     assert [badge_of(facts[name], False) for name in ("arm", "cut")] == ["", "cut"]
@@ -219,10 +219,10 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
 
     def is_there() -> bool:
         panel.refresh()
-        return strip.look is not None
+        return strip.preview is not None
 
     qtbot.waitUntil(is_there)
-    assert details.part_words.text() == "3 of 3 topics"
+    assert details.part_label.text() == "3 of 3 topics"
     sizes = [sum(each.size_bytes for each in messages[first::2]) for first in range(2)]
     whole, shown = picture(1).size_bytes, size_text(sum(sizes))
     assert (
@@ -239,19 +239,19 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     assert strip._images.count(None) < len(strip._images)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
-    place = QPoint(round(strip._x_of(strip.look.start_ns + 6 * 10**9)), 30)
+    place = QPoint(round(strip._x_of(strip.preview.start_ns + 6 * 10**9)), 30)
     QTest.mouseClick(strip, Qt.MouseButton.LeftButton, pos=place)
-    assert abs(strip.end_ns - strip.look.start_ns - 6 * 10**9) < 10**8
-    strip.set_part(strip.begin_ns, strip.look.start_ns + 6 * 10**9)
+    assert abs(strip.end_ns - strip.preview.start_ns - 6 * 10**9) < 10**8
+    strip.set_part(strip.begin_ns, strip.preview.start_ns + 6 * 10**9)
     QTest.keyClicks(details.topics.edit, "/a ")
-    assert details.part_words.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
+    assert details.part_label.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
     assert details.about.text() == f"about 200 messages, {size_text(sizes[0] * 200 / 500)}"
-    assert details.into.text() == f"{folder.name}/long, 0.02.0 to 0.06.0, CSV"
+    assert details.folder_label.text() == f"{folder.name}/long, 0.02.0 to 0.06.0, CSV"
     assert details.files.text() == "1 file"
     window.answers.path = tmp_path
     details.choose.click()
-    assert details.into.text() == f"{tmp_path.name}/long, 0.02.0 to 0.06.0, CSV"
-    assert details.into.toolTip() == str(tmp_path / "long, 0.02.0 to 0.06.0, CSV")
+    assert details.folder_label.text() == f"{tmp_path.name}/long, 0.02.0 to 0.06.0, CSV"
+    assert details.folder_label.toolTip() == str(tmp_path / "long, 0.02.0 to 0.06.0, CSV")
     details.export.click()
 
     def is_over() -> bool:
@@ -262,7 +262,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     (made,) = (tmp_path / "long, 0.02.0 to 0.06.0, CSV").iterdir()
     assert (made.name, len(made.read_text("utf-8").splitlines())) == ("a.csv", 1 + 200)
     QTest.keyClicks(details.topics.edit, "not /a ")
-    assert details.part_words.text() == "No matching topics in this recording"
+    assert details.part_label.text() == "No matching topics in this recording"
     window.toasts.clear()
     details.export.click()
     assert window.toasts == ["No matching topics in this recording"]
@@ -278,7 +278,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     assert rows == [size_text(each) for each in (*sizes, whole)]
     details.list.table.opened.emit("/a")
     assert details.topics.patterns() == ((), ("/a",))
-    assert details.part_words.text().endswith("2 of 3 topics")
+    assert details.part_label.text().endswith("2 of 3 topics")
     details.list.filter.setText("b")
     details.list.none.click()
     assert details.topics.patterns() == (("/camera",), ())
@@ -286,7 +286,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     assert details.about.text() == "This value can't be converted to this type"
     details.list.filter.clear()
     details.list.none.click()
-    assert (details.part(), details.part_words.text()) == (None, "No matching topics in this recording")
+    assert (details.part(), details.part_label.text()) == (None, "No matching topics in this recording")
     details.list.all.click()
     assert details.part().topics is None
     details.topics.show_patterns(("/a",), ())
@@ -295,7 +295,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     details.times.set_value("clock")
     details.times.changed.emit("clock")
     begin, end = (clock_text(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
-    assert details.part_words.text() == f"{begin} to {end}, 1 of 3 topics"
+    assert details.part_label.text() == f"{begin} to {end}, 1 of 3 topics"
     assert strip.begin.accessibleDescription() == begin
     QTest.keyClick(strip.end, Qt.Key.Key_Home)  # handles can't cross
     assert strip.begin_ns == strip.end_ns

@@ -73,8 +73,8 @@ def test_speaker_is_named_in_the_caption_while_speaking(panel, window) -> None:
     before = panel.view.grab().toImage()
     window.session.voices._current = Utterance("Ginger", "And I say", "en", 0.5)
     panel.refresh()
-    assert panel.view.heard == "Ginger: And I say"
+    assert panel.view.caption == "Ginger: And I say"
     assert panel.view.grab().toImage() != before
     window.session.voices._current = None
     panel.refresh()
-    assert panel.view.heard == ""
+    assert panel.view.caption == ""

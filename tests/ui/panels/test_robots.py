@@ -84,13 +84,13 @@ def test_running_action_shows_progress_and_can_be_cancelled(panel, window) -> No
     card = panel.cards["walk"]
     assert card.progress.isVisible()
     assert card.progress.fraction == pytest.approx(0.4)
-    assert card.words.text() == "for 0.6 s"
+    assert card.text_label.text() == "for 0.6 s"
     press(card.try_button)
     assert window.session.asked("Pepper") == [("cancel", "walk", None)]
     made.state = "canceled"
     panel.refresh()
     assert not card.progress.isVisible()
-    assert card.words.text() == ""
+    assert card.text_label.text() == ""
 
 
 def test_non_cancellable_action_disables_its_button_while_running(panel, window) -> None:
@@ -205,7 +205,7 @@ def test_disconnected_robot_shows_its_last_seen_time_and_can_be_removed(panel, w
     link.is_connected = False
     fleet.revision += 1
     panel.refresh()
-    assert panel.items["Rover"].where.startswith("seen today")
+    assert panel.items["Rover"].location.startswith("seen today")
     panel.select_robot("Rover")
     panel.list.menu_of(panel.items["Rover"]).actions()[1].trigger()
     assert list(panel.items) == ["Pepper"]

@@ -64,16 +64,16 @@ def test_room_shows_the_words_heard_by_the_robot(panel, window) -> None:
     link = window.session.fleet.links[0]
     link.drawing = {**drawing(), "speech": "", "heard": "good morning"}
     panel.refresh()
-    assert panel.view.heard == "Pepper heard “good morning”"
+    assert panel.view.caption == "Pepper heard “good morning”"
     link.drawing = {**drawing(), "speech": "", "heard": ""}
     panel.refresh()
-    assert panel.view.heard == ""
+    assert panel.view.caption == ""
 
 
 def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None:
     hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
     window.session.document.workspace = {"blocks": {"blocks": [hat]}}
-    press(panel.say.words)
+    press(panel.say.suggestions_button)
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
     choose(panel, "quiz")
     assert window.session.changes("Pepper") == [{"say": "quiz"}]

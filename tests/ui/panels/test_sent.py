@@ -61,11 +61,11 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert panel.total.text().startswith("1 since ")
     assert unsaid(panel) == []
     key = panel.model.key_of(panel.model.row_at(panel.model.index(0, 0)))
-    assert not panel.again.isEnabled()
+    assert not panel.repeat_button.isEnabled()
     panel.table.select_key(key)
     panel.refresh()
-    assert panel.again.isEnabled()
-    press(panel.again)
+    assert panel.repeat_button.isEnabled()
+    press(panel.repeat_button)
     assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
     ticks(window, panel)
     assert rows(panel)[0] == ["/words", "Word, received by 1", "\u00d7 2", "Publish"]
@@ -85,7 +85,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
 
     session.runs.stop()
     ticks(window, panel, 7)
-    assert not panel.again.isEnabled()
+    assert not panel.repeat_button.isEnabled()
     assert rows(panel)[0][1] == "no longer armed"
     menu = panel.menu_of(key)
     assert menu is not None

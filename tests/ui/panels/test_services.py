@@ -43,7 +43,7 @@ def offer(session: Session, **services: str) -> None:
 def window(qapp) -> Window:
     session = Session.full()
     offer(session, remember_face="1", forget_face="1", set_language="2")
-    session.acting.shelf.set_request("remember_face", REQUEST)
+    session.acting.saved_messages.set_request("remember_face", REQUEST)
     return Window(session)
 
 
@@ -95,7 +95,7 @@ def test_form_is_built_from_the_last_request_and_edits_its_json(panel) -> None:
     assert panel._parse_text().fill({}) == {
         "name": "Grey Ada", "pictures": 30, "quality": 1, "replace": False, "box": {"x": 1},
     }  # fmt: skip
-    press(panel.way.findChildren(type(panel.way.selected_button()))[1])
+    press(panel.format_switch.findChildren(type(panel.format_switch.selected_button()))[1])
     assert panel.edit.isVisible()
     panel.edit.set_text('{"name": "Bo"}')
     panel._set_mode("form")
@@ -120,7 +120,7 @@ def test_invalid_field_is_reported_and_disables_the_call(panel) -> None:
     assert panel.edit.text() == '{"name": 1}'
     panel.edit.set_text("[1]")
     panel._set_mode("form")
-    assert panel.way.value == "json", "a list has no fields"
+    assert panel.format_switch.value == "json", "a list has no fields"
 
 
 def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
@@ -137,15 +137,15 @@ def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
     answered(window, panel, qtbot)
     assert asked == [panel._parse_text().fill({})]
     assert session.acting.arming.targets == (Target("service", "remember_face"),)
-    rows = panel.answer.model
+    rows = panel.reply_view.model
     shown = [(rows.cell_at(row, 0).text, rows.cell_at(row, 1).text) for row in range(rows.rowCount())]
     assert shown == [("ok", "true"), ("faces", "[1]"), ("0", "{1}"), ("id", "7"), ("quality", "0.93")]
-    assert panel.answer.chip.text.startswith("replied in ")
-    assert panel.answer.facts.text().endswith("B")
-    panel.answer.way.set_value("json")
-    panel.answer._set_mode("json")
-    assert '"quality": 0.93' in panel.answer.text.text()
-    press(panel.answer.copy)
+    assert panel.reply_view.chip.text.startswith("replied in ")
+    assert panel.reply_view.details.text().endswith("B")
+    panel.reply_view.format_switch.set_value("json")
+    panel.reply_view._set_mode("json")
+    assert '"quality": 0.93' in panel.reply_view.text.text()
+    press(panel.reply_view.copy)
     assert '"ok": true' in QGuiApplication.clipboard().text()
     assert panel.call_button.text() == "Call"
     assert panel.calls_model.cell_at(0, 1).text.startswith("name Aiko, pictures 12")
@@ -165,22 +165,22 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
     session.source.node.new_server("remember_face", serve, threads=3)
     press(panel.call_button)
     answered(window, panel, qtbot)
-    assert panel.answer.sentence.text() == "rejected: no face in sight"
+    assert panel.reply_view.sentence.text() == "rejected: no face in sight"
     mode[0] = "wait"
     panel.seconds.setText("0.2")
     QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
     press(panel.call_button)
     assert not panel.call_button.isEnabled()
     answered(window, panel, qtbot)
-    assert panel.answer.chip.text == "no reply within 0.2 s"
+    assert panel.reply_view.chip.text == "no reply within 0.2 s"
     panel.seconds.setText("60")
     QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
     press(panel.call_button)
     ticks(window, panel)
     assert panel.call_button.text().startswith("Waiting ")
-    press(panel.give_up)
-    assert panel.answer.chip.text.startswith("cancelled")
-    assert not panel.give_up.isVisible()
+    press(panel.cancel_button)
+    assert panel.reply_view.chip.text.startswith("cancelled")
+    assert not panel.cancel_button.isVisible()
     go_on.set()
 
 
@@ -224,10 +224,16 @@ def test_reply_is_not_clipped_at_the_width_of_the_developer_layout(window, panel
     window.session.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
     press(panel.call_button)
     answered(window, panel, qtbot)
-    assert panel.answer.chip.text.startswith("replied in ")
+    assert panel.reply_view.chip.text.startswith("replied in ")
     right = panel.mapToGlobal(panel.rect().topRight()).x()
-    for widget in (panel.answer.table, panel.answer.way, panel.answer.copy, panel.calls, panel.way):
+    for widget in (
+        panel.reply_view.table,
+        panel.reply_view.format_switch,
+        panel.reply_view.copy,
+        panel.calls,
+        panel.format_switch,
+    ):
         assert widget.isVisible()
         qtbot.waitUntil(lambda each=widget: each.mapToGlobal(each.rect().topRight()).x() <= right)
     panel.resize(720, 640)
-    qtbot.waitUntil(lambda: panel.answer.copy.y() < panel.answer.chip.geometry().bottom())
+    qtbot.waitUntil(lambda: panel.reply_view.copy.y() < panel.reply_view.chip.geometry().bottom())

@@ -95,7 +95,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert panel.strip.isVisible()
     assert not panel.transport.armed.isVisible()
     assert panel.strip.question.text().startswith("/base/cmd_vel commands robots.")
-    QTest.mouseClick(panel.strip.let, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(panel.strip.allow_button, Qt.MouseButton.LeftButton)
     session.tick(), panel.refresh()
     assert [token.text() for token in panel.strip.tokens] == ["/a as /test/a", "/base/cmd_vel"]
     going = sending.outbox.active_topics

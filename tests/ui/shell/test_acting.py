@@ -45,7 +45,7 @@ def test_menu_commands_open_their_panels_and_stop_disarms(window: MainWindow) ->
     assert publish.message is not None
     assert publish.message.topic == "/blackboard"
     assert run("publish.new")
-    assert [each.topic for each in acting.shelf.messages] == ["/blackboard", ""]
+    assert [each.topic for each in acting.saved_messages.messages] == ["/blackboard", ""]
     assert not run("publish.topic:ros2 /camera"), "other networks are only looked at"
     assert run("service.call:remember_face")
     assert isinstance(bench.docks["services"].panel, ServicesPanel)

@@ -73,7 +73,7 @@ def test_saving_appends_the_displayed_file_extension(
 ) -> None:
     sheet.ask_save(folder / "New behaviour.nepb", taken.append)
     assert sheet.name.text() == "New behaviour"
-    assert sheet.ending.text() == ".nepb"
+    assert sheet.suffix_label.text() == ".nepb"
     assert sheet.name.hasFocus()
     typed(sheet, "Dance")
     assert sheet.done.text() == "Save"
@@ -98,7 +98,7 @@ def test_saving_over_an_existing_file_offers_replace_and_keep_both(
 ) -> None:
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
     assert sheet.done.text() == "Replace"
-    assert sheet.said.text() == "“Greeting” already exists. Replace it, or keep both."
+    assert sheet.hint.text() == "“Greeting” already exists. Replace it, or keep both."
     QTest.mouseClick(sheet.keep_both, LEFT)
     assert taken == [folder / "Greeting 2.nepb"]
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
@@ -136,7 +136,7 @@ def test_invalid_file_names_are_rejected_with_a_reason(name: str, wrong: str) ->
 def test_file_with_an_invalid_name_cannot_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_save(folder / "x.nepb", taken.append)
     typed(sheet, "what?")
-    assert sheet.said.text() == "A name can't contain “?”."
+    assert sheet.hint.text() == "A name can't contain “?”."
     assert not sheet.done.isEnabled()
     QTest.keyClick(sheet.name, Qt.Key.Key_Return)
     assert taken == []
@@ -150,7 +150,7 @@ def test_folders_can_be_created_opened_and_left(sheet: FileSheet, folder: Path, 
     QTest.keyClick(sheet.folder_name, Qt.Key.Key_Return)
     assert (folder / "Class 4").is_dir()
     assert sheet.folder == folder / "Class 4"
-    assert sheet.said.text() == "This folder is empty."
+    assert sheet.hint.text() == "This folder is empty."
     QTest.mouseClick(sheet.up, LEFT)
     assert sheet.folder == folder
     assert sheet.selected_entry is not None
@@ -158,7 +158,7 @@ def test_folders_can_be_created_opened_and_left(sheet: FileSheet, folder: Path, 
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
     QTest.mouseClick(sheet.make_folder, LEFT)
-    assert sheet.said.text() == "“Class 4” already exists."
+    assert sheet.hint.text() == "“Class 4” already exists."
     assert taken == []
 
 
@@ -194,7 +194,7 @@ def test_missing_folder_is_reported_and_the_previous_folder_stays_open(
     sheet.ask_open(folder, print)
     sheet.go_to(folder / "gone")
     assert sheet.folder == folder
-    assert sheet.said.text() == "Can't open “gone”: no such file or directory."
+    assert sheet.hint.text() == "Can't open “gone”: no such file or directory."
 
 
 def test_suggested_locations_are_existing_folders_without_duplicates(folder: Path, tmp_path: Path) -> None:
@@ -256,7 +256,7 @@ def test_open_command_opens_the_file_sheet_with_recent_folders(
     sheet = window.findChild(FileSheet)
     assert sheet is not None
     assert sheet.isVisible()
-    assert "work" in [button.text() for button in sheet.places.findChildren(Button)]
+    assert "work" in [button.text() for button in sheet.location_list.findChildren(Button)]
     sheet.dismiss()
     window.close()
 
@@ -276,16 +276,16 @@ def test_image_chooser_lists_only_images(sheet: FileSheet, folder: Path, taken: 
 def test_folder_is_selected_or_created(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_folder(folder, taken.append)
     assert rows(sheet) == ["class 3"]
-    assert sheet.said.text() == "Images will be saved in “work”.", "no row is chosen by itself"
+    assert sheet.hint.text() == "Images will be saved in “work”.", "no row is chosen by itself"
     sheet.list.setCurrentItem(sheet.list.topLevelItem(0))
-    assert sheet.said.text() == "Images will be saved in “class 3”."
+    assert sheet.hint.text() == "Images will be saved in “class 3”."
     sheet.done.click()
     sheet.ask_folder(folder, taken.append)
     sheet.new_folder.click()
     sheet.folder_name.setText("album")
     sheet.make_folder.click()
     assert sheet.list.hasFocus()
-    assert sheet.said.text() == "Images will be saved in “album”."
+    assert sheet.hint.text() == "Images will be saved in “album”."
     sheet.done.click()
     assert taken == [folder / "class 3", folder / "album"]
 
@@ -317,17 +317,17 @@ def test_save_as_offers_several_file_types(sheet: FileSheet, folder: Path) -> No
         sheet.ask_save_as("Save as image", folder / name, kinds, lambda p, k: taken.append((p.name, k.label)))
 
     ask("Tea 1")
-    assert (sheet.heading.text(), sheet.ending.text(), sheet.name.text()) == (
+    assert (sheet.heading.text(), sheet.suffix_label.text(), sheet.name.text()) == (
         "Save as image",
         ".png",
         "Tea 1",
     )
     assert rows(sheet) == ["class 3", "Tea 1.svg"]
     sheet.kind.setCurrentIndex(1)
-    assert (sheet.ending.text(), sheet.done.text()) == (".svg", "Replace")
+    assert (sheet.suffix_label.text(), sheet.done.text()) == (".svg", "Replace")
     QTest.mouseClick(sheet.keep_both, LEFT)
     ask("Tea 1")
-    assert sheet.ending.text() == ".png", "each question begins with the first kind"
+    assert sheet.suffix_label.text() == ".png", "each question begins with the first kind"
     typed(sheet, "Tea.SVG")
     QTest.keyClick(sheet.name, Qt.Key.Key_Return)
     ask("Tea 1")
@@ -338,4 +338,4 @@ def test_save_as_offers_several_file_types(sheet: FileSheet, folder: Path) -> No
     assert taken == [("Tea 1 2.svg", "Sharp picture"), ("Tea.svg", "Sharp picture"), ("Tea.png", "Picture")]
     sheet.ask_save(folder / "Dance.nepb", print)
     assert not sheet.kind.isVisible()
-    assert sheet.ending.text() == ".nepb"
+    assert sheet.suffix_label.text() == ".nepb"

@@ -112,16 +112,16 @@ def test_alert_text_is_not_interpreted_as_markup(place: QWidget, theme: Theme) -
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", title="<b>/faces</b> & co.")])
-    (line,), _is_whole = banner.banner.words.lines("body")
+    (line,), _is_whole = banner.banner.text_label.lines("body")
     assert next(text for text, _font, _role in line) == "<b>/faces</b> & co."
-    assert "&lt;b&gt;" in banner.banner.words.toolTip()
+    assert "&lt;b&gt;" in banner.banner.text_label.toolTip()
 
 
 def test_long_alert_text_wraps_to_the_lines_that_fit(place: QWidget, theme: Theme) -> None:
     banner = AlertBanner(theme)
     place.layout().addWidget(banner)
     banner.show_alerts([Said("a", detail="It means a lot. " * 30)])
-    words = banner.banner.words
+    words = banner.banner.text_label
     words.resize(300, 48)
     for kind, most in (("bodyLarge", 2), ("small", 3)):
         lines, is_whole = words.lines(kind)

@@ -57,7 +57,7 @@ def test_closing_the_window_saves_the_latest_edit(qtbot, window: MainWindow, com
     bench = window.show_layout("behaviour")
     editor, shut = Late(), []
     monkeypatch.setattr(bench.docks["behaviour"].panel, "flush", editor.flush)
-    window.on_shut = lambda: shut.append(window.session.document.dirty)
+    window.on_closed = lambda: shut.append(window.session.document.dirty)
     window.show()
     assert not window.close()
     assert (shut, window.isVisible()) == ([], True)
@@ -74,7 +74,7 @@ def test_work_that_cannot_be_saved_is_reported_before_closing(
     (home / "journal").parent.mkdir(parents=True, exist_ok=True)
     (home / "journal").write_text("no folder")
     shut: list[bool] = []
-    window.on_shut = lambda: shut.append(True)
+    window.on_closed = lambda: shut.append(True)
     window.show()
     session = window.session
     session.document.apply_edit(BLOCKS)

@@ -209,7 +209,7 @@ def test_page_list_opens_pages_and_search_lists_matching_pages(qtbot, guide: Gui
     assert guide.page.toPlainText().startswith("The virtual room")
     assert guide.page.textCursor().selectedText() == "ball"
     QTest.keyClicks(guide.search, "zzz")
-    assert guide.none.isVisible()
+    assert guide.no_match_label.isVisible()
     QTest.keyClick(guide.search, Qt.Key.Key_Escape)
     assert not guide.isVisible()
 

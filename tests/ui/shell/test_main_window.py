@@ -272,12 +272,12 @@ def test_f6_and_number_shortcuts_move_between_panels(qtbot, window: MainWindow, 
     seen = []
     for _ in range(4):
         QTest.keyClick(window, Qt.Key.Key_F6)
-        dock = window.panel_focus.dock()
+        dock = window.panel_focus.focused_dock()
         assert dock is not None
         seen.append(dock.description.name)
     assert sorted(seen) == ["console", "image", "inspector", "topics"]
     QTest.keyClick(window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
-    found = window.panel_focus.dock()
+    found = window.panel_focus.focused_dock()
     assert found is not None
     assert found.description.name == window.bench.open_names()[1]
     assert found.title.name.property("role") == "text"
@@ -553,7 +553,7 @@ def test_closing_the_window_closes_its_panels_and_stops_its_timer_once(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     done: list[str] = []
-    window.on_shut = lambda: done.append("shut")
+    window.on_closed = lambda: done.append("shut")
     show(qtbot, window)
     bench = window.show_layout("developer")
     window.close()

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox
-from app.ui.widgets.menus import ContextMenuFilter, Menu, round_region
+from app.ui.widgets.menus import FieldContextMenu, Menu, round_region
 
 # on the offscreen platform, popups can't grab the keyboard
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
@@ -100,7 +100,7 @@ def test_mnemonics_are_underlined_during_keyboard_navigation(qtbot, theme: Theme
 
 def test_text_field_uses_the_themed_context_menu(qtbot, theme: Theme) -> None:
     field = QLineEdit("hello")
-    ContextMenuFilter(theme, field)
+    FieldContextMenu(theme, field)
     theme.apply()
     qtbot.addWidget(field)
     field.show()

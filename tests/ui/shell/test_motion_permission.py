@@ -59,17 +59,17 @@ def test_permission_question_names_the_moving_actions_and_the_stop_key(window) -
     question = window.question
     assert question.isVisible()
     assert question.title.text() == "Allow Rover to move?"
-    assert "“move” and “turn” move Rover." in question.sentence.text()
-    assert "F12" in question.sentence.text()
-    assert question.always.text() == "Always for Rover"
+    assert "“move” and “turn” move Rover." in question.message.text()
+    assert "F12" in question.message.text()
+    assert question.always_switch.text() == "Always for Rover"
     assert question.y() > 200  # covers neither the run bar's Stop nor the robot's
-    assert window.focusWidget() is question.not_now
+    assert window.focusWidget() is question.cancel_button
     assert question.accessibleName() == "Allow Rover to move?"
 
 
 def test_allowing_motion_runs_the_requested_action(window) -> None:
     window.ask("move")
-    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(window.question.allow_button, Qt.MouseButton.LeftButton)
     assert window.done == ["moved"]
     assert not window.question.isVisible()
     assert window.focusWidget() is window.field
@@ -80,11 +80,11 @@ def test_allowing_motion_runs_the_requested_action(window) -> None:
 def test_not_now_denies_the_requested_motion(window, how) -> None:
     window.ask("move")
     if how == "button":
-        QTest.mouseClick(window.question.not_now, Qt.MouseButton.LeftButton)
+        QTest.mouseClick(window.question.cancel_button, Qt.MouseButton.LeftButton)
     elif how == "escape":
-        QTest.keyClick(window.question.not_now, Qt.Key.Key_Escape)
+        QTest.keyClick(window.question.cancel_button, Qt.Key.Key_Escape)
     else:
-        QTest.keyClick(window.question.not_now, Qt.Key.Key_Space)
+        QTest.keyClick(window.question.cancel_button, Qt.Key.Key_Space)
     assert window.done == []
     assert not window.question.isVisible()
     assert not window.permission.is_allowed(ROVER)
@@ -93,18 +93,20 @@ def test_not_now_denies_the_requested_motion(window, how) -> None:
 def test_always_allow_choice_is_saved(window, tmp_path) -> None:
     window.ask("move")
     QTest.mouseClick(
-        window.question.always, Qt.MouseButton.LeftButton, pos=window.question.always.rect().center()
+        window.question.always_switch,
+        Qt.MouseButton.LeftButton,
+        pos=window.question.always_switch.rect().center(),
     )
-    assert window.question.always.isChecked()
-    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    assert window.question.always_switch.isChecked()
+    QTest.mouseClick(window.question.allow_button, Qt.MouseButton.LeftButton)
     assert MotionPermission(Settings(tmp_path)).is_allowed(ROVER)
 
 
 def test_always_allow_that_cannot_be_saved_is_reported_and_motion_is_allowed(window, tmp_path) -> None:
     (tmp_path / "settings.json").mkdir()
     window.ask("move")
-    window.question.always.setChecked(True)
-    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    window.question.always_switch.setChecked(True)
+    QTest.mouseClick(window.question.allow_button, Qt.MouseButton.LeftButton)
     assert "can't save settings" in window.complaints[0]
     assert window.done == ["moved"]
 
@@ -129,7 +131,7 @@ def test_permission_answer_works_after_the_previously_focused_widget_was_deleted
     window.ask("move")
     window.field.deleteLater()
     QCoreApplication.sendPostedEvents(window.field, QEvent.Type.DeferredDelete.value)
-    QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(window.question.allow_button, Qt.MouseButton.LeftButton)
     assert window.done == ["moved"]
     assert not window.question.isVisible()
 
@@ -156,13 +158,13 @@ def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) 
     window.permission.request_permission([(rover, ("move",))], lambda: None)
     window.question.refresh()
     assert clipped(window.question) == []
-    for words in (window.question.title, window.question.sentence):
+    for words in (window.question.title, window.question.message):
         widest = max(
             words.fontMetrics().horizontalAdvance(each) for each in re.split("[ \u200b]", words.text())
         )
         assert widest <= words.width()
         assert name in words.text().replace("\u200b", "")
-    assert window.question.always.accessibleName() == f"Always for {name}"
+    assert window.question.always_switch.accessibleName() == f"Always for {name}"
     assert name in window.question.accessibleName()
 
 
@@ -173,7 +175,7 @@ def test_permission_question_has_its_final_size_when_first_shown(qtbot, tmp_path
     window.show()
     window.ask("move", "turn")
     first = window.question.height()
-    for words in (window.question.title, window.question.sentence):
+    for words in (window.question.title, window.question.message):
         assert words.height() >= words.heightForWidth(words.width())
     window.resize(1001, 700)
     assert window.question.height() == first

@@ -48,10 +48,10 @@ def test_network_access_sheet_warns_shows_the_address_and_allows_connections(mak
     sheet.open()
     assert sheet.heading.text() == "Let other computers connect?"
     assert "no password" in sheet.warning.text()
-    assert sheet.first() is sheet.no, "the careful answer has the keyboard"
-    assert sheet.typed.text() == "NEP_MASTER=192.168.1.20:7780"
+    assert sheet.initial_focus() is sheet.no, "the careful answer has the keyboard"
+    assert sheet.setting_label.text() == "NEP_MASTER=192.168.1.20:7780"
     sheet.choice.set_value("10.8.0.2")
-    assert sheet.typed.text() == "NEP_MASTER=10.8.0.2:7780"
+    assert sheet.setting_label.text() == "NEP_MASTER=10.8.0.2:7780"
     sheet.copy.click()
     assert QApplication.clipboard().text() == "NEP_MASTER=10.8.0.2:7780"
     sheet.yes.click()

@@ -53,7 +53,7 @@ def test_all_networks_are_disabled_by_default_and_explain_their_address(
     assert [row.switch.isChecked() for row in sheet.rows] == [False] * 3
     assert [row.address.placeholderText() for row in sheet.rows] == ["127.0.0.1:11311", "0", "local"]
     assert "another computer" in states(sheet)[0]
-    assert sheet.first() is sheet.rows[0].switch
+    assert sheet.initial_focus() is sheet.rows[0].switch
     assert world.made == []
 
 

@@ -305,7 +305,7 @@ def test_panels_topics_and_files_are_found(
     palette.open()
     palette.field.setText("console")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
-    dock = window.panel_focus.dock()
+    dock = window.panel_focus.focused_dock()
     assert dock is not None
     assert dock.description.name == "console"
 
@@ -339,8 +339,8 @@ def test_unavailable_command_shows_the_reason_and_is_not_run(
 def test_empty_result_is_reported(palette: CommandPalette) -> None:
     palette.field.setText("qqqq")
     assert palette.rows.entry is None
-    assert palette.nothing.text() == "No results for “qqqq”."
-    assert palette.nothing.isVisible()
+    assert palette.no_result_label.text() == "No results for “qqqq”."
+    assert palette.no_result_label.isVisible()
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert palette.isVisible()
 
@@ -354,7 +354,7 @@ def test_result_list_is_bounded_with_ten_thousand_topics(palette: CommandPalette
     assert len(palette.rows.lines.lines) < 120
     QTest.keyClicks(palette.field, "t9")
     assert len(palette.rows.lines.lines) < 120
-    assert palette.foot.counted.endswith(f" of {len(palette._finder.entries)}")
+    assert palette.foot.result_text.endswith(f" of {len(palette._finder.entries)}")
     assert palette.height() < 600
 
 

@@ -29,7 +29,7 @@ def card(qtbot, window: MainWindow) -> QuestionCard:
     qtbot.waitExposed(window)
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
-    return window.asked
+    return window.question_card
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_question_gets_focus_and_enter_answers(card, said, window) -> None:
     card.show_question(NAME, paused=False)
     assert card.isVisible()
     assert QApplication.focusWidget() is card.field
-    assert card.words.text() == card.field.accessibleName() == "What is your name?"
+    assert card.text_label.text() == card.field.accessibleName() == "What is your name?"
     QTest.keyClicks(card.field, "Ada")
     QTest.keyClick(card.field, Qt.Key.Key_Return)
     assert said == [(1, "Ada")]
@@ -65,7 +65,7 @@ def test_button_answers_and_the_next_question_starts_empty(card, said) -> None:
     QTest.keyClicks(card.field, "Ada")
     QTest.mouseClick(card.button, Qt.MouseButton.LeftButton)
     card.show_question(AGE, paused=False)
-    assert (said, card.field.text(), card.words.text()) == ([(1, "Ada")], "", "How old are you?")
+    assert (said, card.field.text(), card.text_label.text()) == ([(1, "Ada")], "", "How old are you?")
     assert QApplication.focusWidget() is card.field
 
 
@@ -95,7 +95,7 @@ def test_card_stays_inside_the_window_and_does_not_cover_stop(card, window, word
     window.resize(*size)
     card.show_question(AskedQuestion(1, 1, words), paused=False)
     assert window.rect().contains(card.geometry())
-    assert card.words.text()
+    assert card.text_label.text()
     stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
     assert stops
     assert not [stop for stop in stops if stop.intersects(card.geometry())]

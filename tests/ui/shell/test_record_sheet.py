@@ -147,12 +147,12 @@ def test_invalid_topic_pattern_is_reported_and_not_recorded(window, recorder):
     sheet._set_mode("pattern")
     sheet.patterns.show_patterns(("/a\x01",), ())
     sheet.patterns.changed.emit()
-    assert sheet.wrong.isVisible()
+    assert sheet.pattern_error.isVisible()
     sheet.record.click()
     assert recorder.ops() == []
     sheet.patterns.show_patterns(("/a",), ())
     sheet.patterns.changed.emit()
-    assert not sheet.wrong.isVisible()
+    assert not sheet.pattern_error.isVisible()
 
 
 def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorder):
@@ -185,17 +185,17 @@ def test_recording_stops_at_the_selected_limit_and_its_size_is_estimated(window,
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     assert sheet.ends_words.text() == "no limit"
-    for field, text in ((sheet.ends_min, "30"), (sheet.ends_gb, "8")):
+    for field, text in ((sheet.limit_minutes, "30"), (sheet.limit_gb, "8")):
         field.setText(text)
         field.editingFinished.emit()
     assert sheet.ends_words.text() == "whichever comes first"
     choice = recorder.session.recordings.choice
     assert (choice.max_minutes, choice.max_gb) == (30.0, 8.0)
-    sheet.ends_min.setText("-1")
-    sheet.ends_min.editingFinished.emit()
+    sheet.limit_minutes.setText("-1")
+    sheet.limit_minutes.editingFinished.emit()
     assert sheet.ends_words.text() == "The minimum is 0.1 min."
-    sheet.ends_min.setText("30")
-    sheet.ends_min.editingFinished.emit()
+    sheet.limit_minutes.setText("30")
+    sheet.limit_minutes.editingFinished.emit()
     assert not sheet.at_end.isVisible()
     sheet.record.click()
     assert (recorder.line.orders[0]["seconds"], recorder.line.orders[0]["size_bytes"]) == (1800.0, 8 * 10**9)
@@ -211,8 +211,8 @@ def test_recording_stops_at_the_selected_limit_and_its_size_is_estimated(window,
     assert sheet.at_end.note.text() == "at 30:00"
     recorder.say("ended", status=status(duration_s=1800.0), limit="time")
     assert "at the time limit" in window.toast.text
-    sheet.ends_min.clear()
-    sheet.ends_min.editingFinished.emit()
+    sheet.limit_minutes.clear()
+    sheet.limit_minutes.editingFinished.emit()
     assert recorder.session.recordings.choice.max_minutes is None
 
 
@@ -233,16 +233,16 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     assert sheet.ring_words.text() == "41 s buffered, 1.0 GB of 2.0 GB"
     sheet.seconds.setText("30")
     sheet.seconds.editingFinished.emit()
-    assert recorder.session.recordings.wish == RingSettings(is_on=True, seconds=30)
+    assert recorder.session.recordings.ring_settings == RingSettings(is_on=True, seconds=30)
     QTest.keyClicks(sheet.ring_topics.edit, "/arm/* not /arm/raw")
-    assert recorder.session.recordings.wish.patterns == ("/arm/*",)
+    assert recorder.session.recordings.ring_settings.patterns == ("/arm/*",)
     QTest.keyClick(sheet.ring_topics.edit, Qt.Key.Key_Return)
     assert recorder.ops()[-2:] == ["end_ring", "ring"]
     order = recorder.line.orders[-1]
     assert (order["topics"], order["left_out"]) == (["/arm/*"], ["/arm/raw"])
     sheet.ring_topics.show_patterns(("/b\x01",), ())
     sheet.ring_topics.editing_finished.emit()
-    assert recorder.session.recordings.wish.patterns == ("/arm/*",)
+    assert recorder.session.recordings.ring_settings.patterns == ("/arm/*",)
     assert "isn't a valid topic name" in sheet.ring_words.text()
     sheet.ring.click()
     assert recorder.ops()[-1] == "end_ring"

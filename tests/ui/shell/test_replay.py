@@ -238,7 +238,7 @@ def test_timeline_shortcuts_play_step_bookmark_and_zoom(qtbot, window, session, 
     press(Qt.Key.Key_0)
     assert canvas.scale.is_full
     press(Qt.Key.Key_Down)
-    assert replay.chosen == "/camera"
+    assert replay.selected_topic == "/camera"
     press(Qt.Key.Key_Space)
     until(qtbot, window, lambda: replay.player.is_at_end and not replay.player.is_playing)
     replay.remove_bookmark(replay.bookmarks[0])
@@ -254,7 +254,7 @@ def test_mouse_seeks_selects_lanes_and_zooms_in_the_timeline(qtbot, window, sess
     until(qtbot, window, lambda: replay.player.position_ns == at_ns)
     y = round(canvas._lanes_top() + 1.5 * canvas._row_height())
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(20, y))
-    assert replay.chosen == "/camera"
+    assert replay.selected_topic == "/camera"
     assert replay.player.position_ns == at_ns
     x = canvas.x_of(at_ns)  # the dock may have been resized in between
     place = QPointF(x, 60)

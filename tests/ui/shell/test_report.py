@@ -16,7 +16,7 @@ from app.core.reports.crash_reports import ALERT_ID, CrashReports, show_crash_al
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.reporting import ReportCommands
-from app.ui.shell.commands.table import COMMANDS, releases
+from app.ui.shell.commands.table import COMMANDS, releases_commands
 from app.ui.shell.dialogs.report import ReportSheet, documents_folder
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
@@ -82,7 +82,7 @@ def lines(sheet: ReportSheet) -> str:
 
 def test_report_sheet_focuses_the_text_field_and_lists_the_report_contents(sheet: ReportSheet) -> None:
     assert sheet.isVisible()
-    assert sheet.happened.edit.hasFocus()
+    assert sheet.description.edit.hasFocus()
     for words in ("Nothing is sent", "Included", "connection doctor", "Not included", "Keys, passwords"):
         assert words in lines(sheet)
     assert not sheet.work.isVisible(), "nothing is open that could go in"
@@ -102,14 +102,14 @@ def test_typed_text_is_written_and_the_file_can_be_shown(
     qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path, opened: Opened
 ) -> None:
     answers.path = tmp_path / "report"
-    QTest.keyClicks(sheet.happened.edit, "It stopped")
+    QTest.keyClicks(sheet.description.edit, "It stopped")
     written(qtbot, sheet)
     found = inside(tmp_path / "report.zip")
     assert found["what-happened.txt"] == b"It stopped"
     assert b"Qt: 6" in found["versions.txt"]
     assert not [name for name in found if name.startswith("work/")]
     assert sheet.state.text().startswith("The report is in ")
-    assert sheet.happened.text() == ""
+    assert sheet.description.text() == ""
     assert sheet.show_file.hasFocus()
     sheet.show_file.click()
     assert opened.urls == [QUrl.fromLocalFile(str(tmp_path)).toString()]
@@ -154,11 +154,11 @@ def test_unwritable_target_is_reported_and_typed_text_is_kept(
 ) -> None:
     (tmp_path / "file").write_text("no folder")
     answers.path = tmp_path / "file" / "report.zip"
-    sheet.happened.set_text("It stopped")
+    sheet.description.set_text("It stopped")
     written(qtbot, sheet)
     assert sheet.state.text().startswith("Can't write report.zip (")
     assert sheet.state.text().endswith("choose another folder.")
-    assert sheet.happened.text() == "It stopped"
+    assert sheet.description.text() == "It stopped"
     assert not sheet.show_file.isVisible()
     assert sheet.write.hasFocus()
 
@@ -210,7 +210,7 @@ def test_report_sheet_is_operated_by_keyboard(
     qtbot, sheet: ReportSheet, answers: Answers, tmp_path: Path
 ) -> None:
     answers.path = tmp_path / "report.zip"
-    QTest.keyClicks(sheet.happened.edit, "By keys")
+    QTest.keyClicks(sheet.description.edit, "By keys")
     reached = []
     for _step in range(6):
         QTest.keyClick(sheet.focusWidget(), Qt.Key.Key_Tab)
@@ -262,8 +262,8 @@ def test_palette_and_menu_contain_the_report_command(window: MainWindow, command
 
 
 def test_new_version_entry_exists_only_when_the_project_has_a_web_page() -> None:
-    assert releases("") == ()
-    (made,) = releases("https://example.org/releases")
+    assert releases_commands("") == ()
+    (made,) = releases_commands("https://example.org/releases")
     assert (made.id, made.menu) == ("help.releases", "Help")
     assert ("help.releases" in {each.id for each in COMMANDS}) == bool(RELEASES_PAGE)
 

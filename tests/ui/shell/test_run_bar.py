@@ -156,13 +156,13 @@ def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
 def test_compact_bar_shows_all_states(tools: ToolBar, state: str, run: bool, pause: bool, words: str) -> None:
     tools.show_view(VIEWS[state])
     assert (tools.run.isVisible(), tools.pause.isVisible()) == (run, pause)
-    spoken = tools.result.text if tools.result.isVisible() else tools.words.text()
+    spoken = tools.result.text if tools.result.isVisible() else tools.text_label.text()
     assert spoken == words
     assert tools.stop.isVisible()
     assert tools.confirm.isVisible() == (state == "unanswered")
 
 
-def test_stop_keeps_its_position_in_every_compact_state(tools: ToolBar) -> None:
+def test_stop_button_of_the_compact_bar_keeps_its_position_in_every_run_state(tools: ToolBar) -> None:
     places = set()
     for view in VIEWS.values():
         tools.show_view(view)

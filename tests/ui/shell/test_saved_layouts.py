@@ -71,13 +71,13 @@ def test_layout_is_saved_under_a_name_and_the_built_in_layout_is_unchanged(
 def test_duplicate_long_or_empty_layout_names_are_reported(shown: MainWindow, commands: Commands) -> None:
     sheet = keep_as(shown, commands, "developer")
     assert sheet.isVisible()
-    assert sheet.wrong.text() == "“developer” already exists."
+    assert sheet.error_label.text() == "“developer” already exists."
     sheet.field.setText("x" * 41)
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
-    assert "40 characters" in sheet.wrong.text()
+    assert "40 characters" in sheet.error_label.text()
     sheet.field.setText("  ")
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
-    assert sheet.wrong.text() == "Enter a name for the layout."
+    assert sheet.error_label.text() == "Enter a name for the layout."
     QTest.keyClick(sheet.field, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
     assert shown.saved_layouts.all() == ()

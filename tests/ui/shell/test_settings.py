@@ -149,13 +149,13 @@ def test_language_is_saved_for_the_next_start(
     sheet = window.findChild(SettingsSheet)
     assert sheet is not None
     assert sheet.language.value == "en"
-    assert not sheet.from_next_start.isVisible()
+    assert not sheet.restart_hint.isVisible()
     press(sheet.language, "es")
-    assert sheet.from_next_start.isVisible()
+    assert sheet.restart_hint.isVisible()
     assert not sheet.restart.isVisible(), "a window of its own keeps no tabs"
     assert Settings(home).get("language", "") == "es"
     press(sheet.language, "en")
-    assert not sheet.from_next_start.isVisible()
+    assert not sheet.restart_hint.isVisible()
 
 
 def test_many_languages_are_shown_in_a_drop_down_list(
@@ -171,10 +171,10 @@ def test_many_languages_are_shown_in_a_drop_down_list(
     assert isinstance(language, ComboBox)
     assert [language.itemText(at) for at in range(language.count())] == [name for _code, name in names]
     assert language.value == "en"
-    assert sheet.first() is language
+    assert sheet.initial_focus() is language
     QTest.keyClick(language, Qt.Key.Key_Down)
     assert Settings(home).get("language", "") == "es"
-    assert sheet.from_next_start.isVisible()
+    assert sheet.restart_hint.isVisible()
 
 
 def test_settings_show_whether_the_robot_voice_is_available(
@@ -206,7 +206,7 @@ def test_language_change_offers_a_restart_that_waits_until_robots_stop(
     assert not sheet.restart.isVisible()
     press(sheet.language, "es")
     assert sheet.restart.isVisible()
-    assert not sheet.from_next_start.isVisible()
+    assert not sheet.restart_hint.isVisible()
     robots = window.session.fleet._links
     robots["Robot 1"] = robots_in("busy").fleet.links[0]
     sheet.restart.click()

@@ -239,7 +239,7 @@ def test_changed_shortcut_applies_immediately_to_action_tooltip_and_palette(
     choose(sheet, "Pause")
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_F7)
-    assert sheet.said.text() == "The shortcut of “Pause” is now F7."
+    assert sheet.hint.text() == "The shortcut of “Pause” is now F7."
     assert commands.actions["run.pause"].shortcut() == QKeySequence("F7")
     assert window.tool_bar.pause.toolTip() == "Pause (F7)"
     paused: list[str] = []
@@ -263,7 +263,7 @@ def test_shortcut_conflict_names_the_other_command_and_can_swap(
     choose(sheet, "Open a file")
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_S, CTRL)
-    assert "“Save”" in sheet.said.text()
+    assert "“Save”" in sheet.hint.text()
     assert commands.shortcuts.keys_of("file.open") == ("Ctrl+O",)
     assert sheet.swap.isVisible()
     QTest.mouseClick(sheet.swap, Qt.MouseButton.LeftButton)
@@ -299,7 +299,7 @@ def test_recording_a_shortcut_does_not_trigger_its_current_command(
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_Plus, CTRL)
     assert done == []
-    assert "“Larger text”" in sheet.said.text()
+    assert "“Larger text”" in sheet.hint.text()
 
 
 def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -317,10 +317,10 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     assert keys.keys_of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
     sheet._remove_shortcut()
-    assert sheet.said.text() == "F12 is now the only shortcut for Stop."
+    assert sheet.hint.text() == "F12 is now the only shortcut for Stop."
     assert keys.keys_of("run.stop") == ("F12",)
     sheet._remove_shortcut()
-    assert sheet.said.text() == "F12 can't be removed: it always triggers Stop."
+    assert sheet.hint.text() == "F12 can't be removed: it always triggers Stop."
 
 
 def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(

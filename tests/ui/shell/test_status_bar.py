@@ -96,7 +96,9 @@ def test_lost_messages_item_is_hidden_without_losses(session: fakes.Session) -> 
     assert facts(session).lost() == ("triangle-alert", "12 lost in 30 s", "warn")
 
 
-def test_status_bar_reports_the_number_of_messages_not_shown(session: fakes.Session) -> None:
+def test_status_bar_reports_displayed_and_received_messages_if_some_were_not_displayed(
+    session: fakes.Session,
+) -> None:
     session.traffic.shown_30s = session.traffic.sent_30s = 900
     assert facts(session).displayed_messages()[1] == ""
     session.traffic.sent_30s = 4900

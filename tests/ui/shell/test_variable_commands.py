@@ -88,14 +88,14 @@ def test_existing_variable_name_is_reported_while_typing(
     commands.run("variable.new")
     sheet = sheet_of(shown)
     typed(sheet, name)
-    assert sheet.wrong.text() == f"A variable named “{name}” already exists. Choose another name."
+    assert sheet.error_label.text() == f"A variable named “{name}” already exists. Choose another name."
     assert not sheet.button.isEnabled()
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert sheet.isVisible()
     typed(sheet, "x" * 61)
-    assert "60 characters" in sheet.wrong.text()
+    assert "60 characters" in sheet.error_label.text()
     QTest.keyClick(typed(sheet, "").field, Qt.Key.Key_Return)
-    assert sheet.wrong.text() == "Enter a name for the variable."
+    assert sheet.error_label.text() == "Enter a name for the variable."
     assert editor(shown).edited == []
 
 

@@ -36,7 +36,7 @@ def shown(qtbot, window: MainWindow) -> MainWindow:
 def opened(qtbot, commands: Commands, window: MainWindow) -> VersionHistorySheet:
     commands.run("file.earlier")
     (sheet,) = window.findChildren(VersionHistorySheet)
-    qtbot.waitUntil(lambda: sheet.read)
+    qtbot.waitUntil(lambda: sheet.has_read_all)
     return sheet
 
 

@@ -57,7 +57,7 @@ class Desk:
         return True
 
     def settle(self):
-        self.web.started(self.events.get(timeout=30))
+        self.web.on_started(self.events.get(timeout=30))
         self.sheet.refresh()
         return self.web._server
 
@@ -233,7 +233,7 @@ def test_allowed_origins_are_tokens_and_invalid_text_is_kept_as_typed(desk: Desk
     QTest.keyClicks(field.edit, "http://lab.example 192.168.1.20")
     QTest.keyClick(field.edit, Qt.Key.Key_Return)
     assert desk.web.origins == ("http://lab.example",)
-    assert (field.edit.text(), field.is_wrong) == ("192.168.1.20", True)
+    assert (field.edit.text(), field.is_invalid) == ("192.168.1.20", True)
     field.edit.clear()
     QTest.keyClick(field.edit, Qt.Key.Key_Backspace)
     assert (desk.web.origins, list(field.tokens)) == ((), [])
@@ -246,7 +246,7 @@ def test_allowed_robots_are_selected_by_check_boxes_and_applied_immediately(desk
     assert list(choice.boxes) == ["Rover", "Turtle"]
     QTest.keyClick(choice.boxes["Turtle"], Qt.Key.Key_Space)
     assert server.allow_moving == {"Rover", "Turtle"}
-    assert "Turtle" in choice.words.text()
+    assert "Turtle" in choice.text_label.text()
 
 
 def test_tab_order_follows_the_reading_order(desk: Desk) -> None:
@@ -294,7 +294,11 @@ def test_rosbridge_and_foxglove_tabs_have_separate_switches(desk: Desk) -> None:
 def test_port_in_use_offers_a_free_port(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
     web = WebPages(master.address, events.put, addresses=tuple)
     desk = Desk(qtbot, theme, web, events)
-    web.sentence, web.free_port, web._failed = "Port 9090 is in use.", 9091, frozenset({"rosbridge"})
+    web.sentence, web.free_port, web._failed_protocols = (
+        "Port 9090 is in use.",
+        9091,
+        frozenset({"rosbridge"}),
+    )
     desk.sheet.refresh()
     assert "9091" in desk.sheet.other_port.text()
     web._start = FakeWebServer  # type: ignore[assignment]

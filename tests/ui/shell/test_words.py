@@ -238,11 +238,13 @@ def test_tools_hidden_for_lack_of_room_reappear_after_the_run(qtbot, whole: Main
     bar, keep = whole.tool_bar, whole.tools.keep
     settle(qtbot)
     assert keep.isVisible()
-    bar.words.setMinimumWidth(bar.width() - keep.width())  # the text of a run state without room for `keep`
-    bar.words.show()
+    bar.text_label.setMinimumWidth(
+        bar.width() - keep.width()
+    )  # the text of a run state without room for `keep`
+    bar.text_label.show()
     settle(qtbot)
     assert not keep.isVisible()
-    bar.words.setMinimumWidth(0)
+    bar.text_label.setMinimumWidth(0)
     whole.tools.refresh()
     settle(qtbot)
     assert keep.isVisible()
@@ -289,7 +291,7 @@ def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWin
     for typed in ("", "ŕúñ", "nowhere"):
         palette.field.setText(typed)
         assert forgotten(palette, "nowhere") == []
-        assert untranslated(palette.foot.counted) == []
+        assert untranslated(palette.foot.result_text) == []
     palette.dismiss()
     assert untranslated(" ".join(_(said) for _keys, said in palette.foot.KEY_HINTS)) == []
     whole.commands.run("help.shortcuts")
@@ -299,12 +301,12 @@ def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWin
         sheet.record,
         sheet._remove_shortcut,
         sheet._reset,
-        lambda: sheet._set_status(sheet.said.text()),
+        lambda: sheet._set_status(sheet.hint.text()),
     ):
         act()
-        told.append(sheet.said.text())
+        told.append(sheet.hint.text())
     sheet.open_for("file.new")
-    told.append(sheet.said.text())
+    told.append(sheet.hint.text())
     assert [each for each in told if untranslated(each)] == []
     assert forgotten(sheet) == []
 
@@ -316,7 +318,7 @@ def test_version_history_is_translated(qtbot, whole: MainWindow, tmp_path: Path)
         whole.commands.run("file.save")
     whole.commands.run("file.earlier")
     (sheet,) = whole.findChildren(VersionHistorySheet)
-    qtbot.waitUntil(lambda: sheet.read)
+    qtbot.waitUntil(lambda: sheet.has_read_all)
     assert len(sheet.rows.lines.lines) == 2
     assert forgotten(sheet) == []
     assert untranslated(whole.toast.text, "Mine") == []
@@ -330,7 +332,7 @@ def test_name_dialog_is_translated(whole: MainWindow) -> None:
         sheet.field.setText(name)
         sheet._submit()
         assert sheet.isVisible()
-        assert sheet.wrong.text()
+        assert sheet.error_label.text()
         assert forgotten(sheet) == []
     sheet.field.setText("Mine")
     sheet._submit()

@@ -12,11 +12,11 @@ from app.ui.startup import graphics
 @pytest.mark.parametrize(
     ("given", "has_one", "wanted", "is_so"),
     [
-        ({}, False, {graphics.CHOICE: "software"}, True),
+        ({}, False, {graphics.BACKEND_VARIABLE: "software"}, True),
         ({}, True, {}, False),
-        ({graphics.CHOICE: ""}, False, {graphics.CHOICE: "software"}, True),
-        ({graphics.CHOICE: "rhi"}, False, {graphics.CHOICE: "rhi"}, False),
-        ({graphics.CHOICE: "software"}, True, {graphics.CHOICE: "software"}, True),
+        ({graphics.BACKEND_VARIABLE: ""}, False, {graphics.BACKEND_VARIABLE: "software"}, True),
+        ({graphics.BACKEND_VARIABLE: "rhi"}, False, {graphics.BACKEND_VARIABLE: "rhi"}, False),
+        ({graphics.BACKEND_VARIABLE: "software"}, True, {graphics.BACKEND_VARIABLE: "software"}, True),
     ],
 )
 def test_software_rendering_is_selected_without_a_gpu_unless_set_by_the_user(

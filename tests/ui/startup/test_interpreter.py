@@ -86,7 +86,7 @@ def test_qt_objects_are_deleted_in_the_gui_thread_even_with_busy_threads(qtbot: 
 
     def busy() -> None:
         for _round in range(50):
-            _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS)]
+            _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS_THRESHOLD)]
 
     threads = [threading.Thread(target=busy) for _thread in range(3)]
     for thread in threads:
@@ -94,7 +94,7 @@ def test_qt_objects_are_deleted_in_the_gui_thread_even_with_busy_threads(qtbot: 
     for thread in threads:
         thread.join()
     assert not deleted.by
-    _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS)]
+    _kept = [[n] for n in range(2 * interpreter.NEW_OBJECTS_THRESHOLD)]
     qtbot.waitUntil(lambda: len(deleted.by) == made, timeout=60_000)
     assert set(deleted.by) == {threading.get_ident()}
 
@@ -102,8 +102,8 @@ def test_qt_objects_are_deleted_in_the_gui_thread_even_with_busy_threads(qtbot: 
 def test_older_gc_generations_are_collected_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
     monkeypatch.setattr(gc, "collect", asked.append)
-    few, many = interpreter.COLLECTIONS, interpreter.COLLECTIONS + 1
-    made = interpreter.NEW_OBJECTS + 1
+    few, many = interpreter.COLLECTIONS_THRESHOLD, interpreter.COLLECTIONS_THRESHOLD + 1
+    made = interpreter.NEW_OBJECTS_THRESHOLD + 1
     for counts in ((made - 1, many, many), (made, few, many), (made, many, few), (made, many, many)):
         monkeypatch.setattr(gc, "get_count", lambda counts=counts: counts)
         interpreter.collect_garbage()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.ui.startup.portal import CHOICE, THEME, has_bus, has_system_dialogs, use_portal
+from app.ui.startup.portal import PORTAL_THEME, THEME_VARIABLE, has_bus, has_system_dialogs, use_portal
 
 BUS = {"DBUS_SESSION_BUS_ADDRESS": "unix:path=/nowhere"}
 FAKE = """
@@ -53,18 +53,18 @@ def chosen(environ: dict[str, str], platform: str, *, answers: bool = True) -> t
         return answers
 
     use_portal(environ, platform, answer)
-    return environ.get(CHOICE, ""), len(asked)
+    return environ.get(THEME_VARIABLE, ""), len(asked)
 
 
 def test_responding_desktop_portal_is_used_on_linux_only() -> None:
-    assert chosen(dict(BUS), "linux") == (THEME, 1)
+    assert chosen(dict(BUS), "linux") == (PORTAL_THEME, 1)
     assert chosen(dict(BUS), "linux", answers=False) == ("", 1)
     assert chosen(dict(BUS), "win32") == ("", 0)
     assert chosen(dict(BUS), "darwin") == ("", 0)
 
 
 def test_platform_theme_set_by_the_user_is_kept_without_a_portal_query() -> None:
-    assert chosen({**BUS, CHOICE: "kde"}, "linux") == ("kde", 0)
+    assert chosen({**BUS, THEME_VARIABLE: "kde"}, "linux") == ("kde", 0)
 
 
 def test_portal_is_not_queried_without_a_session_bus(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_portal_is_not_queried_without_a_session_bus(tmp_path: Path) -> None:
 def test_system_dialogs_are_available_on_windows_macos_and_with_a_portal() -> None:
     assert has_system_dialogs({}, "win32")
     assert has_system_dialogs({}, "darwin")
-    assert has_system_dialogs({CHOICE: THEME}, "linux")
+    assert has_system_dialogs({THEME_VARIABLE: PORTAL_THEME}, "linux")
     assert not has_system_dialogs({}, "linux")
 
 

@@ -62,7 +62,7 @@ def test_second_process_passes_absolute_paths_to_the_running_instance(
 ) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
-    assert meeting.open
+    assert meeting.is_listening
     process = second(name, "a.nepb", str(tmp_path / "Grüße.nepb"), cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
     assert process.returncode == 0
@@ -127,7 +127,7 @@ def test_second_window_does_not_replace_the_single_instance_server(qtbot, name: 
     asked: list[StartRequest] = []
     first = meet(name, asked.append)
     later = meet(name, asked.append)
-    assert (first.open, later.open) == (True, False)
+    assert (first.is_listening, later.is_listening) == (True, False)
     process = second(name, cwd=tmp_path)
     qtbot.waitUntil(lambda: process.poll() is not None, timeout=WAIT_MS)
     assert asked == [StartRequest()]
@@ -148,7 +148,7 @@ def test_stale_socket_of_a_killed_studio_is_replaced(qtbot, name: str) -> None:
     process.communicate()
     assert Path(name).exists(), "its socket is still there"
     meeting = meet(name, lambda _asked: None)
-    assert meeting.open
+    assert meeting.is_listening
     meeting.close()
 
 
@@ -220,7 +220,7 @@ def test_without_a_private_folder_studio_starts_without_a_socket(
     monkeypatch.setattr(os, "geteuid", lambda: 4242)
     assert socket_name(tmp_path) == ""
     assert send_request("", StartRequest()) is False
-    assert SingleInstanceServer("", lambda _asked: None).open is False
+    assert SingleInstanceServer("", lambda _asked: None).is_listening is False
 
 
 @needs_modes
@@ -231,7 +231,7 @@ def test_file_that_is_not_a_socket_of_this_user_is_not_connected_to(
     os.mkfifo(name)
     assert send_request(name, StartRequest()) is False
     meeting = meet(name, lambda _asked: None)
-    assert meeting.open, "what is left in our own folder is ours to take away"
+    assert meeting.is_listening, "what is left in our own folder is ours to take away"
     assert is_own_socket(name)
     Path(name).parent.chmod(0o777)
     assert send_request(name, StartRequest()) is False

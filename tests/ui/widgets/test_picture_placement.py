@@ -7,7 +7,7 @@ import itertools
 import pytest
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 
-from app.ui.pictures.placement import MAX_SIZE, PicturePlacement
+from app.ui.pictures.placement import MAX_ZOOM, PicturePlacement
 
 VIEW, PICTURE = QSizeF(400, 300), QSizeF(800, 400)
 
@@ -65,7 +65,7 @@ def test_zoom_has_limits() -> None:
     place = PicturePlacement()
     middle = QPointF(200, 150)
     place.zoom_at(1e9, middle, VIEW, PICTURE)
-    assert place.zoom == MAX_SIZE
+    assert place.zoom == MAX_ZOOM
     place.zoom_at(1e-9, middle, VIEW, PICTURE)
     assert place.zoom is not None
     assert 0 < place.zoom <= 0.02

@@ -111,13 +111,13 @@ def test_invalid_number_is_kept_and_the_reason_is_shown(
     slider.field.setText(typed)
     slider.field.editingFinished.emit()
     assert slider.field.text() == typed
-    assert slider.field.sentence == sentence
+    assert slider.field.problem == sentence
     assert slider.field.property("wrong") == "true"
     assert slider.value == 0.5
     slider.field.setText("0,75")
     slider.field.editingFinished.emit()
     assert slider.value == 0.75
-    assert slider.field.sentence == ""
+    assert slider.field.problem == ""
 
 
 def test_slider_with_an_empty_range_raises(theme: Theme) -> None:

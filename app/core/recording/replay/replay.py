@@ -47,7 +47,7 @@ class Replay:
     the attributes of a session for the live network. A recording has no nodes and no other networks.
 
     Attributes:
-        chosen: Topic whose messages `step` steps through; "" for none.
+        selected_topic: Topic whose messages `step` steps through; "" for none.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Replay:
         self.console = Console(lambda: self._position_ns() / 1e9)
         self.graph: GraphView | None = None
         self.densities: Densities | None = None
-        self.chosen = ""
+        self.selected_topic = ""
         self.sending = ReplaySending(acting) if acting is not None else None
         if self.sending is not None:
             self.sending.on_change = self._update_forwarding
@@ -198,14 +198,14 @@ class Replay:
 
         Has no effect if no topic is chosen.
         """
-        topic = self.chosen
+        topic = self.selected_topic
         if topic in self.recorded_topics:
             self.source.queue_change("step", lambda playback: playback.step(topic, forward=forward))
 
     def select_topic(self, topic: str) -> None:
         """Choose the topic whose messages `step` steps through. Topics that aren't recorded are ignored."""
         if topic in self.recorded_topics:
-            self.chosen = topic
+            self.selected_topic = topic
 
     def set_speed(self, speed: float) -> None:
         """Set the playback speed, limited to the supported range."""
@@ -314,7 +314,7 @@ class Replay:
             if topic in LOG_TOPICS:
                 self.console.add_messages(batch.messages, batch.dropped)
             self._add(topic, batch, now)
-        self.series.add(handed.drained.batches)
+        self.series.dispatch(handed.drained.batches)
         if handed.stats:
             self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in handed.stats.items()})
         self.topics.update_ages(now, self._position_ns())
@@ -333,10 +333,10 @@ class Replay:
         recording = opened.recording
         self.series.origin_ns = recording.start_ns
         if self.sending is not None:
-            self.sending.open(opened)
+            self.sending.set_recording(opened)
         self.graph = create_graph(recording.topics, opened.stats)
         self.topics.update(self.graph, now)
-        self.chosen = next(iter(recording.topics), "")
+        self.selected_topic = next(iter(recording.topics), "")
         self.densities = Densities(recording)
         for topic in LOG_TOPICS:
             if topic in recording.topics:
@@ -389,7 +389,7 @@ class Replay:
             batch = Batch(list(messages))
             self._add(topic, Batch(batch.messages[-2:]), now)
             self.series.reset([topic])
-            self.series.add({topic: batch})
+            self.series.dispatch({topic: batch})
 
     def _add(self, topic: str, batch: Batch, now: float) -> None:
         if self._watches.is_watched(topic):

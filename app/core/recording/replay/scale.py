@@ -99,14 +99,14 @@ class TimeScale:
             by_clock: True to align the marks to the local time of day, False to the recording's start.
         """
         step_ns = round(self.mark_interval_s(max_marks) * 1e9)
-        origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
+        origin_ns = local_midnight_ns(self.first_ns) if by_clock else self.first_ns
         number = -((origin_ns - self.start_ns) // step_ns)
         while (at_ns := origin_ns + number * step_ns) <= self.end_ns:
             yield at_ns
             number += 1
 
 
-def offset_ns(at_ns: int) -> int:
+def local_midnight_ns(at_ns: int) -> int:
     """Return a time (ns since 1970) at which a local day starts, from which ruler marks are counted.
 
     Args:

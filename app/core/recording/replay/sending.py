@@ -230,7 +230,7 @@ class ReplaySending:
         self.on_change: Callable[[], object] = _do_nothing
         """Called when the set of published topics changes."""
 
-    def open(self, opened: OpenedRecording) -> None:
+    def set_recording(self, opened: OpenedRecording) -> None:
         """Set the recording after it has been opened."""
         self._opened = opened
 
@@ -312,7 +312,7 @@ class ReplaySending:
         for sent in self.outbox.active_topics:
             if sent.route not in routes:
                 self._stop(sent)
-                self._acting.forbid(sent.route.target)
+                self._acting.deny(sent.route.target)
         self._acting.recorded_commands |= {
             route.name for route in routes if self.moves_robot(route.recorded, route.name)
         }
@@ -327,7 +327,7 @@ class ReplaySending:
         self._is_asking = False
         while self._pending_routes:
             route, turn = self._pending_routes[0], self._acting.arming.turn
-            not_armed = self._acting.ready(route.target, self._start_next)
+            not_armed = self._acting.prepare(route.target, self._start_next)
             if not_armed:
                 self._pending_routes = []
                 return not_armed

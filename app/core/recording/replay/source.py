@@ -132,7 +132,7 @@ class ReplaySource:
         self._watched: set[str] = set()
         self._history_capacities: dict[str, int] = {}
         self._panel_topics: frozenset[str] = frozenset()
-        self._sent: frozenset[str] = frozenset()
+        self._forwarded_topics: frozenset[str] = frozenset()
         self._played: frozenset[str] = frozenset()
         self._forward: Forward | None = None
         self._mailbox = Mailbox()
@@ -211,7 +211,7 @@ class ReplaySource:
             to: Callback; None ends the forwarding.
         """
         with self._changed:
-            self._sent, self._forward = frozenset(topics), to
+            self._forwarded_topics, self._forward = frozenset(topics), to
         self.queue_change("choose", self._update_selection)
 
     def pop_results(self) -> ReplayResults:
@@ -294,8 +294,8 @@ class ReplaySource:
         was_playing = playback.status().is_playing
         for _kind, change in orders:
             change(playback)
-        if not was_playing and playback.status().is_playing and self._sent:
-            first = playback.messages_at_start(self._sent)
+        if not was_playing and playback.status().is_playing and self._forwarded_topics:
+            first = playback.messages_at_start(self._forwarded_topics)
             self._forward_messages(first, [0.0] * len(first))
         due = playback.advance()
         if due.is_jump:
@@ -305,7 +305,7 @@ class ReplaySource:
                 history_topics = frozenset(self._history_capacities)
             self._read_history(playback, history_topics & self._panel_topics)
         else:
-            if self._sent:
+            if self._forwarded_topics:
                 self._forward_messages(due.messages, delays_of(due, playback.status()))
             self._post_messages([each for each in due.messages if each.topic in self._panel_topics])
             self._update_status(playback)
@@ -326,7 +326,7 @@ class ReplaySource:
             watched, with_history, sent = (
                 frozenset(self._watched),
                 frozenset(self._history_capacities),
-                self._sent,
+                self._forwarded_topics,
             )
         newly_watched = watched - self._panel_topics  # by a panel, from now on
         new = newly_watched & with_history
@@ -351,7 +351,7 @@ class ReplaySource:
 
     def _forward_messages(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
         with self._changed:
-            topics, to = self._sent, self._forward
+            topics, to = self._forwarded_topics, self._forward
         forwarded = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
         if forwarded and to is not None:
             to([message for message, _late in forwarded], [late for _message, late in forwarded])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from app.core.robots.motion.permission import MotionPermission, risky_actions
+from app.core.robots.motion.permission import MotionPermission, risky_action_titles
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Robot
 from app.robots.identity import controls_of
@@ -143,10 +143,10 @@ class MotionGate:
         allowed = {
             name
             for name, robot in robots_by_name.items()
-            if self._permission.is_allowed(robot) or not risky_actions(robot, _action_names(robot))
+            if self._permission.is_allowed(robot) or not risky_action_titles(robot, _action_names(robot))
         }
         # a permission counts until the robot is identified
-        strangers = self._permission.strangers - robots_by_name.keys()
+        strangers = self._permission.allowed_unknown_robots - robots_by_name.keys()
         self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described_topics)
         self._followed_state = now
 

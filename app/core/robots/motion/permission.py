@@ -92,7 +92,7 @@ class MotionPermission:
         # `settings` store the *always* permissions; `identity_of` returns a robot's program.
         self._settings, self._identity_of = settings, identity_of
         self._allowed: set[str] = set()
-        self.strangers: frozenset[str] = frozenset()
+        self.allowed_unknown_robots: frozenset[str] = frozenset()
         """Allowed robots without a readable description, and topics of unknown robots that were allowed."""
         self._question_keys: tuple[tuple[str, str], ...] = ()
         self.question: PermissionQuestion | None = None
@@ -126,12 +126,12 @@ class MotionPermission:
             reason: Sentence about the origin of the command, or "" for a command of the user.
         """
         unconfirmed = [
-            (robot, risky_actions(robot, actions))
+            (robot, risky_action_titles(robot, actions))
             for robot, actions in requested
             if not self.is_allowed(robot)
         ]
         open_ = [(robot, moves) for robot, moves in unconfirmed if moves]
-        unknown = tuple(name for name in strangers if name not in self.strangers)
+        unknown = tuple(name for name in strangers if name not in self.allowed_unknown_robots)
         if not open_ and not unknown:
             return True
         self._question_keys = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
@@ -156,7 +156,7 @@ class MotionPermission:
         if question is None or not is_allowed:
             return
         self._allowed.update(now for now, _key in self._question_keys)
-        self.strangers |= set(question.unknown_robots)
+        self.allowed_unknown_robots |= set(question.unknown_robots)
         try:
             if always and self._settings is not None:
                 self._settings.set(
@@ -179,7 +179,7 @@ class MotionPermission:
             SettingsError: The settings can't be written. Saved permissions remain valid.
         """
         self._allowed.clear()
-        self.strangers = frozenset()
+        self.allowed_unknown_robots = frozenset()
         self.revision += 1
         if self._settings is not None:
             self._settings.set(SETTING_KEY, [])
@@ -205,7 +205,7 @@ def _unknown_robot_label(name: str) -> str:
     return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMAND_TOPIC else name
 
 
-def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
+def risky_action_titles(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     """Return the quoted titles of the actions that move the robot, without duplicates.
 
     At most `MAX_NAMED_ACTIONS` titles are returned, followed by “more” if there are others.

@@ -65,7 +65,7 @@ class UnconfirmedMotion:
     id: str = ""
 
     @property
-    def is_known(self) -> bool:
+    def is_sender_known(self) -> bool:
         """True if the sender of the command is known."""
         return self.sender not in UNKNOWN_SENDERS
 
@@ -121,7 +121,7 @@ class MovedRobots:
         Motions with a known sender take precedence over unfinished actions and unproven Stops.
         """
         motions = self._motions.get(name, [])
-        candidates = [motion for motion in motions if motion.is_known] or motions
+        candidates = [motion for motion in motions if motion.is_sender_known] or motions
         return candidates[-1] if candidates else None
 
     def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:

@@ -89,14 +89,16 @@ class RobotStopper:
         self._lines: dict[str, StopLine] = {}
         self._requests: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
-        self._hearers: dict[str, frozenset[str]] = {}  # subscribed nodes by command topic, of this view
+        self._subscribed_nodes: dict[
+            str, frozenset[str]
+        ] = {}  # subscribed nodes by command topic, of this view
         self._graph_queried_s = 0.0
         self._senders = Senders()
 
     def update_graph(self, view: GraphView) -> None:
         """Apply a new graph, which determines the programs that serve each robot and must confirm a Stop."""
         with self._changed:
-            self._view, self._hearers = view, {}
+            self._view, self._subscribed_nodes = view, {}
             targets = [line.target for line in self._lines.values()]
             self._senders.update(
                 view, {topic_set.reply for target in targets for topic_set in target.topic_sets}
@@ -375,10 +377,10 @@ class RobotStopper:
 
     def _is_connected_locked(self, line: StopLine, channel: StopChannel) -> bool:
         # Call with `_changed` held.
-        hearers = self._hearers.get(channel.topic)
+        hearers = self._subscribed_nodes.get(channel.topic)
         if hearers is None:
             hearers = frozenset(subscriber_nodes(self._view or GraphView(0, 0), channel.topic))
-            self._hearers[channel.topic] = hearers
+            self._subscribed_nodes[channel.topic] = hearers
         return channel.is_connected(line.target, hearers)
 
     def _deliver(self, request: StopRequest) -> bool:

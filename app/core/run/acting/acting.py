@@ -26,12 +26,12 @@ from app.core.run.acting.sending import Outbox, SendOrder, SendResult
 from app.core.run.acting.sent_log import SendOrigin, SentLog, SentRecord
 from app.core.run.acting.shelf import (
     MAX_BYTES,
-    NewerShelfError,
+    NewerSavedMessagesError,
     SavedMessage,
-    Shelf,
-    encode_shelf,
+    SavedMessages,
+    encode_saved_messages,
     new_message_id,
-    parse_shelf,
+    parse_saved_messages,
 )
 from app.core.run.acting.templates import is_editable, is_plain_text
 from app.core.storage.atomic_file import write_atomically
@@ -119,8 +119,8 @@ class SessionActing:
         self._is_newer = False
         self._source_revision = session.source_revision
         self.path: Path | None = session.settings.path.with_name(FILE_NAME)
-        self.shelf = self._read(self.path)
-        self._written = self.shelf.revision
+        self.saved_messages = self._read(self.path)
+        self._written = self.saved_messages.revision
 
     # ---- switch
 
@@ -201,9 +201,9 @@ class SessionActing:
         if question is not None and is_allowed:
             question.on_allow()
 
-    def forbid(self, target: Target) -> None:
+    def deny(self, target: Target) -> None:
         """Deny sending to a target, and stop its repeated messages."""
-        self.arming.forbid(target)
+        self.arming.deny(target)
         for repeated in self.outbox.repeated_messages:
             if repeated.order.target == target:
                 self.outbox.stop(repeated.order.id)
@@ -246,9 +246,9 @@ class SessionActing:
 
     def new_message(self, topic: str, msg_type: str, text: str) -> SavedMessage | None:
         """Add a saved message and return it; return None if there are `MAX_MESSAGES`."""
-        name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
+        name = self.saved_messages.free_name(topic.rpartition("/")[2] or _("Message"))
         message = SavedMessage(new_message_id(), name, topic, msg_type or "json", text)
-        return message if self.shelf.set_message(message) else None
+        return message if self.saved_messages.set_message(message) else None
 
     def problem_of(self, message: SavedMessage) -> str:
         """Return the reason why a message can't be sent, or "" if it can be sent once armed."""
@@ -300,7 +300,7 @@ class SessionActing:
         not_now = self._replay_problem()
         if not_now:
             return not_now
-        not_armed = self.ready(order.target, partial(self.send_order, order, rate_hz=rate_hz))
+        not_armed = self.prepare(order.target, partial(self.send_order, order, rate_hz=rate_hz))
         if not_armed is not None:
             return not_armed
         self.notify_moved(order.target, order.origin)
@@ -314,7 +314,7 @@ class SessionActing:
     def _replay_problem(self) -> str:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
-    def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
+    def prepare(self, target: Target, go_on: Callable[[], object]) -> str | None:
         """Prepare sending to a target, asking the user if necessary.
 
         Sending is armed if it isn't yet.
@@ -343,7 +343,7 @@ class SessionActing:
             return None
         return None if self.gate.request_permission(target.name, resume_if_unchanged) else ""
 
-    def repeat(self, number: int) -> str:
+    def resend(self, number: int) -> str:
         """Send the message or call of an entry of `sent` again, if its target is armed.
 
         Args:
@@ -353,11 +353,11 @@ class SessionActing:
             Reason why this isn't possible, or "".
         """
         record = self.sent.get(number)
-        if record is None or record.repeat is None:
+        if record is None or record.resend is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
             return _("Sending to {name} isn't armed. Arm it first.").format(name=record.name)
-        return record.repeat()
+        return record.resend()
 
     def stop_sending(self, message_id: str) -> None:
         """Stop sending a message repeatedly."""
@@ -384,14 +384,14 @@ class SessionActing:
         not_now = self._replay_problem()
         if not_now:
             return not_now
-        not_armed = self.ready(Target("service", service), partial(self.call, service, text, timeout_s))
+        not_armed = self.prepare(Target("service", service), partial(self.call, service, text, timeout_s))
         if not_armed is not None:
             return not_armed
         try:
             self.calls.call(service, request, text, timeout_s)
         except NepError as error:
             return str(error)
-        self.shelf.set_request(service, text)
+        self.saved_messages.set_request(service, text)
         self.revision += 1
         return ""
 
@@ -408,7 +408,7 @@ class SessionActing:
             target = repeated.order.target
             if not self.may_continue(target):
                 self.outbox.stop(repeated.order.id)
-                self.ready(target, _do_nothing)
+                self.prepare(target, _do_nothing)
         for result in self.outbox.pop_results():
             self._apply_result(result)
         for record in self.calls.tick():
@@ -419,11 +419,11 @@ class SessionActing:
 
     def _apply_result(self, result: SendResult) -> None:
         order = result.order
-        if self.shelf.get(order.id) is not None:
+        if self.saved_messages.get(order.id) is not None:
             self.last[order.id] = result
             self.sent_at_s[order.id] = self._clock_s()
         for values_by_id in (self.last, self.sent_at_s):
-            for old_id in [id for id in values_by_id if self.shelf.get(id) is None]:
+            for old_id in [id for id in values_by_id if self.saved_messages.get(id) is None]:
                 del values_by_id[old_id]
         self.revision += 1
         is_bad = result.kind == "failed"
@@ -494,30 +494,30 @@ class SessionActing:
     # ---- file
 
     def _write(self) -> None:
-        path, revision = self.path, self.shelf.revision
+        path, revision = self.path, self.saved_messages.revision
         if path is None or self._is_newer or revision == self._written:
             return
         self._written = revision
-        snapshot = Shelf(self.shelf.messages, self.shelf.requests)
+        snapshot = SavedMessages(self.saved_messages.messages, self.saved_messages.requests)
 
         def write() -> bool:
-            write_atomically(path, encode_shelf(snapshot), durable=False, private=True)
+            write_atomically(path, encode_saved_messages(snapshot), durable=False, private=True)
             return True
 
         self._worker.submit(FILE_NAME, write)
 
-    def _read(self, path: Path) -> Shelf:
-        def parse(data: bytes) -> tuple[Shelf, str]:
-            saved_messages, unread = parse_shelf(data)
+    def _read(self, path: Path) -> SavedMessages:
+        def parse(data: bytes) -> tuple[SavedMessages, str]:
+            saved_messages, unread = parse_saved_messages(data)
             template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return saved_messages, template.format(count=unread) if unread else ""
 
-        stored = read_stored(path, parse, NewerShelfError, MAX_BYTES)
+        stored = read_stored(path, parse, NewerSavedMessagesError, MAX_BYTES)
         self._is_newer = stored.is_newer
         if stored.problem:
             title = _("Saved messages couldn't be read.")
             self._session.alerts.raise_alert("messages:file", "warn", title, stored.problem)
-        return stored.value if stored.value is not None else Shelf()
+        return stored.value if stored.value is not None else SavedMessages()
 
 
 def _do_nothing() -> None: ...

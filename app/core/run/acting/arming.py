@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 ARMED_S = 300.0
-MIN_S, MAX_S = 60.0, 3600.0
+MIN_ARMED_S, MAX_ARMED_S = 60.0, 3600.0
 MAX_TARGETS = 20
 
 
@@ -65,14 +65,14 @@ class Arming:
         """Switch sending on, or extend the time.
 
         Args:
-            seconds: Time from now in seconds, limited to `MIN_S` to `MAX_S`.
+            seconds: Time from now in seconds, limited to `MIN_ARMED_S` to `MAX_ARMED_S`.
         """
         with self._lock:
             if not self.is_on:
                 self._targets, self._confirmed = (), frozenset()
                 self.turn += 1
             self._is_on = True
-            self._until_s = self._clock() + min(MAX_S, max(MIN_S, seconds))
+            self._until_s = self._clock() + min(MAX_ARMED_S, max(MIN_ARMED_S, seconds))
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
@@ -96,7 +96,7 @@ class Arming:
         """Return True if the user has confirmed that the topic moves robots."""
         return topic in self._confirmed
 
-    def forbid(self, target: Target) -> None:
+    def deny(self, target: Target) -> None:
         """Deny a target."""
         with self._lock:
             self._targets = tuple(each for each in self._targets if each != target)

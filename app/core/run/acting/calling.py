@@ -21,7 +21,7 @@ from nep.nodes.node import Node
 from nep.patterns.services.client import Client
 
 TIMEOUT_S = 2.0
-MIN_S, MAX_S = 0.1, 120.0
+MIN_TIMEOUT_S, MAX_TIMEOUT_S = 0.1, 120.0
 MAX_RECORDS = 200
 MAX_REPLIES = 20
 """Number of the newest calls whose replies are stored."""
@@ -129,14 +129,14 @@ class ServiceCalls:
             service: Name of the service.
             request: Request as a value.
             words: Request as shown to the user.
-            timeout_s: Timeout in seconds, limited to `MIN_S` to `MAX_S`.
+            timeout_s: Timeout in seconds, limited to `MIN_TIMEOUT_S` to `MAX_TIMEOUT_S`.
 
         Raises:
             NepError: Another call is in flight.
         """
         if self.in_flight is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.in_flight.service))
-        timeout_s = min(MAX_S, max(MIN_S, timeout_s))
+        timeout_s = min(MAX_TIMEOUT_S, max(MIN_TIMEOUT_S, timeout_s))
         record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
         now = _CallInFlight(record.number, self._arming.turn, self._clock())
         self._in_flight = now

@@ -35,12 +35,12 @@ class JsonText:
 
     Attributes:
         fault: Syntax error; None for valid JSON.
-        places: Names of the placeholders, in order of appearance.
+        placeholders: Names of the placeholders, in order of appearance.
     """
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.places: tuple[str, ...] = ()
+        self.placeholders: tuple[str, ...] = ()
         self.fault: JsonFault | None = None
         self._spans: list[tuple[int, int, str]] = []
         if len(text) > MAX_LENGTH:
@@ -50,7 +50,7 @@ class JsonText:
         for match in _PLACEHOLDER.finditer(text):
             if match["name"] is not None:
                 self._spans.append((match.start(), match.end(), match["name"]))
-        self.places = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
+        self.placeholders = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
         # replaced by strings of the same length, so that every character stays in its position
         parts, after = [], 0
         for start, end, _name in self._spans:
@@ -61,12 +61,12 @@ class JsonText:
     @property
     def manual_placeholders(self) -> tuple[str, ...]:
         """Names of the placeholders that the user must fill in."""
-        return tuple(name for name in self.places if name not in AUTOMATIC_PLACEHOLDERS)
+        return tuple(name for name in self.placeholders if name not in AUTOMATIC_PLACEHOLDERS)
 
     @property
     def has_automatic_placeholders(self) -> bool:
         """True if the text contains automatic placeholders, so that each message has different values."""
-        return any(name in AUTOMATIC_PLACEHOLDERS for name in self.places)
+        return any(name in AUTOMATIC_PLACEHOLDERS for name in self.placeholders)
 
     def fill(self, values: Mapping[str, object]) -> object:
         """Return the value with all placeholders filled in.

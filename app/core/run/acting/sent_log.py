@@ -27,7 +27,7 @@ class SentRecord:
         is_error: True if the result is an error.
         text: Message or request; "" if there is none or it is too large.
         source: Message or request as the user wrote it.
-        repeat: Sends the message or call again and returns the reason if that isn't possible; None for
+        resend: Sends the message or call again and returns the reason if that isn't possible; None for
             other entries.
         count: Number of consecutive occurrences.
     """
@@ -39,7 +39,7 @@ class SentRecord:
     is_error: bool = False
     text: str = ""
     source: str = ""
-    repeat: Callable[[], str] | None = None
+    resend: Callable[[], str] | None = None
     count: int = 1
     number: int = 0
 
@@ -93,7 +93,7 @@ class SentLog:
             self.total += sent
             self.since_s = record.at_s if self.since_s is None else self.since_s
         if is_large(record.text) or is_large(record.source):
-            record = replace(record, text="", source="", repeat=None)
+            record = replace(record, text="", source="", resend=None)
         newest = self._records[-1] if self._records else None
         if newest is not None and record.origin != "switch" and newest.is_like(record):
             self._records[-1] = replace(record, number=newest.number, count=newest.count + 1)

@@ -24,7 +24,7 @@ MAX_BYTES = 64 * 2**20
 """Maximum size of the file in bytes; a larger file is not read."""
 
 
-class NewerShelfError(NepError):
+class NewerSavedMessagesError(NepError):
     """Raised if the file was written by a newer version of Studio."""
 
 
@@ -70,7 +70,7 @@ class SavedMessage:
         return replace(self, values=tuple(others.items())[-MAX_VALUES:])
 
 
-class Shelf:
+class SavedMessages:
     """Saved messages in order, and the last request of each service. Both are limited in number."""
 
     def __init__(
@@ -170,7 +170,7 @@ class Shelf:
 # ---- file
 
 
-def encode_shelf(saved_messages: Shelf) -> bytes:
+def encode_saved_messages(saved_messages: SavedMessages) -> bytes:
     """Return saved messages in the file format."""
     value = {
         "format": FORMAT_VERSION,
@@ -191,7 +191,7 @@ def encode_shelf(saved_messages: Shelf) -> bytes:
     return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
 
 
-def parse_shelf(data: bytes) -> tuple[Shelf, int]:
+def parse_saved_messages(data: bytes) -> tuple[SavedMessages, int]:
     """Parse the content of a file.
 
     Returns:
@@ -209,7 +209,7 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
     if not isinstance(value, dict) or not isinstance(message_list, list):
         raise NepError(_("the file has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT_VERSION:
-        raise NewerShelfError(_("the file was saved by a newer version of Studio"))
+        raise NewerSavedMessagesError(_("the file was saved by a newer version of Studio"))
     messages = [_parse_message(each) for each in message_list[:MAX_MESSAGES]]
     valid = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")
@@ -218,7 +218,7 @@ def parse_shelf(data: bytes) -> tuple[Shelf, int]:
         for name, text in (requests.items() if isinstance(requests, dict) else ())
         if isinstance(text, str) and len(text) <= MAX_LENGTH
     }
-    return Shelf(valid.values(), request_texts), len(message_list) - len(valid)
+    return SavedMessages(valid.values(), request_texts), len(message_list) - len(valid)
 
 
 def _parse_message(entry: object) -> SavedMessage | None:

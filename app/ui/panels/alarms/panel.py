@@ -111,7 +111,7 @@ class AlarmsPanel(PanelWidget):
         self.filter.textChanged.connect(self._show_history)
         self.export = Button(self.theme, _("CSV"), "download", size="small")
         self.export.setAccessibleName(_("Save the history as CSV"))
-        self.export.clicked.connect(self._save)
+        self.export.clicked.connect(self._save_history)
         columns = history_columns(self._severity, lambda: local_datetime(self.now_s()))
         self.model: TableModel[AlarmRecord] = TableModel(
             columns, lambda record: f"{record.rule_id} {record.at_s}"
@@ -120,7 +120,7 @@ class AlarmsPanel(PanelWidget):
         self.table.setAccessibleName(_("Alarm history"))
         self.table.order_changed.connect(self._show_history)
         self.table.filter_requested.connect(self.focus_filter)
-        self.table.opened.connect(self._open_record)
+        self.table.opened.connect(self._scroll_to_alarm)
         self.table.menu_requested.connect(self._show_record_menu)
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self._clear = QAction(_("Clear the history"), self)
@@ -453,7 +453,7 @@ class AlarmsPanel(PanelWidget):
             self.alarms.snooze(rule_id, 0.0 if is_snoozed or not seconds else self.now_s() + seconds)
             self.refresh()
 
-    def _until_tomorrow(self) -> float:
+    def _until_tomorrow_s(self) -> float:
         now = local_datetime(self.now_s())
         tomorrow = (now + dt.timedelta(days=1)).replace(hour=0, minute=0, second=0, microsecond=0)
         return tomorrow.timestamp() - self.now_s()
@@ -470,7 +470,7 @@ class AlarmsPanel(PanelWidget):
             for text, seconds in (
                 (_("Snooze for 10 min"), SNOOZE_S),
                 (_("Snooze for 1 h"), 3600.0),
-                (_("Snooze until tomorrow"), self._until_tomorrow()),
+                (_("Snooze until tomorrow"), self._until_tomorrow_s()),
             ):
                 menu.addAction(self.theme.icon("bell-off"), text, partial(self._snooze, rule.id, seconds))
         menu.addSeparator()
@@ -511,7 +511,7 @@ class AlarmsPanel(PanelWidget):
 
     # -- history ------------------------------------------------------------------------------------------
 
-    def _open_record(self, key: str) -> None:
+    def _scroll_to_alarm(self, key: str) -> None:
         rule_id = key.partition(" ")[0]
         row = next((row for row in self.rows if row.rule_id == rule_id), None)
         if row is not None:
@@ -526,18 +526,18 @@ class AlarmsPanel(PanelWidget):
         )
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._open_record, key))
+        menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._scroll_to_alarm, key))
         for name in filter(None, file_names):
             path = self.session.recordings.folder / name
             run = partial(self.context.run, f"recording.open:{path}")
             menu.addAction(self.theme.icon("history"), _("Open the recording"), run)
         menu.popup(position)
 
-    def _save(self) -> None:
+    def _save_history(self) -> None:
         suggestion = Path.home() / _("alarms.csv")
-        self.context.files.save_as(_("Save the history"), suggestion, [CSV_KIND], self._write)
+        self.context.files.save_as(_("Save the history"), suggestion, [CSV_KIND], self._write_history)
 
-    def _write(self, path: Path, _kind: FileKind) -> None:
+    def _write_history(self, path: Path, _kind: FileKind) -> None:
         try:
             write_atomically(path, csv_text(self.alarms.history.records).encode("utf-8"))
         except OSError as error:

@@ -15,7 +15,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.keyboard import has_no_modifiers, next_in_focus_chain
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 
 HEIGHT, PADDING, ICON, GAP, MAX_WIDTH = 24, 7, 14, 5, 300
 FIELD_WIDTH = 240
@@ -127,7 +127,7 @@ class SlotField(QLineEdit):
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("small"))
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self._offered = QStringListModel(self)
         completer = QCompleter(self._offered, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)

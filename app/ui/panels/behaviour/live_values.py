@@ -8,7 +8,7 @@ from typing import Protocol
 from app.robots.description.description import DataField, Robot, Sensor
 from app.ui.text.sensor_values import quantity_text, reading_text, yes_no_text
 
-SILENT_TEXT = "silent"
+SILENT_STATE = "silent"
 
 
 class SensorValues(Protocol):
@@ -51,7 +51,7 @@ def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tupl
             continue
         sensor_values = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
         texts |= sensor_values
-        if link.state == SILENT_TEXT:
+        if link.state == SILENT_STATE:
             old |= sensor_values.keys()
     return texts, old
 

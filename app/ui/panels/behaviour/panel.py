@@ -98,7 +98,7 @@ class Editor(Protocol):
     def undo_deletion(self) -> None: ...
     def move_dragged_blocks(self) -> None: ...
     def undo_block_move(self) -> None: ...
-    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None: ...
+    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None: ...
     def render_pdf(
         self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
     ) -> None: ...
@@ -139,7 +139,7 @@ class BehaviourPanel(PanelWidget):
         tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
         tabs.command_requested.connect(lambda command, key: context.run(f"{command}:{key}"))
         tabs.renamed.connect(lambda key, name: context.run(f"tab.rename:{key}:{name}"))
-        tabs.why_not = self._name_problem
+        tabs.name_problem = self._name_problem
         tabs.add.clicked.connect(lambda: context.run("file.new"))
         self.mode = "blocks"
         self.program = ProgramView(self.theme)
@@ -157,7 +157,7 @@ class BehaviourPanel(PanelWidget):
         self._offered: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
         self._watched: tuple[str, ...] = ()  # ids of variables whose values the page shows
         self._ticks = 0
-        self._carried: BlockDrag | None = None
+        self._block_drag: BlockDrag | None = None
         self._backpack: BackpackController | None = None
 
     def title_widget(self) -> QWidget:
@@ -261,7 +261,7 @@ class BehaviourPanel(PanelWidget):
         editor.try_requested.connect(lambda stack: self.context.run(f"try:{stack}"))
         editor.toolbox_pinned.connect(self._save_pinned)
         editor.blocks_deleted.connect(lambda count: self._blocks_deleted(editor, count))
-        self._carried = BlockDrag(
+        self._block_drag = BlockDrag(
             self.context, self.session, self._bar.tabs, editor, self.flush, self.show_current
         )
         backpack = Backpack(self.session.settings.path.parent)
@@ -393,7 +393,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit_from_menu(command)
 
-    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
+    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the active behaviour as an image.
 
         Args:
@@ -404,7 +404,7 @@ class BehaviourPanel(PanelWidget):
         if self.editor is None:
             callback(b"")
         else:
-            self.editor.picture(kind, white, callback)
+            self.editor.render_picture(kind, white, callback)
 
     def render_pdf(
         self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
@@ -508,11 +508,11 @@ class LoadingMessage:
     def __init__(self, parent: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
         self._container, self._clock = parent, clock
         self._since: float | None = None
-        self.words = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.words.setParent(parent)
-        self.words.hide()
+        self.text_label = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
+        self.text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.text_label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.text_label.setParent(parent)
+        self.text_label.hide()
 
     def set_ready(self, *, ready: bool) -> None:
         """Show or hide the message; call on every refresh.
@@ -527,10 +527,10 @@ class LoadingMessage:
             self._since = now
         late = self._since is not None and now - self._since >= LOADING_TEXT_DELAY_S
         if late:
-            self.words.setGeometry(self._container.rect())
-            self.words.raise_()
-        if late != self.words.isVisibleTo(self._container):
-            self.words.setVisible(late)
+            self.text_label.setGeometry(self._container.rect())
+            self.text_label.raise_()
+        if late != self.text_label.isVisibleTo(self._container):
+            self.text_label.setVisible(late)
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:

@@ -10,7 +10,7 @@ from PySide6.QtGui import QSyntaxHighlighter, QTextCharFormat, QTextDocument
 from PySide6.QtWidgets import QFrame, QPlainTextEdit
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 # The first rule that matches wins: strings and comments come before keywords.
@@ -52,7 +52,7 @@ class ProgramView(QPlainTextEdit):
         self.setAccessibleName(_("Python program"))
         self.document().setDocumentMargin(16)
         self._colours = _Highlighter(self.document(), theme)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         theme.changed.connect(self._restyle)
         self._restyle()
 

@@ -20,7 +20,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 MAX_NAME_WIDTH = 220
@@ -68,21 +68,21 @@ class BehaviourTab(PaintedButton):
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(theme, checkable=True, parent=parent)
-        self.facts = TabState("", "")
+        self.state = TabState("", "")
         self._from: QPointF | None = None
         self._is_close_hovered = self._close_down = False
         self.setMouseTracking(True)
 
     def show_state(self, state: TabState, current: bool) -> bool:
         """Update the tab. Return True if its width changed."""
-        if state == self.facts and current == self.isChecked():
+        if state == self.state and current == self.isChecked():
             return False
         wider = (
-            state.name != self.facts.name
+            state.name != self.state.name
             or current != self.isChecked()
-            or state.is_running != self.facts.is_running
+            or state.is_running != self.state.is_running
         )
-        self.facts = state
+        self.state = state
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
         states = [
@@ -101,11 +101,11 @@ class BehaviourTab(PaintedButton):
         return round(self._theme.scaled(ICON_SIZE))
 
     def _has_icon(self) -> bool:
-        return self.isChecked() or self.facts.is_running
+        return self.isChecked() or self.state.is_running
 
     def sizeHint(self) -> QSize:
         font = self._font(current=True)
-        name = min(self._theme.scaled(MAX_NAME_WIDTH), paint.width_of(font, self.facts.name) + 1)
+        name = min(self._theme.scaled(MAX_NAME_WIDTH), paint.width_of(font, self.state.name) + 1)
         icon = self._icon_size() + 8 if self._has_icon() else 0
         height = max(28, round(paint.height_of(font)) + 6)
         return QSize(round(PADDING + icon + name + SLOT_WIDTH + 4), height)
@@ -133,12 +133,12 @@ class BehaviourTab(PaintedButton):
             self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
             left += side + 8
         text_rect = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
-        paint.text_line(painter, text_rect, self.facts.name, self._font(current=current), colour)
+        paint.text_line(painter, text_rect, self.state.name, self._font(current=current), colour)
         self._paint_slot(painter, is_highlighted or self.hasFocus())
 
     def _paint_mark(self, painter: QPainter, icon_rect: QRectF) -> None:
         theme = self._theme
-        if not self.facts.is_running:
+        if not self.state.is_running:
             paint_icon(painter, icon_rect, "blocks", theme.colour("selectedText"))
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -156,7 +156,7 @@ class BehaviourTab(PaintedButton):
             if self._is_close_hovered:
                 paint.box(painter, slot, theme.radius("key"), theme.colour("pressed"))
             paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", colour)
-        elif self.facts.is_dirty:
+        elif self.state.is_dirty:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(colour)
@@ -245,7 +245,7 @@ class NameField(QLineEdit):
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MAX_NAME_LENGTH)
         self.setFont(theme.font("label"))
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self.textEdited.connect(lambda _text: self._show_problem(""))
         self.selectAll()
 

@@ -41,7 +41,7 @@ class BehaviourTabs(QWidget):
         self._states: tuple[TabState, ...] = ()
         self._current = ""
         self._scroll_offset = 0.0
-        self.why_not: Callable[[str, str], str] = lambda _key, _name: ""
+        self.name_problem: Callable[[str, str], str] = lambda _key, _name: ""
         """Returns the reason why the tab with this key can't have a name, or ""."""
         self.field: NameField | None = None
         self._edited = ""
@@ -148,10 +148,10 @@ class BehaviourTabs(QWidget):
         if key not in self.tabs:
             return
         self._end_edit()
-        state = self.tabs[key].facts
+        state = self.tabs[key].state
         name = state.plain_name or state.name
         self._edited = key
-        self.field = NameField(self._theme, name, lambda name: self.why_not(key, name), self._room)
+        self.field = NameField(self._theme, name, lambda name: self.name_problem(key, name), self._room)
         self.field.committed.connect(lambda name: self.renamed.emit(key, name))
         self.field.exited.connect(self._end_edit)
         self._update_layout(bring=key == self._current)
@@ -306,7 +306,7 @@ class BehaviourTabs(QWidget):
                 lambda _on=False, command=command: self.command_requested.emit(command, key)
             )
             if command == "tab.folder":
-                action.setEnabled(self.tabs[key].facts.has_file)
+                action.setEnabled(self.tabs[key].state.has_file)
             if command == "tab.close_others":
                 action.setEnabled(len(self.tabs) > 1)
         return menu

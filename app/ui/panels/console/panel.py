@@ -58,10 +58,10 @@ class ConsolePanel(PanelWidget):
         self.filter = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
-        self.words = LogFindField(self.theme)
-        self.words.textChanged.connect(self.refresh)
-        self.words.exited.connect(self._focus_lines)
-        self.words.hide()
+        self.find_field = LogFindField(self.theme)
+        self.find_field.textChanged.connect(self.refresh)
+        self.find_field.exited.connect(self._focus_lines)
+        self.find_field.hide()
         self.model = ConsoleModel()
         self.list = self._make_list()
         self.empty = EmptyState(self.theme, "terminal", _("No events yet"), "")
@@ -78,7 +78,7 @@ class ConsolePanel(PanelWidget):
         column.setSpacing(4)
         row = QHBoxLayout()
         row.setContentsMargins(8, 0, 8, 0)
-        row.addWidget(self.words)
+        row.addWidget(self.find_field)
         column.addLayout(row)
         column.addWidget(self.pages)
 
@@ -111,7 +111,7 @@ class ConsolePanel(PanelWidget):
 
     def refresh(self) -> None:
         console = self.session.displayed_console
-        choice = (self.level, self.node, self.words.text())
+        choice = (self.level, self.node, self.find_field.text())
         if (console.revision, choice) == (self._last_revision, self._choice):
             return
         records, record_filter = console.records, self._current_filter()
@@ -138,7 +138,7 @@ class ConsolePanel(PanelWidget):
             self.list.scrollToTop()
 
     def _current_filter(self) -> RecordFilter:
-        return RecordFilter(VISIBLE_LEVELS[self.level], self.node, self.words.text())
+        return RecordFilter(VISIBLE_LEVELS[self.level], self.node, self.find_field.text())
 
     def _on_scrolled(self, value: int) -> None:
         if value == 0:
@@ -161,11 +161,11 @@ class ConsolePanel(PanelWidget):
         self.newer.move(port.width() - self.newer.width() - 12, 8)
 
     def _update_empty_state(self) -> None:
-        is_filtered = self.level in {"warn", "error"} or self.node or self.words.text()
+        is_filtered = self.level in {"warn", "error"} or self.node or self.find_field.text()
         if not is_filtered:
             self.empty.set_texts(_("No events yet"), _("Log messages of programs and robots appear here."))
             self.empty.set_actions([self.doctor_action()])
-        elif self.node or self.words.text():
+        elif self.node or self.find_field.text():
             self.empty.set_texts(_("No matching lines"), _("Show all lines, or wait for a matching one."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.clear_filters, "x")])
         else:
@@ -175,7 +175,7 @@ class ConsolePanel(PanelWidget):
 
     def blockers(self) -> list[Blocker]:
         active_filters = [
-            self.words.text(),
+            self.find_field.text(),
             self.node,
             _(LEVEL_LABELS[self.level]) if self.level in {"warn", "error"} else "",
         ]
@@ -197,8 +197,8 @@ class ConsolePanel(PanelWidget):
 
     def clear_filters(self) -> None:
         """Remove all filters."""
-        self.words.clear()
-        self.words.hide()
+        self.find_field.clear()
+        self.find_field.hide()
         self.set_node("")
         self.set_level("all")
 
@@ -248,9 +248,9 @@ class ConsolePanel(PanelWidget):
         return (self._find, self._copy_all, self._clear)
 
     def focus_filter(self) -> bool:
-        self.words.show()
-        self.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
-        self.words.selectAll()
+        self.find_field.show()
+        self.find_field.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.find_field.selectAll()
         return True
 
     def _focus_lines(self) -> None:

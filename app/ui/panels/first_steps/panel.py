@@ -79,12 +79,12 @@ class StepRow(QWidget):
         super().__init__()
         self._theme, self.step = theme, step
         self.mark = _StepMark(theme, number)
-        self.words = label(with_block_names(step.text), "bodyLarge", wrap=True)
+        self.text_label = label(with_block_names(step.text), "bodyLarge", wrap=True)
         self.hint = label(with_block_names(step.hint), "body", role="textSecondary", wrap=True)
         first = step.id == "robot"
         self.button = Button(theme, with_block_names(step.text) if first else _("Show me"), size="small")
         self.button.clicked.connect(lambda: show_me(step))
-        for text_label in (self.words, self.hint):
+        for text_label in (self.text_label, self.hint):
             text_label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         help_row = QHBoxLayout()
         help_row.setSpacing(8)
@@ -92,7 +92,7 @@ class StepRow(QWidget):
         help_row.addWidget(self.button, 0, Qt.AlignmentFlag.AlignTop)
         text = QVBoxLayout()
         text.setSpacing(4)
-        text.addWidget(self.words)
+        text.addWidget(self.text_label)
         text.addLayout(help_row)
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 5, 8, 5)
@@ -105,9 +105,9 @@ class StepRow(QWidget):
         self.mark.state = state
         paint.show_when(self.hint, state == "next")
         paint.show_when(self.button, state == "next")
-        set_role(self.words, "textSecondary" if state == "done" else "text")
+        set_role(self.text_label, "textSecondary" if state == "done" else "text")
         template = {"done": _("{step}: done"), "next": _("{step}: the next step"), "later": "{step}"}[state]
-        self.setAccessibleName(template.format(step=self.words.text()))
+        self.setAccessibleName(template.format(step=self.text_label.text()))
         self.update()
         self.mark.update()
 

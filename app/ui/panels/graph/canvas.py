@@ -351,7 +351,7 @@ class GraphCanvas(QWidget):
         clicked = self._pressed is not None and not self._dragged
         self._pressed, self._dragged = None, False
         if clicked and event.button() == Qt.MouseButton.LeftButton:
-            self._press(event.position())
+            self._click_at(event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         target = self._item_at(event.position())
@@ -370,7 +370,7 @@ class GraphCanvas(QWidget):
         if choice is not None:
             self.menu_requested.emit(choice, self.mapToGlobal(position.toPoint()))
 
-    def _press(self, position: QPointF) -> None:
+    def _click_at(self, position: QPointF) -> None:
         target = self._item_at(position)
         if isinstance(target, tuple):
             group, is_head = target
@@ -426,10 +426,10 @@ class GraphCanvas(QWidget):
             self._activate()
         elif key == Qt.Key.Key_Escape and self.choice is not None:
             self.select(None)
-        elif not self._zoom_key(event):
+        elif not self._handle_zoom_key(event):
             super().keyPressEvent(event)
 
-    def _zoom_key(self, event: QKeyEvent) -> bool:
+    def _handle_zoom_key(self, event: QKeyEvent) -> bool:
         modifiers = event.modifiers() & ~(
             Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
         )

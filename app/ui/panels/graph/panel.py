@@ -85,17 +85,17 @@ class GraphPanel(PanelWidget):
         super().__init__(context, _("Graph"))
         theme = self.theme
         self._host = platform.node()
-        self._choices = GraphOptions()
+        self._options = GraphOptions()
         self._thread = LayoutThread()
         self._quiet, self._calls = QuietNodes(), CallRates()
         self._layout: GraphLayout | None = None
-        self._coming: GraphScene | None = None
+        self._pending_scene: GraphScene | None = None
         self._requested_graph: NodeGraph | None = None
         self._requested_sizes = LayoutSizes()
         self._last_snapshot: tuple[object, ...] = ()
         self._values: tuple[object, ...] = ()
         self._ticks = 0
-        self._hertz: Mapping[str, float] = {}
+        self._call_rates_hz: Mapping[str, float] = {}
         self._box_of: Callable[[str], str] = lambda _entry: ""
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
@@ -126,7 +126,7 @@ class GraphPanel(PanelWidget):
         theme = self.theme
         self._internal_topics_action = QAction(_("Show NEP's own topics"), self)
         self._internal_topics_action.setCheckable(True)
-        self._internal_topics_action.toggled.connect(lambda on: self._update_choices(shows_internal=on))
+        self._internal_topics_action.toggled.connect(lambda on: self._update_options(shows_internal=on))
         self._rearrange = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
         self._rearrange.triggered.connect(lambda _on=False: self._reset_layout())
 
@@ -136,12 +136,12 @@ class GraphPanel(PanelWidget):
         tools.filter.exited.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
         tools.group.changed.connect(self._group_by)
         tools.quiet.clicked.connect(
-            lambda: self._update_choices(
+            lambda: self._update_options(
                 hides_quiet=tools.quiet.isChecked(), groups_with_visible_quiet_nodes=frozenset()
             )
         )
         tools.services.clicked.connect(
-            lambda: self._update_choices(shows_services=tools.services.isChecked())
+            lambda: self._update_options(shows_services=tools.services.isChecked())
         )
         tools.whole.clicked.connect(canvas.show_all)
         tools.larger.clicked.connect(lambda: canvas.zoom_by(1.2))
@@ -173,9 +173,9 @@ class GraphPanel(PanelWidget):
         self._page_layout.setContentsMargins(0, 0, 0, 0)
         self._page_layout.setSpacing(0)
         self._page_layout.addWidget(main_area, 1)
-        self._line = Separator(self.theme, upright=True)
-        self._line.hide()
-        self._page_layout.addWidget(self._line)
+        self._separator = Separator(self.theme, upright=True)
+        self._separator.hide()
+        self._page_layout.addWidget(self._separator)
         self._page_layout.addWidget(self.card)
         return page
 
@@ -206,7 +206,7 @@ class GraphPanel(PanelWidget):
         graph = (view.epoch, view.revision) if view is not None else None
         counts = (session.nodes.revision, session.topics.revision, session.networks.revision)
         pages = session.web_pages.revision
-        return (graph, counts, pages, session.fleet.revision, session.master.kind, self._choices)
+        return (graph, counts, pages, session.fleet.revision, session.master.kind, self._options)
 
     def _graph_input(self) -> GraphInput:
         session = self.session
@@ -223,20 +223,20 @@ class GraphPanel(PanelWidget):
         graph_input, now = self._graph_input(), time.monotonic()
         self._quiet.update(graph_input, now)
         self._calls.update(graph_input, now)
-        self._hertz = self._calls.rates_hz()
-        self._update_choices(quiet_nodes=self._quiet.quiet_keys(now))
+        self._call_rates_hz = self._calls.rates_hz()
+        self._update_options(quiet_nodes=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
         graph_input = self._graph_input()
-        options = self._choices
+        options = self._options
         if len(graph_input.nodes) > MAX_EXPANDED_NODES and not (options.starts_collapsed or options.toggled):
             self._layout = None
-            self._update_choices(starts_collapsed=True)
-        graph = node_graph(graph_input, self._choices)
+            self._update_options(starts_collapsed=True)
+        graph = node_graph(graph_input, self._options)
         self.pages.setCurrentIndex(0 if graph_input.nodes else 1)
         self.export.setVisible(bool(graph_input.nodes))
         if not graph_input.nodes:
-            self._update_choices(starts_collapsed=False)
+            self._update_options(starts_collapsed=False)
             self._update_empty_state()
         self._update_counts(graph)
         if graph != self._requested_graph:
@@ -245,13 +245,13 @@ class GraphPanel(PanelWidget):
 
     def _apply_layout(self) -> None:
         # A large scene is shown one tick after it was built, to keep ticks short.
-        scene, self._coming = self._coming, None
+        scene, self._pending_scene = self._pending_scene, None
         result = self._thread.pop_result()
         if result is not None:
             graph, self._layout = result
             scene = GraphScene(self.theme, graph, self._layout, self._requested_sizes, self._host)
             if len(scene.lines) > MAX_LINES_PER_TICK:
-                self._coming = scene
+                self._pending_scene = scene
                 return
         if scene is not None:
             self._show(scene)
@@ -265,7 +265,7 @@ class GraphPanel(PanelWidget):
         self._update_card()
 
     def _stats_of(self, line: GraphLine) -> LineStats:
-        return line_stats(line, self.session.topic, self._hertz, self._box_of)
+        return line_stats(line, self.session.topic, self._call_rates_hz, self._box_of)
 
     def _has_gone_nodes(self) -> bool:
         graph = self._requested_graph
@@ -295,7 +295,7 @@ class GraphPanel(PanelWidget):
     def _update_counts(self, graph: NodeGraph) -> None:
         self.count.setText(counts_text(graph))
         if graph.node_count:
-            self.tools.show_quiet_count(graph.hidden_quiet_count, self._choices.hides_quiet)
+            self.tools.show_quiet_count(graph.hidden_quiet_count, self._options.hides_quiet)
 
     def _update_note(self, layout: GraphLayout) -> None:
         notes = []
@@ -313,29 +313,29 @@ class GraphPanel(PanelWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _update_choices(self, **changes: object) -> None:
-        self._choices = replace(self._choices, **changes)  # type: ignore[arg-type]
-        self.tools.show_choices(self._choices)
+    def _update_options(self, **changes: object) -> None:
+        self._options = replace(self._options, **changes)  # type: ignore[arg-type]
+        self.tools.show_options(self._options)
 
     def _group_by(self, name: str) -> None:
         for group_by in GROUPS:
             if group_by == name:
                 self._layout = None
-                self._update_choices(
+                self._update_options(
                     group_by=group_by, toggled=frozenset(), groups_with_visible_quiet_nodes=frozenset()
                 )
 
     def _toggle_group(self, group: str) -> None:
         self._layout = None
-        self._update_choices(toggled=self._choices.toggled ^ {group})
+        self._update_options(toggled=self._options.toggled ^ {group})
 
     def _show_quiet(self, group: str) -> None:
-        self._update_choices(
-            groups_with_visible_quiet_nodes=self._choices.groups_with_visible_quiet_nodes | {group}
+        self._update_options(
+            groups_with_visible_quiet_nodes=self._options.groups_with_visible_quiet_nodes | {group}
         )
 
     def _reset_layout(self) -> None:
-        self._layout = self._requested_graph = self._coming = None
+        self._layout = self._requested_graph = self._pending_scene = None
         self._last_snapshot = ()
         self.canvas.show_all()
 
@@ -348,14 +348,14 @@ class GraphPanel(PanelWidget):
         if letter == "/":
             self.focus_filter()
         elif letter == "g":
-            now = GROUPS.index(self._choices.group_by)
+            now = GROUPS.index(self._options.group_by)
             self._group_by(GROUPS[(now + 1) % len(GROUPS)])
         elif letter == "h":
-            self._update_choices(
-                hides_quiet=not self._choices.hides_quiet, groups_with_visible_quiet_nodes=frozenset()
+            self._update_options(
+                hides_quiet=not self._options.hides_quiet, groups_with_visible_quiet_nodes=frozenset()
             )
         elif letter == "s":
-            self._update_choices(shows_services=not self._choices.shows_services)
+            self._update_options(shows_services=not self._options.shows_services)
 
     def _open(self, key: str) -> None:
         if self.session.topic(key) is not None:
@@ -423,8 +423,8 @@ class GraphPanel(PanelWidget):
             self.session.graph,
             lambda entry: names.get(entry, split_key(entry)[1]),
             self._box_of,
-            self._hertz,
-            lambda name: is_drawn(name, self._choices),
+            self._call_rates_hz,
+            lambda name: is_drawn(name, self._options),
         )
 
     def _update_card(self) -> None:
@@ -438,13 +438,13 @@ class GraphPanel(PanelWidget):
                 if node is not None:
                     content = node_card(node, self._services_of(node.entry_key), self._card_sources())
         self.card.show_content(content)
-        self._line.setVisible(content is not None)
+        self._separator.setVisible(content is not None)
 
     def _services_of(self, entry: str) -> list[tuple[str, bool]]:
         view = self.session.graph
         services: list[tuple[str, bool]] = []
         for name, service in view.services.items() if view is not None else ():
-            if is_drawn(name, self._choices):
+            if is_drawn(name, self._options):
                 services += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
                 services += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
         return services
@@ -508,7 +508,7 @@ class GraphPanel(PanelWidget):
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return
-        data = self.picture() if kind is SVG_KIND else self.to_dot().encode("utf-8")
+        data = self.to_svg() if kind is SVG_KIND else self.to_dot().encode("utf-8")
         try:
             write_atomically(path, data)
         except OSError as error:
@@ -517,7 +517,7 @@ class GraphPanel(PanelWidget):
         else:
             self.context.show_toast(_("Saved {name}").format(name=path.name))
 
-    def picture(self) -> bytes:
+    def to_svg(self) -> bytes:
         """Return the whole graph as SVG in the colours of the theme; b"" if the graph is empty."""
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
@@ -570,7 +570,7 @@ class GraphPanel(PanelWidget):
         self.card.setMinimumWidth(width if is_wide else 0)
         self.card.setMaximumWidth(width if is_wide else 16_777_215)
         self.card.setMaximumHeight(16_777_215 if is_wide else max(120, self.height() // 2))
-        self._line.setFixedSize(*((1, 16_777_215) if is_wide else (16_777_215, 1)))
+        self._separator.setFixedSize(*((1, 16_777_215) if is_wide else (16_777_215, 1)))
         self.legend.setVisible(is_wide and self.height() >= self.theme.scaled(420))
 
     def theme_changed(self) -> None:
@@ -580,7 +580,7 @@ class GraphPanel(PanelWidget):
             self._reset_layout()
 
     def save_state(self) -> dict[str, object]:
-        options = self._choices
+        options = self._options
         return {
             "group_by": options.group_by,
             "services": options.shows_services,
@@ -591,11 +591,11 @@ class GraphPanel(PanelWidget):
     def restore_state(self, state: Mapping[str, object]) -> None:
         for group_by in GROUPS:
             if state.get("group_by") == group_by:
-                self._update_choices(group_by=group_by)
+                self._update_options(group_by=group_by)
         if isinstance(services := state.get("services"), bool):
-            self._update_choices(shows_services=services)
+            self._update_options(shows_services=services)
         if isinstance(hides := state.get("hides_quiet"), bool):
-            self._update_choices(hides_quiet=hides)
+            self._update_options(hides_quiet=hides)
         if isinstance(shows_own := state.get("own"), bool):
             self._internal_topics_action.setChecked(shows_own)
 

@@ -47,13 +47,13 @@ class GraphTools(QWidget):
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
-        self.show_choices(GraphOptions())
+        self.show_options(GraphOptions())
 
     def filter_words(self) -> list[str]:
         """Return the words of the filter, in lower case."""
         return self.filter.text().casefold().split()
 
-    def show_choices(self, options: GraphOptions) -> None:
+    def show_options(self, options: GraphOptions) -> None:
         """Update the buttons to show the current choices."""
         self.group.set_value(options.group_by)
         self.quiet.setChecked(options.hides_quiet)

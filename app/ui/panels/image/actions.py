@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction
 
-from app.ui.pictures.zoom import STEP, ZoomablePicture
+from app.ui.pictures.zoom import ZOOM_STEP, ZoomablePicture
 from app.ui.theme.theme import Theme
 from nep.i18n import _, lazy
 
@@ -73,8 +73,8 @@ class PictureActions(QObject):
         super().__init__(view)
         self._view = view
         callbacks: dict[str, Callable[[], object]] = {
-            "larger": lambda: view.zoom_by(STEP),
-            "smaller": lambda: view.zoom_by(1 / STEP),
+            "larger": lambda: view.zoom_by(ZOOM_STEP),
+            "smaller": lambda: view.zoom_by(1 / ZOOM_STEP),
             "fit": view.fit_to_view,
             "exact": view.show_actual_size,
             "right": lambda: self._rotate(90),
@@ -121,16 +121,16 @@ class PictureActions(QObject):
 
     def update_checks(self) -> None:
         """Update the check marks of the flip actions."""
-        self["across"].setChecked(self._view.place.is_flipped_horizontally)
-        self["down"].setChecked(self._view.place.is_flipped_vertically)
+        self["across"].setChecked(self._view.placement.is_flipped_horizontally)
+        self["down"].setChecked(self._view.placement.is_flipped_vertically)
 
     def _trigger(self, name: str) -> None:
         self._by_key[name].trigger()
 
     def _rotate(self, degrees: int) -> None:
-        self._view.place.rotate(degrees)
+        self._view.placement.rotate(degrees)
         self._view.notify_changed()
 
     def _flip(self, *, is_horizontal: bool) -> None:
-        self._view.place.flip(horizontally=is_horizontal)
+        self._view.placement.flip(horizontally=is_horizontal)
         self._view.notify_changed()

@@ -11,7 +11,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResiz
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
-from app.core.messages.image_style import PLAIN, PictureLook, parse_look
+from app.core.messages.image_style import PLAIN, PictureStyle, parse_style
 from app.core.networks.networks import topic_label
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, paused_blocker
@@ -19,7 +19,7 @@ from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.overlays import Overlays
 from app.ui.panels.image.point_bar import PointBar
 from app.ui.panels.image.snapshot import SnapshotJob
-from app.ui.panels.image.style_bar import LookBar
+from app.ui.panels.image.style_bar import StyleBar
 from app.ui.pictures.boxes import boxes_in_camera, robot_of_camera
 from app.ui.pictures.clicks import ClickablePicture
 from app.ui.pictures.placement import PicturePlacement
@@ -50,7 +50,7 @@ class ImagePanel(PanelWidget):
         self._watch: Watch | None = None
         self._watched_robot = ""
         self._placements: dict[str, PicturePlacement] = {}
-        self._looks: dict[str, PictureLook] = {}
+        self._styles: dict[str, PictureStyle] = {}
         self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
         self._has_image: bool | None = None
@@ -69,10 +69,10 @@ class ImagePanel(PanelWidget):
         self._update_empty_state()
 
     def _make_content(self) -> QWidget:
-        self.look_bar = LookBar(self.theme, lambda: self.view.picture)
-        self.look_bar.changed.connect(self._set_look)
-        self.look_bar.hide()
-        self.tune.toggled.connect(self.look_bar.setVisible)
+        self.style_bar = StyleBar(self.theme, lambda: self.view.picture)
+        self.style_bar.changed.connect(self._set_picture_style)
+        self.style_bar.hide()
+        self.tune.toggled.connect(self.style_bar.setVisible)
         self.points = PointBar(self.context, self.view)
         self.points.exited.connect(lambda: self._publish_points(on=False))
         self.view.clicked.connect(self.points.send)
@@ -82,14 +82,14 @@ class ImagePanel(PanelWidget):
         column.setSpacing(0)
         column.addWidget(self.points)
         column.addWidget(self.view, 1)
-        column.addWidget(self.look_bar)
+        column.addWidget(self.style_bar)
         return self.shown
 
-    def _set_look(self, style: object) -> None:
-        if isinstance(style, PictureLook):
-            self._looks[self._topic] = style
+    def _set_picture_style(self, style: object) -> None:
+        if isinstance(style, PictureStyle):
+            self._styles[self._topic] = style
             if self._stream is not None:
-                self._stream.set_look(style)
+                self._stream.set_style(style)
 
     def _make_actions(self) -> None:
         own_callbacks = {
@@ -142,8 +142,8 @@ class ImagePanel(PanelWidget):
         self.set_title(_("Image"), topic_label(name))
         if name:
             self._stream = self.session.images.stream(name)
-            self._stream.set_look(self._looks.get(name, PLAIN))
-            self.look_bar.show_look(self._looks.get(name, PLAIN))
+            self._stream.set_style(self._styles.get(name, PLAIN))
+            self.style_bar.show_style(self._styles.get(name, PLAIN))
             self.session.mark_seen(name)
         self._update_empty_state()
 
@@ -161,8 +161,8 @@ class ImagePanel(PanelWidget):
         # Zoom, rotation and image settings are remembered per topic.
         if len(self._placements) >= MAX_SAVED_VIEWS:
             self._placements.clear()
-            self._looks.clear()
-        self.view.place = self._placements.setdefault(topic, PicturePlacement())
+            self._styles.clear()
+        self.view.placement = self._placements.setdefault(topic, PicturePlacement())
         self.actions_of.update_checks()
 
     def refresh(self) -> None:
@@ -180,7 +180,7 @@ class ImagePanel(PanelWidget):
         link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
         boxes = boxes_in_camera(link, self._topic) if link is not None else ()
         self.view.show_image(self._stream, boxes, self.overlays.annotations_for)
-        self.look_bar.refresh()
+        self.style_bar.refresh()
         if self._stream.picture is not None:
             self._show_page(has_image=True)
         elif self._stream.error:
@@ -342,8 +342,8 @@ class ImagePanel(PanelWidget):
     def save_state(self) -> dict[str, object]:
         return {
             "topic": self._topic,
-            "place": self.view.place.to_json(),
-            "look": self.look_bar.look.to_json(),
+            "place": self.view.placement.to_json(),
+            "look": self.style_bar.picture_style.to_json(),
             "tune": self.tune.isChecked(),
             "layers": list(self.overlays.selected),
             "point": self.points.to_json(),
@@ -353,10 +353,10 @@ class ImagePanel(PanelWidget):
         topic = state.get("topic")
         if isinstance(topic, str) and topic:
             self.show_topic(topic)
-        self.view.place.restore(state.get("place"))
+        self.view.placement.restore(state.get("place"))
         self.actions_of.update_checks()
-        self._set_look(style := parse_look(state.get("look")))
-        self.look_bar.show_look(style)
+        self._set_picture_style(style := parse_style(state.get("look")))
+        self.style_bar.show_style(style)
         self.tune.setChecked(state.get("tune") is True)
         self.points.restore(state.get("point"))
         self.actions_of["point"].setChecked(self.points.is_on)

@@ -19,7 +19,7 @@ from app.ui.pictures.clicks import KEYBOARD_HINT, ClickablePicture
 from app.ui.text import plain
 from app.ui.widgets import Button, ComboBox, IconButton, label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.errors import BadTopicError
 from nep.i18n import _, ngettext
 from nep.protocol.wire import check_topic
@@ -69,7 +69,7 @@ class PointBar(QWidget):
         self.is_on = False
         # armed for this turn of the switch and this target
         self._armed: tuple[int, Target] | None = None
-        self.count = self.heard = 0
+        self.count = self.subscriber_count = 0
         theme = context.theme
         self.topic = QLineEdit()
         self.topic.setAccessibleName(_("Topic for points"))
@@ -77,16 +77,16 @@ class PointBar(QWidget):
         self.topic.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
         self.topic.setProperty("focusRadius", theme.radius("control"))
         self.topic.textEdited.connect(lambda _text: self._target_changed())
-        ContextMenuFilter(theme, self.topic)
+        FieldContextMenu(theme, self.topic)
         self.kind = ComboBox(theme, [(each, each) for each in MESSAGE_TYPES], name=_("Point type"))
         self.close_button = IconButton(theme, "x", _("Stop publishing points"), size=26)
         self.close_button.clicked.connect(self.exited)
         self.problem = label("", "small", role="error", wrap=True)
         self.problem.setMinimumWidth(0)
         self.problem.setContentsMargins(12, 0, 12, 6)
-        self.let = Button(theme, "", "lock", size="small")
-        self.let.allow_shrinking()
-        self.let.clicked.connect(self._arm_clicked)
+        self.arm_button = Button(theme, "", "lock", size="small")
+        self.arm_button.allow_shrinking()
+        self.arm_button.clicked.connect(self._arm_clicked)
         self.strip = PointStrip(context, self.arm, self._count_text)
         self._arrange()
         self.hide()
@@ -100,7 +100,7 @@ class PointBar(QWidget):
         about.setToolTip(plain.tip(_(KEYBOARD_HINT)))
         flow.addWidget(about)
         flow.add_elastic(self.topic, greedy=True)
-        for widget in (self.kind, self.let, self.close_button):
+        for widget in (self.kind, self.arm_button, self.close_button):
             flow.addWidget(widget)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -133,7 +133,9 @@ class PointBar(QWidget):
             return
         acting = self._acting
         is_waiting = acting.arming.is_on and not self.is_armed and acting.question is None
-        self.let.setVisible(is_waiting and not self.problem.text() and not self._context.session.is_replaying)
+        self.arm_button.setVisible(
+            is_waiting and not self.problem.text() and not self._context.session.is_replaying
+        )
         self.strip.refresh()
 
     def set_image_topic(self, key: str) -> None:
@@ -151,7 +153,7 @@ class PointBar(QWidget):
     def _target_changed(self) -> None:
         # Another target has to be armed again.
         self._disarm()
-        self.count = self.heard = 0
+        self.count = self.subscriber_count = 0
         try:
             check_topic(self.target.name)
             problem = ""
@@ -159,15 +161,15 @@ class PointBar(QWidget):
             problem = str(error) if self._pictures else ""
         self.problem.setText(problem)
         self.problem.setVisible(bool(problem))
-        self.let.set_label(_("Send points"), "lock")
-        self.let.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
+        self.arm_button.set_label(_("Send points"), "lock")
+        self.arm_button.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
         self.refresh()
 
     def _count_text(self) -> str:
         if not self.count:
             return ""
         text = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
-        return f"{text}, {subscribers_text(self.heard)}"
+        return f"{text}, {subscribers_text(self.subscriber_count)}"
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -210,7 +212,7 @@ class PointBar(QWidget):
         if set(arming.targets) <= {armed[1]}:
             self._acting.disarm()
         else:
-            self._acting.forbid(armed[1])
+            self._acting.deny(armed[1])
 
     def send(self, point: PicturePoint) -> None:
         """Publish a clicked point."""
@@ -230,7 +232,7 @@ class PointBar(QWidget):
         if result.kind != "sent":
             self._context.show_toast(result.message)
         elif result.order.target == self.target:
-            self.count, self.heard = self.count + 1, result.subscriber_count
+            self.count, self.subscriber_count = self.count + 1, result.subscriber_count
             self._view.show_mark(point)
 
     # -- saved state --------------------------------------------------------------------------------------

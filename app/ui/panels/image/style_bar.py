@@ -9,7 +9,7 @@ from math import exp, log
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from app.core.messages.image_style import COLOUR_MAPS, MAX_CONTRAST, PLAIN, PictureLook
+from app.core.messages.image_style import COLOUR_MAPS, MAX_CONTRAST, PLAIN, PictureStyle
 from app.core.messages.picture import Picture
 from app.robots.description.typed_number import parse_number
 from app.ui.theme.theme import Theme
@@ -37,7 +37,7 @@ class _RangeEdit(NumberEdit):
         return f"{value:.7g}"
 
 
-class LookBar(QWidget):
+class StyleBar(QWidget):
     """Bar with display settings of an image; emits `changed` with the new `PictureStyle`.
 
     Args:
@@ -50,14 +50,14 @@ class LookBar(QWidget):
         super().__init__()
         self._picture = picture
         self._of_numbers = True
-        self.look = PLAIN
+        self.picture_style = PLAIN
         self.brightness = self._make_slider(theme, _("Brightness"), self._set_brightness)
         self.contrast = self._make_slider(theme, _("Contrast"), self._set_contrast)
         maps = [(name, _(COLOUR_MAP_NAMES[name])) for name in COLOUR_MAPS]
         names = [("", _("Default colours")), *maps]
         self.colours = ComboBox(theme, names, name=_("Colour map"))
         self.colours.activated.connect(
-            lambda _at: self._apply(replace(self.look, colours=self.colours.value))
+            lambda _at: self._apply(replace(self.picture_style, colours=self.colours.value))
         )
         self.own_range = ToggleButton(theme, _("Custom range"), "ruler")
         self.own_range.toggled.connect(self._set_manual_range)
@@ -80,7 +80,7 @@ class LookBar(QWidget):
         )  # fmt: skip
         for part in parts:
             flow.addWidget(part)
-        self.show_look(PLAIN)
+        self.show_style(PLAIN)
 
     def _make_slider(self, theme: Theme, name: str, on_change: Callable[[int], None]) -> SliderTrack:
         slider = SliderTrack(theme, 2 * SLIDER_STEPS)
@@ -90,9 +90,9 @@ class LookBar(QWidget):
         slider.reset.connect(lambda: slider.setValue(SLIDER_STEPS))
         return slider
 
-    def show_look(self, style: PictureLook) -> None:
+    def show_style(self, style: PictureStyle) -> None:
         """Show other settings without emitting `changed`."""
-        self.look = style
+        self.picture_style = style
         slider_values = (
             (self.brightness, round(SLIDER_STEPS * (1 + style.brightness))),
             (self.contrast, round(SLIDER_STEPS * (1 + log(style.contrast) / log(MAX_CONTRAST)))),
@@ -121,25 +121,27 @@ class LookBar(QWidget):
             for part in (self.colours, self.own_range, self.low, self.high):
                 part.setEnabled(of_numbers)
 
-    def _apply(self, style: PictureLook, *, show: bool = False) -> None:
+    def _apply(self, style: PictureStyle, *, show: bool = False) -> None:
         if show:
-            self.show_look(style)
-        if style != self.look or show:
-            self.look = style
+            self.show_style(style)
+        if style != self.picture_style or show:
+            self.picture_style = style
             self.changed.emit(style)
 
     def _set_brightness(self, value: int) -> None:
-        self._apply(replace(self.look, brightness=value / SLIDER_STEPS - 1))
+        self._apply(replace(self.picture_style, brightness=value / SLIDER_STEPS - 1))
 
     def _set_contrast(self, value: int) -> None:
-        self._apply(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
+        self._apply(replace(self.picture_style, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
 
     def _set_manual_range(self, on: bool) -> None:
         picture = self._picture()
         scale = picture.scale if picture is not None else None
         low, high = (scale.low, scale.high) if scale is not None else (0.0, 255.0)
         low, high = (low, high) if low < high else (low, low + 1)
-        self._apply(replace(self.look, low=low if on else None, high=high if on else None), show=True)
+        self._apply(
+            replace(self.picture_style, low=low if on else None, high=high if on else None), show=True
+        )
 
     def _apply_range(self) -> None:
         try:
@@ -147,4 +149,4 @@ class LookBar(QWidget):
         except ValueError:  # a field is incomplete; it marks itself
             return
         if low < high:
-            self._apply(replace(self.look, low=low, high=high))
+            self._apply(replace(self.picture_style, low=low, high=high))

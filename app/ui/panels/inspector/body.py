@@ -38,13 +38,13 @@ class CompareStrip(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._with = ""
-        self.words = ElidedLabel("small", "textSecondary")
+        self.text_label = ElidedLabel("small", "textSecondary")
         self.only = IconButton(theme, "filter", _("Show changes only"), checkable=True, size=24)
         self.only.toggled.connect(self.changes_only_toggled)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 8, 3)
         row.setSpacing(6)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
         row.addWidget(self.only)
         self.hide()
 
@@ -57,10 +57,10 @@ class CompareStrip(QWidget):
             is_complete: False if the counts are incomplete.
         """
         template = _("{compared_with}: {changes}")
-        self.words.setText(
+        self.text_label.setText(
             template.format(compared_with=compared_with, changes=changes_text(counts, is_complete))
         )
-        self.setAccessibleDescription(self.words.text())
+        self.setAccessibleDescription(self.text_label.text())
 
 
 class InspectorBody(QWidget):
@@ -143,7 +143,7 @@ class InspectorBody(QWidget):
         self.pages.setCurrentIndex(page)
         for widget in (self.bar, self.line, self.foot):
             widget.setVisible(page in MODES)
-        self.query.set_tree_visible(tree=page in {TREE, TABLE})
+        self.query.update_visibility(tree=page in {TREE, TABLE})
         self.strip.setVisible(page == TREE and comparing)
         self.foot.legend.setVisible(page == TREE)
         if page in MODES:
@@ -213,6 +213,6 @@ class InspectorBody(QWidget):
 
     def reveal(self, path: object) -> None:
         """Select the value at a path in the tree and scroll to it."""
-        index = self.model.reveal(path)  # type: ignore[arg-type]
+        index = self.model.index_of_path(path)  # type: ignore[arg-type]
         self.tree.setCurrentIndex(index)
         self.tree.scrollTo(index)

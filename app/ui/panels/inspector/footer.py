@@ -116,12 +116,12 @@ class Footer(QWidget):
         self.copy_value = IconButton(theme, "copy", _("Copy value"), "Ctrl+C", size=26)
         self.copy_path = IconButton(theme, "link", _("Copy path"), "Ctrl+Shift+C", size=26)
         self.plot = IconButton(theme, "chart-line", _("Plot"), "Ctrl+Shift+L", size=26)
-        self.facts = FixedWidthLabel("small", "textTertiary")
+        self.info = FixedWidthLabel("small", "textTertiary")
         self.legend = Legend(theme)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(0)
-        for parts in ((self.path, self.copy_value, self.copy_path, self.plot), (self.facts, self.legend)):
+        for parts in ((self.path, self.copy_value, self.copy_path, self.plot), (self.info, self.legend)):
             rows.addWidget(Separator(theme))
             row = QHBoxLayout()
             row.setContentsMargins(10, 3, 8, 3)
@@ -144,4 +144,4 @@ class Footer(QWidget):
 
     def show_info(self, text: str) -> None:
         """Show the properties of a message."""
-        self.facts.setText(text)
+        self.info.setText(text)

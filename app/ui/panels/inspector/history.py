@@ -24,7 +24,7 @@ class HistoryStrip(QWidget):
 
     Attributes:
         history: Collected messages.
-        at: Number of the selected message; None while the newest one is selected.
+        selected_number: Number of the selected message; None while the newest one is selected.
 
     Signals:
         selection_changed: The user selected another message.
@@ -34,8 +34,8 @@ class HistoryStrip(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.kept = MessageHistory()
-        self.at: int | None = None
+        self.history = MessageHistory()
+        self.selected_number: int | None = None
         self._feed: SeriesFeed | None = None
         self._topic = ""
         self._last_state: tuple[int, int, int | None] = (0, 0, None)
@@ -43,11 +43,11 @@ class HistoryStrip(QWidget):
         self.back = IconButton(theme, "step-back", _("Previous message"), size=24)
         self.track = SliderTrack(theme, 0)
         self.track.setAccessibleName(_("Messages of this topic"))
-        self.on = IconButton(theme, "step-forward", _("Next message"), size=24)
+        self.forward = IconButton(theme, "step-forward", _("Next message"), size=24)
         self.newest = IconButton(theme, "chevron-last", _("Follow the newest message"), size=24)
-        self.words = FixedWidthLabel("small", "textSecondary")
+        self.text_label = FixedWidthLabel("small", "textSecondary")
         self.back.clicked.connect(lambda: self.step(-1))
-        self.on.clicked.connect(lambda: self.step(1))
+        self.forward.clicked.connect(lambda: self.step(1))
         self.newest.clicked.connect(lambda: self.select(None))
         self.track.valueChanged.connect(self._slider_moved)
         row = QHBoxLayout(self)
@@ -55,9 +55,9 @@ class HistoryStrip(QWidget):
         row.setSpacing(3)
         row.addWidget(self.back)
         row.addWidget(self.track, 2)
-        row.addWidget(self.on)
+        row.addWidget(self.forward)
         row.addWidget(self.newest)
-        row.addWidget(self.words, 3)
+        row.addWidget(self.text_label, 3)
         self.hide()
 
     def start(self, feed: SeriesFeed, topic: str) -> None:
@@ -69,36 +69,36 @@ class HistoryStrip(QWidget):
         """
         self.pause()
         if topic != self._topic:
-            self.kept.reset()
-            self.at = None
+            self.history.reset()
+            self.selected_number = None
         self._feed, self._topic = feed, topic
         if topic:
-            feed.register(topic, self.kept, is_lossless=False)
+            feed.register(topic, self.history, is_lossless=False)
 
     def pause(self) -> None:
         """Stop collecting messages until the next `start`. The collected messages remain available."""
         if self._feed is not None:
-            self._feed.unregister(self._topic, self.kept)
+            self._feed.unregister(self._topic, self.history)
             self._feed = None
 
     def reset(self) -> None:
         """Stop collecting messages and clear the history; called when the source changes."""
         self.pause()
         self._topic = ""
-        self.kept.reset()
-        self.at = None
+        self.history.reset()
+        self.selected_number = None
         self.refresh(at_once=True)
 
     def selected_message(self) -> Message | None:
         """Return the selected message; None if the newest is selected or the message has been evicted."""
-        return self.kept.at(self.at) if self.at is not None else None
+        return self.history.at(self.selected_number) if self.selected_number is not None else None
 
-    def before(self) -> Message | None:
+    def previous_message(self) -> Message | None:
         """Return the message before the selected one.
 
         None if the newest message is selected or the message has been evicted.
         """
-        return self.kept.at(self.at - 1) if self.at is not None else None
+        return self.history.at(self.selected_number - 1) if self.selected_number is not None else None
 
     def step(self, by: int) -> None:
         """Select another message.
@@ -107,10 +107,10 @@ class HistoryStrip(QWidget):
             by: Number of messages to move by; negative for earlier messages. A step beyond the last
                 message selects the newest message and follows later ones.
         """
-        if not len(self.kept):
+        if not len(self.history):
             return
-        target = (self.at if self.at is not None else self.kept.end - 1) + by
-        self.select(None if target >= self.kept.end else self.kept.nearest(target))
+        target = (self.selected_number if self.selected_number is not None else self.history.end - 1) + by
+        self.select(None if target >= self.history.end else self.history.nearest(target))
 
     def select(self, number: int | None) -> None:
         """Select a message by its number.
@@ -118,15 +118,15 @@ class HistoryStrip(QWidget):
         Args:
             number: Number of the message; None selects the newest message and follows later ones.
         """
-        if number != self.at:
-            self.at = number
+        if number != self.selected_number:
+            self.selected_number = number
             self.refresh(at_once=True)
             self.selection_changed.emit()
 
     def clamp_selection(self) -> None:
         """Select the newest message if the selected one no longer exists because the replay was rewound."""
-        if self.at is not None and self.at >= self.kept.end:
-            self.at = None
+        if self.selected_number is not None and self.selected_number >= self.history.end:
+            self.selected_number = None
 
     def refresh(self, *, at_once: bool = False, is_busy: bool = False) -> None:
         """Update the strip; call on every refresh.
@@ -138,9 +138,9 @@ class HistoryStrip(QWidget):
         """
         self._ticks += 1
         self.clamp_selection()
-        messages = self.kept
-        state = (messages.first, messages.end, self.at)
-        is_needed = len(messages) > 1 or self.at is not None
+        messages = self.history
+        state = (messages.first, messages.end, self.selected_number)
+        is_needed = len(messages) > 1 or self.selected_number is not None
         interval_ticks = UPDATE_TICKS if is_busy else 2 * UPDATE_TICKS
         due = at_once or is_needed is self.isHidden() or self._ticks >= interval_ticks
         if state == self._last_state or not due:
@@ -150,8 +150,8 @@ class HistoryStrip(QWidget):
         self.track.blockSignals(True)
         self.track.setRange(0, max(0, len(messages) - 1))
         index = (
-            messages.nearest(self.at) - messages.first
-            if self.at is not None and len(messages)
+            messages.nearest(self.selected_number) - messages.first
+            if self.selected_number is not None and len(messages)
             else len(messages) - 1
         )
         if not self.track.isSliderDown():
@@ -159,21 +159,21 @@ class HistoryStrip(QWidget):
         self.track.blockSignals(False)
         self.track.update()
         self.back.setEnabled(index > 0)
-        self.on.setEnabled(self.at is not None)
-        self.newest.setEnabled(self.at is not None)
-        self.words.setText(self._position_text(index))
+        self.forward.setEnabled(self.selected_number is not None)
+        self.newest.setEnabled(self.selected_number is not None)
+        self.text_label.setText(self._position_text(index))
 
     def _position_text(self, index: int) -> str:
-        if self.at is None:
-            return _("the newest of {count}").format(count=len(self.kept))
+        if self.selected_number is None:
+            return _("the newest of {count}").format(count=len(self.history))
         message = self.selected_message()
         if message is None:
             return _("no longer available")
-        text = _("{place} of {count}").format(place=index + 1, count=len(self.kept))
+        text = _("{place} of {count}").format(place=index + 1, count=len(self.history))
         if message.stamp_ns is not None and 0 <= message.stamp_ns < 2**62:
             text = f"{text}   {clock_text(message.stamp_ns)}"
         return text
 
     def _slider_moved(self, index: int) -> None:
-        last = index >= len(self.kept) - 1
-        self.select(None if last else self.kept.first + index)
+        last = index >= len(self.history) - 1
+        self.select(None if last else self.history.first + index)

@@ -64,7 +64,7 @@ class ObjectsView(QWidget):
         self._sorted_at = 0.0
         self._row_height = 26
         self.table: TableView[ObjectRow] | None = None
-        self.words = ElidedLabel("small", "textSecondary")
+        self.text_label = ElidedLabel("small", "textSecondary")
         self.choose = IconButton(theme, "chevron-down", _("Choose a list in the message"), size=24)
         self.choose.clicked.connect(self._show_list_menu)
         self.copy = IconButton(theme, "copy", _("Copy the table as CSV"), size=24)
@@ -75,7 +75,7 @@ class ObjectsView(QWidget):
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 8, 3)
         row.setSpacing(4)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
         row.addWidget(self.choose)
         row.addWidget(self.copy)
         self.pages = QStackedWidget()
@@ -152,7 +152,7 @@ class ObjectsView(QWidget):
         self.copy.setEnabled(bool(columns))
         if not columns:
             self._remove_table()
-            self.words.setText("")
+            self.text_label.setText("")
             return
         if columns != self._columns or self.table is None:
             self._make_table(columns, rows)
@@ -170,7 +170,7 @@ class ObjectsView(QWidget):
             )
         if len(self._columns) >= MAX_COLUMNS:
             text = _("{rows}, the first {count} columns").format(rows=text, count=MAX_COLUMNS)
-        self.words.setText(f"{path}   {text}" if path else text)
+        self.text_label.setText(f"{path}   {text}" if path else text)
 
     def _update_rows(self, rows: list[ObjectRow], now: float) -> None:
         # Keeps the previous order except for one re-sort per second.

@@ -142,7 +142,7 @@ class InspectorPanel(PanelWidget):
             return
         topic, recorded = self.session.topic(self._topic), self.session.replay is not None
         self.history.clamp_selection()
-        earlier = self.history.at is not None
+        earlier = self.history.selected_number is not None
         self.live.set(*chip_state(topic, self.is_frozen, recorded=recorded, earlier=earlier))
         newest, is_shown = topic.newest if topic is not None and topic.gone_s is None else None, False
         if (
@@ -209,7 +209,7 @@ class InspectorPanel(PanelWidget):
 
     def _decode_in_background(self, message: Message) -> None:
         # Decoded in the reader's thread; the old contents are shown until then.
-        if self.history.at is not None:  # the user waits for exactly this message
+        if self.history.selected_number is not None:  # the user waits for exactly this message
             self.reader.submit(message)
         elif not self.reader.submit_throttled(message, self.clock()):
             return
@@ -228,8 +228,8 @@ class InspectorPanel(PanelWidget):
             self._before = self._value if self._value is not None else NO_BASE
             topic = self.session.topic(self._topic)
             previous = topic.previous if topic is not None else None
-            if self.history.at is not None:
-                previous = self.history.before()
+            if self.history.selected_number is not None:
+                previous = self.history.previous_message()
             if message.size_bytes <= LARGE_BYTES and previous is not None:
                 self._before = payload_or_default(previous, self._before)
             self.finder.invalidate_matches()
@@ -325,7 +325,7 @@ class InspectorPanel(PanelWidget):
     @property
     def is_display_fixed(self) -> bool:
         """True if new messages don't change the display: it is frozen, or an earlier message is selected."""
-        return self.is_frozen or self.history.at is not None
+        return self.is_frozen or self.history.selected_number is not None
 
     @property
     def is_comparing(self) -> bool:
@@ -346,7 +346,7 @@ class InspectorPanel(PanelWidget):
         self._pinned = self._value if pinned and self._value is not None else NO_BASE
         stamp_ns = self._shown_message.stamp_ns if self._shown_message is not None else None
         self._pinned_text = _(PINNED)
-        if self.history.at is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
+        if self.history.selected_number is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
             time_text = clock_text(stamp_ns)
             self._pinned_text = _("{message} of {clock}").format(message=_(PINNED), clock=time_text)
         self._show_value()
@@ -356,7 +356,7 @@ class InspectorPanel(PanelWidget):
         message = self.history.selected_message()
         if message is not None:
             self._show_message(message)
-        elif self.history.at is None:
+        elif self.history.selected_number is None:
             self.freeze.setChecked(False)
             self._refresh_now()
 

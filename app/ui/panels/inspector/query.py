@@ -48,11 +48,11 @@ class QueryStrip(QWidget):
         self._value: object = None
         self._due = self._on_tree = False
         self._not_before = 0.0
-        self.words = label("", "small", role="textSecondary", wrap=True)
-        self.words.setMinimumWidth(0)
+        self.text_label = label("", "small", role="textSecondary", wrap=True)
+        self.text_label.setMinimumWidth(0)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 8, 3)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
         self.hide()
 
     @property
@@ -101,23 +101,23 @@ class QueryStrip(QWidget):
         self._value, self._due = None, False
         self._set_status("", is_error=False)
 
-    def set_tree_visible(self, *, tree: bool) -> None:
+    def update_visibility(self, *, tree: bool) -> None:
         """Show or hide the strip. It is visible only if it has a text.
 
         Args:
             tree: True if the current page can show the results of a query.
         """
         self._on_tree = tree
-        show_when(self, tree and bool(self.words.text()))
+        show_when(self, tree and bool(self.text_label.text()))
 
     def close_worker(self) -> None:
         """Stop the background thread."""
         self._worker.close()
 
     def _set_status(self, text: str, *, is_error: bool) -> None:
-        self.words.setText(text)
-        set_role(self.words, "warn" if is_error else "textSecondary")
-        self.set_tree_visible(tree=self._on_tree)
+        self.text_label.setText(text)
+        set_role(self.text_label, "warn" if is_error else "textSecondary")
+        self.update_visibility(tree=self._on_tree)
 
 
 def result_text(result: QueryResult) -> str:

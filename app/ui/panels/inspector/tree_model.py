@@ -289,7 +289,7 @@ class TreeModel(QAbstractItemModel):
         self.changePersistentIndexList(before, [self.index_of(node) for node in nodes])
         self.layoutChanged.emit()
 
-    def reveal(self, path: Sequence[str | int]) -> QModelIndex:
+    def index_of_path(self, path: Sequence[str | int]) -> QModelIndex:
         """Return the index of the value at a path.
 
         The parents of the value are loaded if necessary. The index is invalid if there is no such

@@ -19,7 +19,7 @@ from app.core.networks.parameters import (
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, paint, set_role
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, format_list, lazy
@@ -159,7 +159,9 @@ class ParametersView(QWidget):
             template = _("The parameters of {node} can't be read: {reason}")
             return template.format(node=name, reason=parameters.problem)
         template = (
-            _("Parameters of {node}") if parameters.heard else _("Waiting for the parameters of {node}")
+            _("Parameters of {node}")
+            if parameters.has_received
+            else _("Waiting for the parameters of {node}")
         )
         return template.format(node=name)
 
@@ -171,7 +173,7 @@ class ParametersView(QWidget):
 
     def _selection_changed(self, _now: QModelIndex, _before: QModelIndex) -> None:
         self._edited = False
-        self.parameters.refusal = ""
+        self.parameters.rejection_reason = ""
         self._show_selected()
 
     def _show_selected(self) -> None:
@@ -191,7 +193,7 @@ class ParametersView(QWidget):
         is_pending = self.parameters.setting == parameter.name
         if self._is_awaiting_reply and not self.parameters.setting:
             self._is_awaiting_reply = False
-            self._edited = bool(self.parameters.refusal)
+            self._edited = bool(self.parameters.rejection_reason)
         self._show_editor(parameter, options)
         self.field.setEnabled(not disabled_reason)
         self.choice.setEnabled(not disabled_reason)
@@ -214,7 +216,7 @@ class ParametersView(QWidget):
             self.field.setText(now[:MAX_TEXT_LENGTH])
 
     def _update_status(self, parameter: ReportedParameter, disabled_reason: str, *, is_pending: bool) -> None:
-        rejection = self.parameters.refusal
+        rejection = self.parameters.rejection_reason
         self.field.set_invalid(is_invalid=bool(rejection))
         if rejection:
             self._set_status(_as_sentence(rejection), "error")
@@ -245,7 +247,7 @@ class ParametersView(QWidget):
 
     def _cancel_edit(self) -> None:
         self._edited = False
-        self.parameters.refusal = ""
+        self.parameters.rejection_reason = ""
         self._show_selected()
         self.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
@@ -268,7 +270,7 @@ class ValueField(QLineEdit):
         self._on_submit, self._leave = on_submit, leave
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(60)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
 
     def set_invalid(self, *, is_invalid: bool) -> None:
         """Show or remove the red outline.

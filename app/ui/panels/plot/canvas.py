@@ -207,7 +207,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.mouse_s: float | None = None
         self.painted_s = 0.0  # accumulated processor time of painting
         # like `marks`, at fixed times on dense lines, which have no dashes
-        self.signs: list[tuple[PlotCurve, float, float]] = []
+        self.line_marks: list[tuple[PlotCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._drag_state: tuple[str, QPointF] | None = None
         self.ranges = {"left": ValueRange(), "right": ValueRange()}
@@ -323,7 +323,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             item.getViewBox().removeItem(item)
         self._show_axes([curve for curve, _line in lines])
         self._fit_values(lines)
-        self.signs = []
+        self.line_marks = []
         for index, (curve, line) in enumerate(lines):
             self._show_line(curve, line)
             if len(lines) > 1 and self._is_dense(line, right=curve.right):
@@ -346,7 +346,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         item.setData(
             line.times - self.anchor_s,
             np.clip(line.values, -MAX_ABS_VALUE, MAX_ABS_VALUE),
-            pen=curve.look.pen(self.theme, is_dense=dense),
+            pen=curve.style.pen(self.theme, is_dense=dense),
             antialias=not dense,
         )
 
@@ -367,14 +367,14 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             time_s = (first + index) * step_s
             sample = curve.curve.samples.at(time_s)
             if sample is not None and self.begin_s <= time_s <= self.end_s:
-                self.signs.append((curve, *sample))
+                self.line_marks.append((curve, *sample))
 
     def _show_axes(self, curves: Sequence[PlotCurve]) -> None:
         for name, right in (("left", False), ("right", True)):
             axis_curves = [curve for curve in curves if curve.right is right]
             axis = self.plot.getAxis(name)
             colour = (
-                axis_curves[0].look.line_colour(self.theme)
+                axis_curves[0].style.line_colour(self.theme)
                 if len(axis_curves) == 1
                 else self.theme.colour("textSecondary")
             )
@@ -452,10 +452,10 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for x in visible.values():
             painter.setPen(pen)
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
-        for curve, time_s, value in (*self.signs, *self.marks):
+        for curve, time_s, value in (*self.line_marks, *self.marks):
             x, y = self.x_of(time_s, area), self.y_of(value, right=curve.right, area=area)
             if area.left() <= x <= area.right() and area.top() - 1 <= y <= area.bottom() + 1:
-                curve.look.paint_mark(painter, theme, QPointF(x, y), 9)
+                curve.style.paint_mark(painter, theme, QPointF(x, y), 9)
         self._paint_distance(painter, positions)
         for name, x in visible.items():
             flag = self._flag_rect(x)

@@ -20,7 +20,7 @@ LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
 
 
 @dataclass(frozen=True, slots=True)
-class CurveLook:
+class CurveStyle:
     """Style of a curve.
 
     Attributes:
@@ -88,7 +88,7 @@ class Stroke:
         is_hidden: True for a hidden curve, whose sample is faded.
     """
 
-    look: CurveLook
+    style: CurveStyle
     is_state: bool
     is_hidden: bool
 
@@ -99,15 +99,15 @@ class Stroke:
         middle = box.center().y()
         width = min(box.width(), 34.0)
         if self.is_state:
-            paint_state(painter, theme, QRectF(box.left(), middle - 7, width, 14), self.look)
+            paint_state(painter, theme, QRectF(box.left(), middle - 7, width, 14), self.style)
         else:
-            painter.setPen(self.look.pen(theme))
+            painter.setPen(self.style.pen(theme))
             painter.drawLine(QPointF(box.left(), middle), QPointF(box.left() + width, middle))
-            self.look.paint_mark(painter, theme, QPointF(box.left() + width / 2, middle))
+            self.style.paint_mark(painter, theme, QPointF(box.left() + width / 2, middle))
         painter.setOpacity(1.0)
 
 
-def paint_state(painter: QPainter, theme: Theme, box: QRectF, style: CurveLook) -> None:
+def paint_state(painter: QPainter, theme: Theme, box: QRectF, style: CurveStyle) -> None:
     """Paint the box of a state.
 
     Args:

@@ -67,7 +67,7 @@ class CsvWriter:
                 raise OSError(errno.ECANCELED, os.strerror(errno.ECANCELED))
             yield lines.encode()
 
-    def pop_result(self) -> str | None:
+    def result(self) -> str | None:
         """Return None while the thread is writing, "" on success, or the reason of the failure."""
         return self._result
 
@@ -119,7 +119,7 @@ class PlotPicture:
         row = self._theme.scaled(LEGEND_ROW_HEIGHT)
         for curve in self._curves:
             box = QRectF(12, top + 4, self.size.width() - 24, row)
-            Stroke(curve.look, curve.curve.is_state, is_hidden=False).paint(painter, box, self._theme)
+            Stroke(curve.style, curve.curve.is_state, is_hidden=False).paint(painter, box, self._theme)
             font = self._theme.font("code")
             paint.text_line(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
             top += row
@@ -207,7 +207,7 @@ class PlotExport:
             else:
                 self._report(path, "")
             return
-        if self._writer is not None and self._writer.pop_result() is None:
+        if self._writer is not None and self._writer.result() is None:
             self._context.show_toast(_("The previous export is still running"))
             return
         curves = [each.curve for each in self._curves() if not each.is_hidden]
@@ -216,7 +216,7 @@ class PlotExport:
 
     def poll(self) -> None:
         """Report the result of a CSV export once it has finished; call on every tick."""
-        if self._writer is not None and (failed := self._writer.pop_result()) is not None:
+        if self._writer is not None and (failed := self._writer.result()) is not None:
             self._report(self._writer.path, failed)
             self._writer = None
 

@@ -95,7 +95,7 @@ class StateLanes(QWidget):
             role = "textDisabled" if curve.is_hidden else "textSecondary"
             paint.text_line(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
         for curve, run, box in self.boxes():
-            paint_state(painter, theme, box, curve.look)
+            paint_state(painter, theme, box, curve.style)
             if box.width() >= MIN_WORD_WIDTH:
                 text_box = box.adjusted(6, 0, -4, 0)
                 paint.text_line(painter, text_box, run.value or "", theme.font("small"), theme.colour("text"))

@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent
 from app.core.series.curves import Curves
 from app.core.series.formula import FieldSource
 from app.core.series.samples import RangeStats
-from app.ui.panels.plot.curve_style import COLOUR_NAMES, CurveLook, Stroke
+from app.ui.panels.plot.curve_style import COLOUR_NAMES, CurveStyle, Stroke
 from app.ui.panels.plot.plotted_curve import MINUS, PlotCurve, number_text, value_text
 from app.ui.text.numbers import group_digits, seconds_text
 from app.ui.theme.theme import Theme
@@ -68,7 +68,7 @@ class _CellFactory:
     """Functions that create the cells of the columns."""
 
     def __init__(self, stats: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
-        self.figures, self._is_gone = stats, is_gone
+        self._stats, self._is_gone = stats, is_gone
 
     @staticmethod
     def _role(plot_curve: PlotCurve) -> str:
@@ -84,7 +84,7 @@ class _CellFactory:
 
     @staticmethod
     def stroke(plot_curve: PlotCurve) -> Cell:
-        style = plot_curve.look
+        style = plot_curve.style
         return Cell(
             mark=Stroke(style, plot_curve.curve.is_state, plot_curve.is_hidden),
             accessible_text=_(COLOUR_NAMES[style.colour % len(COLOUR_NAMES)]),
@@ -109,13 +109,13 @@ class _CellFactory:
         return Cell(value_text(plot_curve.curve.last), role=self._role(plot_curve))
 
     def at_a(self, plot_curve: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.value_at_cursor(plot_curve, 0)), role=self._role(plot_curve))
+        return Cell(value_text(self._stats.value_at_cursor(plot_curve, 0)), role=self._role(plot_curve))
 
     def at_b(self, plot_curve: PlotCurve) -> Cell:
-        return Cell(value_text(self.figures.value_at_cursor(plot_curve, 1)), role=self._role(plot_curve))
+        return Cell(value_text(self._stats.value_at_cursor(plot_curve, 1)), role=self._role(plot_curve))
 
     def difference(self, plot_curve: PlotCurve) -> Cell:
-        stats = self.figures
+        stats = self._stats
         if stats.cursors is None:
             return Cell()
         if plot_curve.curve.is_state and plot_curve.curve.states is not None:
@@ -134,7 +134,7 @@ class _CellFactory:
 
     def stat(self, which: str) -> Callable[[PlotCurve], Cell]:
         def cell(plot_curve: PlotCurve) -> Cell:
-            value = None if plot_curve.curve.is_state else getattr(self.figures.stats_for(plot_curve), which)
+            value = None if plot_curve.curve.is_state else getattr(self._stats.stats_for(plot_curve), which)
             return Cell("" if value is None else number_text(value), role=self._role(plot_curve))
 
         return cell
@@ -248,7 +248,7 @@ class LegendTable(TableView[PlotCurve]):
         for number, text in enumerate(COLOUR_NAMES):
             action = menu.addAction(_(text))
             action.setCheckable(True)
-            action.setChecked(plot_curve.look.colour % len(COLOUR_NAMES) == number)
+            action.setChecked(plot_curve.style.colour % len(COLOUR_NAMES) == number)
             action.triggered.connect(lambda _on=False, number=number: self._set_colour(plot_curve, number))
         menu.addSeparator()
         hide = menu.addAction(
@@ -267,17 +267,17 @@ class LegendTable(TableView[PlotCurve]):
         self.changed.emit()
 
     def _set_colour(self, plot_curve: PlotCurve, number: int) -> None:
-        plot_curve.look = CurveLook(number, plot_curve.look.pattern)
+        plot_curve.style = CurveStyle(number, plot_curve.style.pattern)
         self.changed.emit()
 
 
-def next_look(curves: Sequence[PlotCurve]) -> CurveLook:
+def next_style(curves: Sequence[PlotCurve]) -> CurveStyle:
     """Return a style for a new curve, with the colour and the pattern that the fewest curves have."""
-    colours = [curve.look.colour % len(COLOUR_NAMES) for curve in curves]
-    patterns = [curve.look.pattern % 4 for curve in curves]
+    colours = [curve.style.colour % len(COLOUR_NAMES) for curve in curves]
+    patterns = [curve.style.pattern % 4 for curve in curves]
     colour = min(range(len(COLOUR_NAMES)), key=lambda each: (colours.count(each), each))
     pattern = min(range(4), key=lambda each: (patterns.count(each), each))
-    return CurveLook(colour, pattern)
+    return CurveStyle(colour, pattern)
 
 
 def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
@@ -295,9 +295,9 @@ def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -
     for count, template in (
         (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
         (
-            curves.unread_count,
+            curves.skipped_count,
             ngettext(
-                "{count} message can't be decoded", "{count} messages can't be decoded", curves.unread_count
+                "{count} message can't be decoded", "{count} messages can't be decoded", curves.skipped_count
             ),
         ),
         (

@@ -24,9 +24,9 @@ from app.ui.panels.plot.advice import PlotAdvice
 from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
-from app.ui.panels.plot.legend import LegendStats, LegendTable, caption_text, columns, next_look
+from app.ui.panels.plot.legend import LegendStats, LegendTable, caption_text, columns, next_style
 from app.ui.panels.plot.pace import DrawThrottle
-from app.ui.panels.plot.plotted_curve import PlotCurve, parse_look
+from app.ui.panels.plot.plotted_curve import PlotCurve, parse_style
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas
@@ -63,7 +63,7 @@ class PlotPanel(PanelWidget):
         self.curves = Curves(self.session.series, self._topic_names)
         self.shown: list[PlotCurve] = []
         self.view = TimeView()
-        self.figures = LegendStats()
+        self.stats = LegendStats()
         self._ticks = 0
         self._due = True
         self._ticks_since_stats = IDLE_STATS_UPDATE_TICKS
@@ -106,7 +106,7 @@ class PlotPanel(PanelWidget):
         self.xy = XYCanvas(theme)
         self.lanes = StateLanes(theme, self.canvas)
         self.model: TableModel[PlotCurve] = TableModel(
-            columns(self.figures, self.cursors.isChecked, self._is_gone), lambda shown: shown.name
+            columns(self.stats, self.cursors.isChecked, self._is_gone), lambda shown: shown.name
         )
         self.table = LegendTable(theme, self.model)
         self.table.changed.connect(self._curves_changed)
@@ -214,7 +214,7 @@ class PlotPanel(PanelWidget):
 
     def _add_curves(self, curves: Sequence[Curve], *, right: bool) -> None:
         for curve in curves:
-            self.shown.append(PlotCurve(curve, next_look(self.shown), right))
+            self.shown.append(PlotCurve(curve, next_style(self.shown), right))
         self._curves_changed()
 
     def remove(self, name: str) -> None:
@@ -289,7 +289,10 @@ class PlotPanel(PanelWidget):
             for each in self.shown
             if not each.is_hidden and not each.curve.is_state
         ]
-        self._points = (sum(line.points for _c, line in lines), all(line.is_complete for _c, line in lines))
+        self._points = (
+            sum(line.sample_count for _c, line in lines),
+            all(line.is_complete for _c, line in lines),
+        )
         if self.is_xy:
             self.xy.cursors = canvas.cursors
             self.xy.show_pairs(self._pairs(), begin_s, end_s)
@@ -326,7 +329,7 @@ class PlotPanel(PanelWidget):
         cursors = self.canvas.cursors
         both = (cursors["A"], cursors["B"]) if len(cursors) == 2 else None
         begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
-        self.figures.set_range(begin_s, end_s, both)
+        self.stats.set_range(begin_s, end_s, both)
         self.table.refresh_visible()
         distance = self.xy.distance() if self.is_xy else None
         self.about.setText(caption_text(self.curves, has_cursors=both is not None, distance=distance))
@@ -577,7 +580,7 @@ class PlotPanel(PanelWidget):
         except CurveError:
             return
         for curve in curves:
-            plot_curve = PlotCurve(curve, parse_look(saved, next_look(self.shown)))
+            plot_curve = PlotCurve(curve, parse_style(saved, next_style(self.shown)))
             plot_curve.right, plot_curve.is_hidden = saved.get("right") is True, saved.get("hidden") is True
             self.shown.append(plot_curve)
 

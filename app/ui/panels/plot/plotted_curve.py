@@ -9,7 +9,7 @@ from math import isfinite
 from app.core.series.curves import Curve
 from app.core.series.field_path import MISSING
 from app.core.series.formula import FieldSource
-from app.ui.panels.plot.curve_style import CurveLook
+from app.ui.panels.plot.curve_style import CurveStyle
 from app.ui.text.numbers import group_digits
 from nep.i18n import number
 
@@ -28,7 +28,7 @@ class PlotCurve:
     """
 
     curve: Curve
-    look: CurveLook
+    style: CurveStyle
     right: bool = False
     is_hidden: bool = False
 
@@ -44,15 +44,15 @@ class PlotCurve:
             "text": self.name,
             "right": self.right,
             "hidden": self.is_hidden,
-            "colour": self.look.colour,
-            "pattern": self.look.pattern,
+            "colour": self.style.colour,
+            "pattern": self.style.pattern,
         }
         if isinstance(source, FieldSource):
             state |= {"topic": source.topic, "path": str(source.path)}
         return state
 
 
-def parse_look(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
+def parse_style(saved: Mapping[str, object], otherwise: CurveStyle) -> CurveStyle:
     """Return the style from a saved state.
 
     Args:
@@ -60,7 +60,7 @@ def parse_look(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
         otherwise: Style whose colour or pattern replaces an invalid entry.
     """
     colour, pattern = saved.get("colour"), saved.get("pattern")
-    return CurveLook(
+    return CurveStyle(
         colour % 6 if isinstance(colour, int) else otherwise.colour,
         pattern % 4 if isinstance(pattern, int) else otherwise.pattern,
     )

@@ -71,7 +71,7 @@ class FieldCatalog:
         ]
         return candidates[:MAX_TOPICS]
 
-    def names(self) -> list[str]:
+    def topic_keys(self) -> list[str]:
         """Return the keys of all topics that exist."""
         return [
             topic.key for topic in (*self._session.topics.existing_topics(), *self._session.networks.topics)
@@ -136,8 +136,8 @@ class AddCurveField(SearchField):
         super().__init__(theme, _("Add a curve"), "C")
         self.setMinimumWidth(round(theme.scaled(150)))
         self._plotted = plotted
-        self.offers = FieldCatalog(session)
-        self.sentence = ""
+        self.catalog = FieldCatalog(session)
+        self.error_message = ""
         self._matches: _MatchPopup | None = None
         self._offered_fields: dict[str, PlottableField] = {}
         self._timer = QTimer(self)
@@ -164,7 +164,7 @@ class AddCurveField(SearchField):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
-        self.offers.open()
+        self.catalog.open()
         self._timer.start()
         self._search()
 
@@ -180,7 +180,7 @@ class AddCurveField(SearchField):
     def dispose(self) -> None:
         """Unsubscribe from topics and hide the list."""
         self._timer.stop()
-        self.offers.close()
+        self.catalog.close()
         self._offered_fields.clear()
         if self._matches is not None:
             self._matches.hide()
@@ -199,7 +199,7 @@ class AddCurveField(SearchField):
         Args:
             message: Reason; "" removes the message.
         """
-        self.sentence = message
+        self.error_message = message
         self.setProperty("wrong", "true" if message else "false")
         self.style().unpolish(self)
         self.style().polish(self)
@@ -209,7 +209,7 @@ class AddCurveField(SearchField):
 
     def _refresh_fields(self) -> None:
         # Refreshes fields and values.
-        self.offers.open()
+        self.catalog.open()
         before = len(self._offered_fields)
         self._read_fields()
         if len(self._offered_fields) != before:
@@ -222,13 +222,13 @@ class AddCurveField(SearchField):
                 match_list.update_entry(line.entry.id, _value_note(field))
 
     def _read_fields(self) -> None:
-        self._offered_fields = dict(self.offers.fields())
+        self._offered_fields = dict(self.catalog.fields())
 
     def _search(self, *_text: object, keep_selection: bool = False) -> None:
         if not self.hasFocus():
             return
         if not keep_selection:
-            if self.sentence:
+            if self.error_message:
                 self.show_error("")
             self._read_fields()
         typed = self.text().strip()
@@ -267,14 +267,14 @@ class AddCurveField(SearchField):
             return
         hint = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
         fit = ngettext("{count} field", "{count} fields", count).format(count=count)
-        self._matches.foot.setText(self.sentence or f"{hint} · {fit}")
-        self._matches.foot.setProperty("role", "error" if self.sentence else "textTertiary")
+        self._matches.foot.setText(self.error_message or f"{hint} · {fit}")
+        self._matches.foot.setProperty("role", "error" if self.error_message else "textTertiary")
         self._matches.foot.style().unpolish(self._matches.foot)
         self._matches.foot.style().polish(self._matches.foot)
 
     def _position_matches(self, has_lines: bool) -> None:
         matches = self.matches
-        if not has_lines and not self.sentence:
+        if not has_lines and not self.error_message:
             matches.hide()
             return
         window = self.window()
@@ -318,7 +318,7 @@ class AddCurveField(SearchField):
         before, last = typed[:start], typed[start:]
         candidates = [
             *self._offered_fields,
-            *self.offers.names(),
+            *self.catalog.topic_keys(),
             *(f"{name}(" for name in (*FUNCTIONS, *WINDOW_FUNCTIONS)),
         ]
         longer = complete(last, candidates) if last else last
@@ -339,7 +339,7 @@ class AddCurveField(SearchField):
         elif (
             key not in {Qt.Key.Key_Home, Qt.Key.Key_End}
             and self._matches is not None
-            and self._matches.list.handle(key)
+            and self._matches.list.handle_key(key)
         ):
             return
         else:
@@ -393,8 +393,8 @@ class PlotTools(QWidget):
         row.setContentsMargins(10, 6, 10, 6)
         row.add_elastic(self.add, greedy=True)
         row.push()
-        self._when_there = (self.span, self.cursors, self.states, self.across, self.export)
-        for widget in self._when_there:
+        self._curve_tools = (self.span, self.cursors, self.states, self.across, self.export)
+        for widget in self._curve_tools:
             row.addWidget(widget)
 
     def update_tools(self, curves: int, numbers: int) -> None:
@@ -404,7 +404,7 @@ class PlotTools(QWidget):
             curves: Number of curves.
             numbers: Number of curves with numeric values.
         """
-        for widget in self._when_there:
+        for widget in self._curve_tools:
             paint.show_when(widget, curves > 0)
         paint.show_when(self.states, curves > numbers)
         paint.show_when(self.across, numbers > 1)

@@ -110,7 +110,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             for shade in range(SHADE_COUNT):
                 first = shade * len(times) // SHADE_COUNT
                 last = (shade + 1) * len(times) // SHADE_COUNT + 1
-                colour = y_curve.look.line_colour(self.theme)
+                colour = y_curve.style.line_colour(self.theme)
                 colour.setAlphaF(MIN_ALPHA + (1 - MIN_ALPHA) * (shade + 1) / SHADE_COUNT)
                 self._line(count).setData(xs[first:last], ys[first:last], pen=pg.mkPen(colour, width=1.75))
                 count += 1
@@ -210,7 +210,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             )
         ]
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(y_curve.look.line_colour(self.theme))
+        painter.setBrush(y_curve.style.line_colour(self.theme))
         painter.drawPolygon(QPolygonF(corners))
 
 

@@ -29,7 +29,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, NumberEdit, Separator, label
 from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.inputs.json_edit import JsonEdit
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault
@@ -47,7 +47,7 @@ class TopicEdit(QLineEdit):
         self.setAccessibleName(_("Topic"))
         self.setPlaceholderText("/topic")
         self.setProperty("focusRadius", theme.radius("control"))
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self._offered = QStringListModel(self)
         completer = QCompleter(self._offered, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
@@ -84,7 +84,7 @@ class MessageForm(QWidget):
         super().__init__()
         self._theme, self._type_of = theme, type_of
         self.message: SavedMessage | None = None
-        self.read = parse_json_text("{}")
+        self.parsed = parse_json_text("{}")
         self._is_showing = False
         self._make_fields()
         self._make_text()
@@ -98,12 +98,12 @@ class MessageForm(QWidget):
         self.name = QLineEdit()
         self.name.setAccessibleName(_("Message name"))
         self.name.setMaxLength(MAX_NAME_LENGTH)
-        ContextMenuFilter(theme, self.name)
+        FieldContextMenu(theme, self.name)
         self.topic = TopicEdit(theme)
         self.kind = QLineEdit()
         self.kind.setAccessibleName(_("Message type"))
         self.kind.setPlaceholderText("json")
-        ContextMenuFilter(theme, self.kind)
+        FieldContextMenu(theme, self.kind)
         for field in (self.name, self.kind):
             field.setProperty("focusRadius", theme.radius("control"))
         self.values = ValueFields(theme)
@@ -237,18 +237,18 @@ class MessageForm(QWidget):
         if message is None:
             return
         is_json = not is_plain_text(message.msg_type)
-        self.read = parse_json_text(message.text) if is_json else parse_json_text("{}")
+        self.parsed = parse_json_text(message.text) if is_json else parse_json_text("{}")
         self.edit.set_highlighting(is_json)
-        fault = self.read.fault
+        fault = self.parsed.fault
         self.edit.mark_line(fault.line if fault is not None else 0)
-        self.tidy.setEnabled(is_json and fault is None and not self.read.places)
-        self.values.show_fields(self.read.manual_placeholders, dict(message.values))
+        self.tidy.setEnabled(is_json and fault is None and not self.parsed.placeholders)
+        self.values.show_fields(self.parsed.manual_placeholders, dict(message.values))
         for widget in (self._values_label, self.values):
-            widget.setVisible(bool(self.read.manual_placeholders))
+            widget.setVisible(bool(self.parsed.manual_placeholders))
 
     def show_problem(self, problem: str) -> None:
         """Show the reason why the message can't be sent; "" hides the reason."""
-        fault = self.read.fault
+        fault = self.parsed.fault
         message = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
         if message != self.sentence.text():
             self.sentence.setText(message)
@@ -299,13 +299,13 @@ class MessageForm(QWidget):
     def format_json(self) -> None:
         """Format the JSON text, or show why this fails: an error, or a placeholder without a value."""
         try:
-            self.replace_text(format_json(self.read.fill({})))
+            self.replace_text(format_json(self.parsed.fill({})))
         except NepError as error:
             self.show_problem(str(error))
 
     def apply_fix(self) -> None:
         """Apply the suggested fix for the first error in the JSON text, if there is one."""
-        fault: JsonFault | None = self.read.fault
+        fault: JsonFault | None = self.parsed.fault
         if fault is not None and fault.fix is not None:
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)
             self.edit.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -18,7 +18,7 @@ from app.core.run.acting.templates import format_empty_message, format_message
 from app.ui.panels.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.publish.message_form import MessageForm
-from app.ui.panels.publish.shelf_list import ShelfList, state_cell
+from app.ui.panels.publish.shelf_list import SavedMessageList, state_cell
 from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.text.numbers import group_digits, rate_text
 from app.ui.widgets import Button, EmptyAction, EmptyState, label
@@ -55,7 +55,7 @@ class PublishPanel(PanelWidget):
         self._minutes = ArmDurationMenu(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter saved messages"))
         self.filter.setMaximumWidth(16_777_215)
-        self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
+        self.list = SavedMessageList(self.theme, lambda each: state_cell(each, self.acting))
         self.form = MessageForm(self.theme, self._type_of)
         self.empty = EmptyState(
             self.theme,
@@ -112,7 +112,7 @@ class PublishPanel(PanelWidget):
         self.strip.refresh()
         self._poll_peek()
         acting, topics = self.acting, self.session.live.topics
-        state = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
+        state = (acting.saved_messages.revision, acting.revision, acting.arming.revision, topics.revision)
         if state != self._last_state:
             self._last_state = state
             self._rebuild()
@@ -126,7 +126,7 @@ class PublishPanel(PanelWidget):
         self._end_peek()
 
     def _rebuild(self) -> None:
-        messages = self.acting.shelf.messages
+        messages = self.acting.saved_messages.messages
         keywords = self.filter.text().casefold().split()
         rows = [
             each
@@ -152,7 +152,7 @@ class PublishPanel(PanelWidget):
     @property
     def message(self) -> SavedMessage | None:
         """Selected message, or None."""
-        return self.acting.shelf.get(self.list.selected_key() or "")
+        return self.acting.saved_messages.get(self.list.selected_key() or "")
 
     def _show_selected(self) -> None:
         message = self.message
@@ -216,7 +216,7 @@ class PublishPanel(PanelWidget):
             key: Key of the topic; "" creates an empty message.
         """
         _network, topic = split_key(key)
-        saved = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
+        saved = [each for each in self.acting.saved_messages.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
         message = (
             saved[-1] if saved else self.acting.new_message(topic, msg_type, format_empty_message(msg_type))
@@ -277,7 +277,7 @@ class PublishPanel(PanelWidget):
 
     def _message_edited(self, message: object) -> None:
         if isinstance(message, SavedMessage):
-            self.acting.shelf.set_message(message)
+            self.acting.saved_messages.set_message(message)
             if self.acting.outbox.is_sending(message.id):
                 self.acting.stop_sending(
                     message.id
@@ -308,7 +308,7 @@ class PublishPanel(PanelWidget):
 
     def copy(self, id: str) -> None:
         """Duplicate a message."""
-        duplicate = self.acting.shelf.copy(id)
+        duplicate = self.acting.saved_messages.copy(id)
         if duplicate is not None:
             self._requested_id = duplicate.id
             self._rebuild()
@@ -316,14 +316,14 @@ class PublishPanel(PanelWidget):
     def delete(self, id: str) -> None:
         """Delete a message; the toast offers to undo it."""
         self.acting.stop_sending(id)
-        removed = self.acting.shelf.remove(id)
+        removed = self.acting.saved_messages.remove(id)
         if removed is not None:
             text = _("Deleted “{name}”").format(name=removed.name)
             self.context.show_toast(text, _("Undo"), self._undo_delete)
             self._rebuild()
 
     def _undo_delete(self) -> None:
-        back = self.acting.shelf.restore()
+        back = self.acting.saved_messages.restore()
         if back is not None:
             self._requested_id = back.id
             self._rebuild()

@@ -35,7 +35,7 @@ def state_cell(message: SavedMessage, acting: SessionActing) -> Cell:
     return Cell("", "send", "textSecondary", accessible_text=_("can be sent"))
 
 
-class ShelfList(TableView[SavedMessage]):
+class SavedMessageList(TableView[SavedMessage]):
     """List of saved messages; a click selects a message.
 
     Args:

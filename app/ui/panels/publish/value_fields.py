@@ -11,7 +11,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 FIELD_WIDTH_PX = 120
@@ -79,7 +79,7 @@ class ValueFields(QWidget):
         )
         field.setToolTip(plain.tip(hint))
         field.setProperty("focusRadius", self._theme.radius("control"))
-        ContextMenuFilter(self._theme, field)
+        FieldContextMenu(self._theme, field)
         field.textEdited.connect(lambda text, name=name: self.typed.emit(name, text))
         name_label.setBuddy(field)
         row.addWidget(name_label)

@@ -165,7 +165,7 @@ def columns(
         now: Returns the current local time.
     """
 
-    def name(info: RecordingInfo) -> Cell:
+    def name_cell(info: RecordingInfo) -> Cell:
         image = picture(info)
         badge = badge_of(info, is_written(info))
         note = note_of(info)
@@ -178,10 +178,10 @@ def columns(
         date = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
         return Cell(date_time_text(date, now()))
 
-    def length(info: RecordingInfo) -> Cell:
+    def length_cell(info: RecordingInfo) -> Cell:
         return Cell(length_text(info.duration_s) if info.message_count else "")
 
-    def lost(info: RecordingInfo) -> Cell:
+    def lost_cell(info: RecordingInfo) -> Cell:
         if info.lost is None:
             return Cell()
         return Cell(
@@ -191,15 +191,16 @@ def columns(
         )
 
     return (
-        Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
+        Column("name", lazy("Recording"), 280, name_cell, key=lambda facts: facts.path.stem.casefold(),
                stretch=True, tip=lambda facts: str(facts.path)),
         Column("when", lazy("Recorded"), 148, date_cell,
                key=lambda facts: facts.start_ns or facts.changed_s * 1e9, hide_order=1),
-        Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, is_numeric=True),
-        Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),
+        Column("length", lazy("Length"), 68, length_cell, key=lambda facts: facts.duration_s,
+        is_numeric=True), Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),
                key=lambda facts: facts.size_bytes, is_numeric=True, hide_order=2),
         Column("messages", lazy("Messages"), 84,
                lambda facts: Cell(group_digits(facts.message_count) if facts.message_count else ""),
                key=lambda facts: facts.message_count, is_numeric=True, hide_order=4),
-        Column("lost", lazy("Lost"), 92, lost, key=lambda facts: facts.lost, is_numeric=True, hide_order=3),
+        Column("lost", lazy("Lost"), 92, lost_cell, key=lambda facts: facts.lost, is_numeric=True,
+        hide_order=3),
     )  # fmt: skip

@@ -93,7 +93,7 @@ class RecordingDetails(QWidget):
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
         self.times = Segments(theme, times, size="small", name=_("Count"))
         self.times.changed.connect(lambda value: self.strip.set_clock_mode(value == "clock"))
-        self.part_words = label("", "small", role="textSecondary", wrap=True)
+        self.part_label = label("", "small", role="textSecondary", wrap=True)
         self.about = label("", "small", role="textSecondary", wrap=True)
         tooltip = _("Size of the messages. The files can be smaller or larger.")
         self.about.setToolTip(plain.tip(tooltip))
@@ -101,7 +101,7 @@ class RecordingDetails(QWidget):
         self._recording: Path | None = None
         self.folder: Path | None = None
         """Folder for exports chosen by the user, or None for the folder of the recording."""
-        self.into = ElidedLabel("body", "text", min_width=60)
+        self.folder_label = ElidedLabel("body", "text", min_width=60)
         self.files = label("", "small", role="textSecondary")
         self.choose = Button(theme, _("Choose"), "folder-open", size="small")
         self.choose.setAccessibleName(_("Choose the export folder"))
@@ -132,10 +132,10 @@ class RecordingDetails(QWidget):
         topics.add_elastic(self.topics, greedy=True)
         topics.addWidget(self.pick)
         times.addWidget(self.times)
-        for row, description in ((kinds, self.about), (times, self.part_words)):
+        for row, description in ((kinds, self.about), (times, self.part_label)):
             row.push()
             row.addWidget(description)
-        folder_row.add_elastic(self.into, greedy=True)
+        folder_row.add_elastic(self.folder_label, greedy=True)
         for widget in (self.files, self.choose, self.export, self.bar, self.progress):
             folder_row.addWidget(widget)
         form = QGridLayout()
@@ -209,9 +209,9 @@ class RecordingDetails(QWidget):
         if self._recording is None:
             return None
         strip, name = self.strip, self._recording.stem
-        if not strip.is_all_selected and strip.look is not None:
+        if not strip.is_all_selected and strip.preview is not None:
             times = [
-                duration_text(time_ns - strip.look.start_ns, digits=1)
+                duration_text(time_ns - strip.preview.start_ns, digits=1)
                 for time_ns in (strip.begin_ns, strip.end_ns)
             ]
             begin, end = (each.replace(":", ".") for each in times)
@@ -221,8 +221,8 @@ class RecordingDetails(QWidget):
 
     def _update_export_path(self) -> None:
         path = self.export_path()
-        self.into.setText(f"{path.parent.name}/{path.name}" if path is not None else "")
-        self.into.setToolTip(plain.tip(str(path or "")))
+        self.folder_label.setText(f"{path.parent.name}/{path.name}" if path is not None else "")
+        self.folder_label.setToolTip(plain.tip(str(path or "")))
 
     def _patterns_edited(self) -> None:
         self._is_none_chosen = False
@@ -233,7 +233,7 @@ class RecordingDetails(QWidget):
 
         Until the preview is loaded, this is the full recording.
         """
-        preview = self.strip.look
+        preview = self.strip.preview
         if preview is None:
             return FULL_RECORDING
         if self._is_none_chosen:
@@ -251,7 +251,7 @@ class RecordingDetails(QWidget):
 
     def _topics_checked(self, names: Sequence[str]) -> None:
         # Called when topics are checked or unchecked in the list.
-        preview = self.strip.look
+        preview = self.strip.preview
         self._is_none_chosen = not names
         if preview is not None and names:
             self.topics.show_patterns(*shortest_choice(preview.topics, names))
@@ -259,7 +259,7 @@ class RecordingDetails(QWidget):
 
     def _update_part(self) -> None:
         # Time range, number of topics and size.
-        preview, part = self.strip.look, self.part()
+        preview, part = self.strip.preview, self.part()
         if preview is not None and not self.list.isHidden():
             all_names = (
                 [each.name for each in preview.topics] if part is not None and part.topics is None else ()
@@ -267,14 +267,14 @@ class RecordingDetails(QWidget):
             names = all_names if part is None else part.topics or all_names
             self.list.show_topics(preview.topics, names, preview.size_of)
         self.topics.set_invalid(part is None)
-        set_role(self.part_words, "error" if part is None else "textSecondary")
+        set_role(self.part_label, "error" if part is None else "textSecondary")
         self._update_size(preview, part)
         self._update_export_path()
         if preview is None:
-            self.part_words.setText("")
+            self.part_label.setText("")
             return
         if part is None:
-            self.part_words.setText(_("No matching topics in this recording"))
+            self.part_label.setText(_("No matching topics in this recording"))
             return
         count = len(preview.topics if part.topics is None else part.topics)
         template = ngettext("{count} of {all} topics", "{count} of {all} topics", len(preview.topics))
@@ -283,7 +283,7 @@ class RecordingDetails(QWidget):
             times_ns = (self.strip.begin_ns, self.strip.end_ns)
             begin, end = (self.strip.time_text(at_ns, digits=1) for at_ns in times_ns)
             text = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=text)
-        self.part_words.setText(text)
+        self.part_label.setText(text)
 
     def _update_size(self, preview: FilmStripPreview | None, part: Part | None) -> None:
         # Estimated from the topics that the format supports.
@@ -304,7 +304,7 @@ class RecordingDetails(QWidget):
         self.files.setVisible(count > 0)
 
     def _size_text(self, preview: FilmStripPreview, names: Collection[str]) -> str:
-        exact, size = preview.about(self.strip.begin_ns, self.strip.end_ns, names)
+        exact, size = preview.estimate_messages(self.strip.begin_ns, self.strip.end_ns, names)
         count = round(exact if self.strip.is_all_selected else float(f"{exact:.2g}"))
         messages = ngettext("{count} message", "{count} messages", count).format(count=group_digits(count))
         if size is None:

@@ -85,7 +85,7 @@ class FilmStrip(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.look: FilmStripPreview | None = None
+        self.preview: FilmStripPreview | None = None
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
@@ -110,14 +110,14 @@ class FilmStrip(QWidget):
             preview: Contents of the film strip; None hides the film strip.
             images: Images of the film strip; None for images that are not loaded.
         """
-        self.look, self._images = preview, images
+        self.preview, self._images = preview, images
         self.select_all()
         self.setVisible(preview is not None)
 
     def select_all(self) -> None:
         """Select the whole recording."""
-        if self.look is not None:
-            self.set_part(self.look.start_ns, self.look.end_ns)
+        if self.preview is not None:
+            self.set_part(self.preview.start_ns, self.preview.end_ns)
 
     def set_part(self, begin_ns: int, end_ns: int) -> None:
         """Select a part of the recording.
@@ -126,7 +126,7 @@ class FilmStrip(QWidget):
             begin_ns: Start in ns since 1970. Both times are limited to the recording and to each other.
             end_ns: End in ns since 1970.
         """
-        preview = self.look
+        preview = self.preview
         if preview is None:
             return
         begin_ns = max(preview.start_ns, min(begin_ns, preview.end_ns))
@@ -148,7 +148,9 @@ class FilmStrip(QWidget):
         """
         if self.by_clock:
             return clock_text(at_ns, digits=digits)
-        return duration_text(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
+        return duration_text(
+            at_ns - (self.preview.start_ns if self.preview is not None else 0), digits=digits
+        )
 
     def set_clock_mode(self, by_clock: bool) -> None:
         """Show times of day if `by_clock` is True, else times relative to the start."""
@@ -159,7 +161,7 @@ class FilmStrip(QWidget):
     @property
     def is_all_selected(self) -> bool:
         """True if the whole recording is selected."""
-        preview = self.look
+        preview = self.preview
         return preview is None or (self.begin_ns, self.end_ns) == (preview.start_ns, preview.end_ns)
 
     # -- geometry -----------------------------------------------------------------------------------------
@@ -176,13 +178,13 @@ class FilmStrip(QWidget):
         return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), height)
 
     def _x_of(self, at_ns: int) -> float:
-        film, preview = self._film_rect(), self.look
+        film, preview = self._film_rect(), self.preview
         if preview is None or preview.end_ns <= preview.start_ns:
             return film.left()
         return film.left() + (at_ns - preview.start_ns) / (preview.end_ns - preview.start_ns) * film.width()
 
     def _time_at(self, x: float) -> int:
-        film, preview = self._film_rect(), self.look
+        film, preview = self._film_rect(), self.preview
         if preview is None:
             return 0
         return preview.start_ns + round(
@@ -192,7 +194,7 @@ class FilmStrip(QWidget):
     def _arrange(self) -> None:
         height = round(self._film_rect().height())
         begin, end = self._x_of(self.begin_ns), self._x_of(self.end_ns)
-        if self.look is not None and self.look.end_ns <= self.look.start_ns:
+        if self.preview is not None and self.preview.end_ns <= self.preview.start_ns:
             end = self._film_rect().right()
         self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, height)
         self.end.setGeometry(round(end), 0, HANDLE_WIDTH, height)
@@ -205,7 +207,7 @@ class FilmStrip(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         # Moves the handle nearest to the mouse.
-        if self.look is None or event.button() != Qt.MouseButton.LeftButton:
+        if self.preview is None or event.button() != Qt.MouseButton.LeftButton:
             return
         x = event.position().x()
         is_begin = abs(x - self._x_of(self.begin_ns)) <= abs(x - self._x_of(self.end_ns))
@@ -221,7 +223,7 @@ class FilmStrip(QWidget):
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        preview, theme = self.look, self._theme
+        preview, theme = self.preview, self._theme
         if preview is None:
             return
         painter, film = QPainter(self), self._film_rect()

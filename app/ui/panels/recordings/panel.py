@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QVBoxLayout
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.film_strip import FilmStripPreview, film_strip
+from app.core.recording.film_strip import FilmStripPreview, read_preview
 from app.core.recording.folder import FolderScan, RecordingFolder, RecordingInfo, read_picture
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
@@ -57,15 +57,17 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_opener())
         self._opener = self._recordings.new_opener()
         self._scan = FolderScan(is_complete=False)
-        self._has_looked = False
+        self._has_scanned = False
         self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
         self._requested_thumbnails: dict[str, tuple[Path, float, int]] = {}
-        self._artist: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker("recordings-pictures")
+        self._thumbnail_worker: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker(
+            "recordings-pictures"
+        )
         self._job: RecordingExport | None = None
-        self._strips: BackgroundWorker[tuple[FilmStripPreview | None, Sequence[QImage | None]]] = (
+        self._strip_worker: BackgroundWorker[tuple[FilmStripPreview | None, Sequence[QImage | None]]] = (
             BackgroundWorker("recordings-strip")
         )
-        self._strip_of: tuple[Path, float, int] | None = None
+        self._strip_key: tuple[Path, float, int] | None = None
         self._loop: tuple[int, int] | None = None
         self._ticks, self._requested_path, self._recorder_revision = 0, "", -1
         super().__init__(context, TABLE_TEXTS, "film")
@@ -118,7 +120,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
         scan = self._folder.pop_result()
         if scan is not None:
-            self._scan, self._has_looked = scan, True
+            self._scan, self._has_scanned = scan, True
         if scan is not None or is_new:
             self._recorder_revision = revision
             self.rebuild()
@@ -182,7 +184,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     def update_empty_state(self) -> None:
         folder = self._recordings.folder
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
-        if not self._has_looked:
+        if not self._has_scanned:
             text = _("Recordings in this folder appear here in a moment.")
             self.empty.set_texts(_("Reading the folder"), text, "folder-open")
             self.empty.set_actions([])
@@ -222,13 +224,13 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         owner = str(info.path)
         if self._requested_thumbnails.get(owner) != mark:
             self._requested_thumbnails[owner] = mark
-            self._artist.submit(owner, lambda: (_load_thumbnail(info.path, self._opener),))
+            self._thumbnail_worker.submit(owner, lambda: (_load_thumbnail(info.path, self._opener),))
         return None
 
     def _collect_thumbnails(self) -> bool:
         is_any = False
         for owner, mark in list(self._requested_thumbnails.items()):
-            result = self._artist.pop_result(owner)
+            result = self._thumbnail_worker.pop_result(owner)
             if result is not None:
                 is_any = True
                 del self._requested_thumbnails[owner]
@@ -243,23 +245,23 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         # Loads the film strip in a background thread.
         can_read = info is not None and info.is_read and not info.problem and not self._is_being_written(info)
         mark = (info.path, info.changed_s, info.size_bytes) if info is not None and can_read else None
-        if mark == self._strip_of:
+        if mark == self._strip_key:
             return
-        self._strip_of, self._loop = mark, None
+        self._strip_key, self._loop = mark, None
         self.details.show_strip(None)
         if mark is not None:
             path = mark[0]
-            self._strips.submit("strip", lambda: _load_strip(path, self._opener))
+            self._strip_worker.submit("strip", lambda: _load_strip(path, self._opener))
 
     def _poll_strip(self) -> None:
         # Shows the film strip once it is loaded; a loop on the timeline becomes the selected part.
-        result = self._strips.pop_result("strip")
+        result = self._strip_worker.pop_result("strip")
         if result is not None:
             preview, images = result
-            if preview is not None and self._strip_of is not None and preview.path == self._strip_of[0]:
+            if preview is not None and self._strip_key is not None and preview.path == self._strip_key[0]:
                 self.details.show_strip(preview, images)
                 self._loop = None
-        replay, preview = self.session.replay, self.details.strip.look
+        replay, preview = self.session.replay, self.details.strip.preview
         player = replay.player if replay is not None else None
         if preview is None or replay is None or player is None or replay.path != preview.path:
             return
@@ -464,8 +466,8 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     def dispose(self) -> None:
         self._folder.close()
         self._opener.close()
-        self._artist.close()
-        self._strips.close()
+        self._thumbnail_worker.close()
+        self._strip_worker.close()
         if self._job is not None:
             self._job.close()
 
@@ -486,7 +488,7 @@ def _load_strip(
     path: Path, opener: RecordingOpener
 ) -> tuple[FilmStripPreview | None, Sequence[QImage | None]]:
     # Runs in a background thread.
-    preview = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
+    preview = read_preview(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
     if preview is None:
         return None, ()
     return preview, [_convert_picture(each) if each is not None else None for each in preview.pictures]

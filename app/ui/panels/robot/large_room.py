@@ -28,7 +28,7 @@ class LargeRoom(QWidget):
         workbench = _workbench_of(panel)
         super().__init__(workbench)
         self._theme, self._workbench = theme, workbench
-        self.filled = False
+        self.is_full_screen = False
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
         self.screen_button.clicked.connect(self.toggle_full_screen)
@@ -70,13 +70,13 @@ class LargeRoom(QWidget):
     def toggle_full_screen(self) -> None:
         """Enter or leave the full screen mode of the window."""
         window = self.window()
-        self.filled = not self.filled
+        self.is_full_screen = not self.is_full_screen
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
-        self.screen_button.set_label(_("Leave full screen") if self.filled else _("Full screen"))
+        self.screen_button.set_label(_("Leave full screen") if self.is_full_screen else _("Full screen"))
 
     def dispose(self) -> None:
         """Close the overlay, leave full screen mode and return the stage to the panel."""
-        if self.filled:
+        if self.is_full_screen:
             self.toggle_full_screen()
         self._workbench.removeEventFilter(self)
         self._top.removeEventFilter(self)

@@ -168,7 +168,7 @@ class RobotPanel(OneRobotPanel):
             action.setCheckable(True)
             action.setChecked(link.name == self._robot)
             action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.select(name))
-        if self._robot in self.session.launcher.wanted:
+        if self._robot in self.session.launcher.models_by_name:
             menu.addSeparator()
             remove_action = menu.addAction(
                 plain.escape_menu_text(_("Remove {robot}").format(robot=self._robot))
@@ -334,7 +334,7 @@ class RobotPanel(OneRobotPanel):
 
     def toggle_full_screen(self) -> None:
         """Show or hide the room in full screen mode, with the run bar above it."""
-        if self._large is not None and self._large.filled:
+        if self._large is not None and self._large.is_full_screen:
             self._large.dispose()
             return
         if self._large is None:

@@ -72,11 +72,11 @@ class RoomView(QWidget):
         super().__init__()
         self._theme = theme
         self._drawing = RobotDrawing(theme.font("label"))
-        self._data: object = None
+        self._state_key: object = None
         self.state = RobotState()
         self.others: Sequence[tuple[str, RobotState]] = ()
         self.stale = False
-        self.heard = ""
+        self.caption = ""
         self._pressed: str | None = None
         self._pressed_at = QPointF()
         self._offset = QPointF()
@@ -116,9 +116,9 @@ class RoomView(QWidget):
             things: Things to draw; None for the things in the state of the main robot.
         """
         state_key = (id(data), [(name, id(each)) for name, each in others], things)
-        if state_key == self._data:
+        if state_key == self._state_key:
             return
-        self._data = state_key
+        self._state_key = state_key
         self._state_refs = (data, others)  # keeps the objects alive, so that their ids are not reused
         state = RobotState.parse(data)
         if things is not None:
@@ -138,8 +138,8 @@ class RoomView(QWidget):
 
     def set_caption(self, text: str) -> None:
         """Show speech as a caption at the bottom of the drawing; "" removes the caption."""
-        if text != self.heard:
-            self.heard = text
+        if text != self.caption:
+            self.caption = text
             self.update()
 
     def _description(self) -> str:
@@ -161,8 +161,8 @@ class RoomView(QWidget):
         self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
         if self.stale:
             painter.fillRect(self.rect(), STALE_COLOUR)
-        if self.heard:
-            paint_caption(painter, area, self.heard, self._theme.font("label"))
+        if self.caption:
+            paint_caption(painter, area, self.caption, self._theme.font("label"))
         painter.end()
 
     # -- geometry -----------------------------------------------------------------------------------------
@@ -260,7 +260,7 @@ class RoomView(QWidget):
     def _bump(self, part: str, position: QPointF) -> bool:
         # Returns False for robots without a bumper.
         area = QRectF(self.rect())
-        side = self._drawing.side_at(position, area, part, self.state, self.others)
+        side = self._drawing.bumper_side_at(position, area, part, self.state, self.others)
         if side is not None:
             self.bumper_pressed.emit(split(part)[0], side)
         return side is not None

@@ -86,18 +86,18 @@ class SayBar(QWidget):
         self._theme, self._awaited = theme, awaited
         self._robot: Robot | None = None
         self.field = SayField(theme)
-        self.words = IconButton(theme, "chevron-down", _("Choose what to say"), size=26)
+        self.suggestions_button = IconButton(theme, "chevron-down", _("Choose what to say"), size=26)
         self.events = IconButton(theme, "zap", _("Simulate an event"), size=26)
         self.field.submitted.connect(self.speech_submitted)
         self.field.suggestions_requested.connect(self.show_suggestions)
-        self.words.clicked.connect(self.show_suggestions)
+        self.suggestions_button.clicked.connect(self.show_suggestions)
         self.events.clicked.connect(self.show_event_menu)
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 6, 8, 6)
         row.setSpacing(4)
         row.addStretch(0)
         row.addWidget(self.field, 1)
-        for button in (self.words, self.events):
+        for button in (self.suggestions_button, self.events):
             row.addWidget(button)
         row.addStretch(0)
         self._row = row
@@ -115,7 +115,7 @@ class SayBar(QWidget):
         self.field.setPlaceholderText(text)
         self.field.setAccessibleName(text)
         self.field.setVisible(hears)
-        self.words.setVisible(hears)
+        self.suggestions_button.setVisible(hears)
         self.events.setVisible(any(True for _entry in self.simulated_events()))
         self.setVisible(robot.virtual and (hears or self.events.isVisibleTo(self)))
 
@@ -135,7 +135,7 @@ class SayBar(QWidget):
             )
         if menu.isEmpty():
             menu.addAction(_("No program is waiting for speech")).setEnabled(False)
-        self._pop_up(menu, self.words)
+        self._pop_up(menu, self.suggestions_button)
 
     # -- simulated events ---------------------------------------------------------------------------------
 

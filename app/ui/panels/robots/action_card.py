@@ -73,8 +73,8 @@ class ActionCard(Card):
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
         self.summary = ElidedLabel("bodyLarge", "textSecondary")
         self.risk = Chip(theme, _(RISK_TEXTS.get(action.risk or "", "")), "warn")
-        self.words = ElidedLabel("body", "textSecondary", 60)
-        self.left = label("", "body", role="textTertiary")
+        self.text_label = ElidedLabel("body", "textSecondary", 60)
+        self.remaining_label = label("", "body", role="textTertiary")
         self.result = Chip(theme)
         self.try_button = Button(theme, _("Try"), "play")
         self.try_button.setAccessibleName(_("Try {action}").format(action=action.title))
@@ -99,13 +99,19 @@ class ActionCard(Card):
     def _lay_out(self, theme: Theme) -> None:
         header = Flow()
         before: tuple[QWidget, ...] = (Tile(theme, self.action.icon), self.title, self.risk)
-        after: tuple[QWidget, ...] = (self.left, self.result, self.past, self.try_button, self.fold)
+        after: tuple[QWidget, ...] = (
+            self.remaining_label,
+            self.result,
+            self.past,
+            self.try_button,
+            self.fold,
+        )
         below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
         for widget in before:
             header.addWidget(widget)
         header.add_elastic(self.summary)
         header.push()
-        header.add_elastic(self.words)
+        header.add_elastic(self.text_label)
         for widget in after:
             header.addWidget(widget)
         column = QVBoxLayout(self)
@@ -202,9 +208,9 @@ class ActionCard(Card):
             remaining = remaining_text(invocation)
         self.progress.setVisible(share is not None)
         self.progress.set_fraction(share)
-        self.words.setText(text)
-        self.left.setText(remaining)
-        self.left.setVisible(bool(remaining))
+        self.text_label.setText(text)
+        self.remaining_label.setText(remaining)
+        self.remaining_label.setVisible(bool(remaining))
         self._show_result(None if self._running else invocation, may_move)
 
     def _show_result(self, invocation: Invocation | None, may_move: bool) -> None:
@@ -213,7 +219,7 @@ class ActionCard(Card):
             chip_text, status, message = result_texts(invocation, may_move=may_move)
         self.result.set(chip_text, status)
         if invocation is not None and invocation.state == "succeeded":
-            self.words.setText(output_text(self.action, invocation.output))
+            self.text_label.setText(output_text(self.action, invocation.output))
         set_role(self.error, "textSecondary" if status == "off" else "error")
         self.error.setText(message)
         self.error.setVisible(bool(message))

@@ -174,16 +174,16 @@ class TryRow(PaintedButton):
 
     def __init__(self, theme: Theme, action: Action, invocation: Invocation) -> None:
         super().__init__(theme)
-        self.made = invocation
+        self.invocation = invocation
         text, status, reason = result_texts(invocation)
         self.when = time.strftime("%H:%M:%S", time.localtime(invocation.sent_at_s))
-        self.given = input_summary(action, invocation.input)
+        self.input_text = input_summary(action, invocation.input)
         output = output_text(action, invocation.output) if invocation.state == "succeeded" else ""
         self.result = f"{text}, {output}" if output else reason.rstrip(".") or text
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         text = _("{when}, {values}, {result}; use these values again")
-        self.setAccessibleName(text.format(when=self.when, values=self.given, result=self.result))
+        self.setAccessibleName(text.format(when=self.when, values=self.input_text, result=self.result))
         self.setToolTip(plain.tip(_("{result}. Click to use these values again").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
@@ -212,7 +212,7 @@ class TryRow(PaintedButton):
         paint_icon(painter, mark, status.icon, theme.colour(status.colour))
         paint.text_line(painter, right, self.result, font, quiet)
         middle = QRectF(left, rect.top(), mark.left() - left - 8, rect.height())
-        paint.text_line(painter, middle, self.given, font, theme.colour("text"))
+        paint.text_line(painter, middle, self.input_text, font, theme.colour("text"))
 
 
 class TryList(QWidget):

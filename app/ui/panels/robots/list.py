@@ -48,7 +48,7 @@ class RobotItem(PaintedButton):
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__(theme, radius="panel", checkable=True)
         self.name = name
-        self.where = ""
+        self.location = ""
         self._is_disconnected = self.may_be_forgotten = False
         self.setAutoExclusive(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -84,7 +84,7 @@ class RobotItem(PaintedButton):
     def _show(self, state: str, location: str, *, is_away: bool) -> None:
         state_label = _(STATE_LABELS[state])
         self.chip.set(state_label, STATUS_BY_ROBOT_STATE[state])
-        self.where, self._is_disconnected = location, is_away
+        self.location, self._is_disconnected = location, is_away
         self.setAccessibleName(f"{self.name}, {location}, {state_label}")
         self.update()
 
@@ -114,7 +114,7 @@ class RobotItem(PaintedButton):
         paint.text_line(painter, text_rect, self.name, bold, colour)
         location_colour = theme.colour("textTertiary" if quiet else "textSecondary")
         paint.text_line(
-            painter, text_rect.translated(0, height), self.where, theme.font("small"), location_colour
+            painter, text_rect.translated(0, height), self.location, theme.font("small"), location_colour
         )
 
 

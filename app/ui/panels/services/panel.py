@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.arming import Target
-from app.core.run.acting.calling import MAX_S, MIN_S, TIMEOUT_S, CallRecord
+from app.core.run.acting.calling import MAX_TIMEOUT_S, MIN_TIMEOUT_S, TIMEOUT_S, CallRecord
 from app.core.run.acting.json_text import JsonText, format_json, parse_json_text
 from app.ui.panels.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
@@ -74,7 +74,7 @@ class ServicesPanel(PanelWidget):
     def _make_request(self) -> None:
         theme = self.theme
         self.name = ElidedLabel("code", "text", min_width=60)
-        self.way = Segments(
+        self.format_switch = Segments(
             theme, [("form", _("Form"), None), ("json", _("JSON"), None)], size="small", name=_("Request as")
         )
         self.form = RequestForm(theme)
@@ -87,15 +87,15 @@ class ServicesPanel(PanelWidget):
         self.fix = Button(theme, _("Fix it"), "wrench", size="small")
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
         self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls the service"), "Ctrl+Enter")))
-        self.give_up = Button(theme, _("Cancel"), "x")
-        self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"), 1)
+        self.cancel_button = Button(theme, _("Cancel"), "x")
+        self.seconds = NumberEdit(theme, MIN_TIMEOUT_S, MAX_TIMEOUT_S, _("s"), 1)
         self.seconds.setAccessibleName(_("Time limit in seconds"))
         self.seconds.setFixedWidth(round(theme.scaled(SECONDS_WIDTH_PX)))
         self.seconds.show_number(TIMEOUT_S)
         self.timeout_s = TIMEOUT_S
 
     def _make_calls(self) -> None:
-        self.answer = ReplyView(self.theme, self.context.show_toast)
+        self.reply_view = ReplyView(self.theme, self.context.show_toast)
         columns: tuple[Column[CallRecord], ...] = (
             Column(
                 "at", lazy("Time"), 88, lambda each: Cell(clock_text(each), role="textSecondary", mono=True)
@@ -125,13 +125,13 @@ class ServicesPanel(PanelWidget):
         self.list.selected.connect(lambda _name: self._show_selected())
         self.list.call_requested.connect(self.call)
         self.list.menu_requested.connect(self._show_menu)
-        self.way.changed.connect(self._set_mode)
+        self.format_switch.changed.connect(self._set_mode)
         self.form.typed.connect(self._form_typed)
         self.edit.changed.connect(self._text_typed)
         self.edit.submitted.connect(self.call)
         self.fix.clicked.connect(self._apply_fix)
         self.call_button.clicked.connect(self.call)
-        self.give_up.clicked.connect(self._cancel_call)
+        self.cancel_button.clicked.connect(self._cancel_call)
         self.seconds.number.connect(lambda value: setattr(self, "timeout_s", value))
         self.calls.opened.connect(self._open_call)
         self.calls.menu_requested.connect(self._show_call_menu)
@@ -156,10 +156,10 @@ class ServicesPanel(PanelWidget):
     def _make_right_side(self) -> QWidget:
         header, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
         header.addWidget(self.name, 1)
-        header.addWidget(self.way)
+        header.addWidget(self.format_switch)
         fault.addWidget(self.sentence, 1)
         fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
-        for button in (self.call_button, self.give_up):
+        for button in (self.call_button, self.cancel_button):
             buttons.addWidget(button)
         limit = QWidget()
         limit_row = QHBoxLayout(limit)
@@ -175,7 +175,7 @@ class ServicesPanel(PanelWidget):
         request.addWidget(self.requests, 1)
         request.addLayout(fault)
         request.addLayout(buttons)
-        self.answer.setMinimumHeight(round(self.theme.scaled(110)))
+        self.reply_view.setMinimumHeight(round(self.theme.scaled(110)))
         self.calls.setMinimumHeight(round(self.theme.scaled(90)))
         scroll = ScrollColumn(_("Selected service"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -183,7 +183,7 @@ class ServicesPanel(PanelWidget):
             (
                 (self._request_widget, 4),
                 (Separator(self.theme), 0),
-                (self.answer, 3),
+                (self.reply_view, 3),
                 (Separator(self.theme), 0),
                 (self.calls, 2),
             )
@@ -264,7 +264,7 @@ class ServicesPanel(PanelWidget):
             self.form.reset_kinds()
             self._set_text(self._request_text(name))
             self._set_mode("form")
-            self.answer.show_record(None)
+            self.reply_view.show_record(None)
         if name:
             records = [each for each in reversed(self.acting.calls.records) if each.service == name]
             self.calls_model.set_rows(records)
@@ -272,7 +272,7 @@ class ServicesPanel(PanelWidget):
             self._update_call()
 
     def _request_text(self, service: str) -> str:
-        return self._texts.get(service) or self.acting.shelf.requests.get(service, EMPTY_REQUEST)
+        return self._texts.get(service) or self.acting.saved_messages.requests.get(service, EMPTY_REQUEST)
 
     @property
     def text(self) -> str:
@@ -285,14 +285,14 @@ class ServicesPanel(PanelWidget):
         self._is_showing = True
         self.edit.set_text(text)
         read = parse_json_text(text)
-        if read.fault is None and not read.places:
+        if read.fault is None and not read.placeholders:
             self.form.show_request(read.fill({}))
         self._is_showing = False
         self._validate()
 
     def _can_show_form(self) -> bool:
         read = parse_json_text(self.text)
-        return read.fault is None and not read.places and isinstance(read.fill({}), Mapping)
+        return read.fault is None and not read.placeholders and isinstance(read.fill({}), Mapping)
 
     def _validate(self) -> None:
         fault = self._parse_text().fault
@@ -308,7 +308,7 @@ class ServicesPanel(PanelWidget):
 
     def _problem(self) -> str:
         # Reason why the request can't be sent although it is valid JSON.
-        if self.way.value == "form" and self.form.problems:
+        if self.format_switch.value == "form" and self.form.problems:
             return next(iter(self.form.problems.values()))
         read = self._parse_text()
         return (
@@ -331,9 +331,9 @@ class ServicesPanel(PanelWidget):
             self.call_button.set_label(
                 _("Call") if is_armed else _("Arm and call"), "play" if is_armed else "lock"
             )
-        self.give_up.setVisible(is_mine)
+        self.cancel_button.setVisible(is_mine)
         record = self._displayed_record()
-        self.answer.show_record(record, acting.calls.elapsed_s)
+        self.reply_view.show_record(record, acting.calls.elapsed_s)
 
     def _displayed_record(self) -> CallRecord | None:
         records = [each for each in self.acting.calls.records if each.service == self.service]
@@ -354,7 +354,7 @@ class ServicesPanel(PanelWidget):
     def _set_mode(self, mode: str) -> None:
         if mode == "form" and not self._can_show_form():
             mode = "json"  # the request can't be shown as fields
-        self.way.set_value(mode)
+        self.format_switch.set_value(mode)
         self.requests.setCurrentIndex(1 if mode == "json" else 0)
         self._validate()
 

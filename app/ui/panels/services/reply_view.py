@@ -119,15 +119,15 @@ class ReplyView(QWidget):
         self._theme, self._toast = theme, toast
         self.record: CallRecord | None = None
         self.chip = Chip(theme)
-        self.facts = ElidedLabel("small", "textTertiary")
-        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.way = Segments(
+        self.details = ElidedLabel("small", "textTertiary")
+        self.details.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.format_switch = Segments(
             theme,
             [("fields", _("Fields"), None), ("json", _("JSON"), None)],
             size="small",
             name=_("Reply as"),
         )
-        self.way.changed.connect(self._set_mode)
+        self.format_switch.changed.connect(self._set_mode)
         self.copy = IconButton(theme, "copy", _("Copy reply"), size=26)
         self.copy.clicked.connect(self._copy)
         self.model: TableModel[ReplyRow] = TableModel(
@@ -162,9 +162,9 @@ class ReplyView(QWidget):
             row.setSpacing(8)
         ended.addWidget(label(_("Reply"), "title"))
         ended.addWidget(self.chip)
-        ended.addWidget(self.facts, 1)
+        ended.addWidget(self.details, 1)
         controls.addStretch(1)
-        controls.addWidget(self.way)
+        controls.addWidget(self.format_switch)
         controls.addWidget(self.copy)
         self._header = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._header.setContentsMargins(12, 4, 8, 0)
@@ -197,11 +197,11 @@ class ReplyView(QWidget):
             return
         self.record = record
         has_answer = record is not None and record.state == "answered" and record.is_retained
-        self.way.setVisible(has_answer)
+        self.format_switch.setVisible(has_answer)
         self.copy.setVisible(has_answer)
         if record is None:
             self.chip.set("")
-            self.facts.setText("")
+            self.details.setText("")
             self.sentence.setText(_("No calls yet."))
         elif record.state != "waiting":
             status = "ok" if record.state == "answered" else "off" if record.state == "canceled" else "error"
@@ -210,12 +210,12 @@ class ReplyView(QWidget):
         if has_answer and record is not None:
             self.model.set_rows(reply_rows(record.reply) if not record.is_truncated else [])
             self.text.set_text(record.text)
-        self._set_mode(self.way.value)
+        self._set_mode(self.format_switch.value)
 
     def _update_details(self, record: CallRecord | None) -> None:
         if record is None:
             return
-        self.facts.setText(clock_text(record))
+        self.details.setText(clock_text(record))
         if record.state == "waiting":
             self.sentence.setText(_("Waiting for the reply…"))
         elif record.state != "answered":
@@ -224,7 +224,7 @@ class ReplyView(QWidget):
             self.sentence.setText(_("The reply was discarded to make room for newer ones."))
         else:
             size = size_text(len(record.text.encode("utf-8", "replace")))
-            self.facts.setText(_("{time}, {size}").format(time=clock_text(record), size=size))
+            self.details.setText(_("{time}, {size}").format(time=clock_text(record), size=size))
 
     def _set_mode(self, mode: str) -> None:
         record = self.record

@@ -13,7 +13,7 @@ from app.core.run.acting.json_text import parse_typed_value
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy
 
 LABEL_WIDTH_PX = 80
@@ -138,7 +138,7 @@ class RequestForm(QWidget):
             return switch
         line = QLineEdit()
         line.setProperty("focusRadius", self._theme.radius("control"))
-        ContextMenuFilter(self._theme, line)
+        FieldContextMenu(self._theme, line)
         line.textEdited.connect(lambda text: self._on_typed(name, text))
         return line
 

@@ -337,7 +337,7 @@ class TimelineCanvas(QAbstractScrollArea):
             return
         top = self._lanes_top() + index * self._row_height() - self.verticalScrollBar().value()
         row_rect = QRectF(0, top, self.viewport().width(), self._row_height())
-        is_chosen = topic == replay.chosen
+        is_chosen = topic == replay.selected_topic
         if is_chosen:
             painter.fillRect(row_rect, theme.colour("selected"))
         recorded = replay.recorded_topics[topic]

@@ -92,7 +92,7 @@ class TimelinePanel(PanelWidget):
             self.pages.setCurrentIndex(1)
             self.ruler.setVisible(True)
         is_new = replay.densities is not None and replay.densities.collect_results()
-        state = (replay.chosen, tuple(replay.bookmarks))
+        state = (replay.selected_topic, tuple(replay.bookmarks))
         if is_new or state != self._state:
             self._state = state
             self.canvas.update_scroll_range()
@@ -214,7 +214,7 @@ class TimelinePanel(PanelWidget):
         # Selects the next topic above or below.
         replay = self._shown_replay
         if replay is not None and (topics := list(replay.recorded_topics)):
-            index = topics.index(replay.chosen) if replay.chosen in topics else 0
+            index = topics.index(replay.selected_topic) if replay.selected_topic in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, index + by))])
 
     # -- sending ------------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ class TimelinePanel(PanelWidget):
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded_topics.items()}
             self._below.setCurrentWidget(self.chooser)
-            self.chooser.open(replay.sending, counts, replay.chosen)
+            self.chooser.open(replay.sending, counts, replay.selected_topic)
 
     def _close_chooser(self) -> None:
         self._below.setCurrentWidget(self.canvas)

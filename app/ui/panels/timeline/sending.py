@@ -18,7 +18,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext
@@ -116,8 +116,8 @@ class SendChooser(QWidget):
         self.table: TableView[SendRow] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics that can be sent"))
         self.table.setMinimumHeight(round(theme.scaled(MIN_TABLE_HEIGHT_PX)))
-        self.words = label("", "small", role="textSecondary", wrap=True)
-        self.words.setMinimumWidth(0)
+        self.text_label = label("", "small", role="textSecondary", wrap=True)
+        self.text_label.setMinimumWidth(0)
         self.problem = label("", "small", role="error", wrap=True)
         self.problem.setMinimumWidth(0)
         self.name = QLineEdit()
@@ -125,7 +125,7 @@ class SendChooser(QWidget):
         self.name.setProperty("focusRadius", theme.radius("control"))
         self.name.setMinimumWidth(round(theme.scaled(NAME_WIDTH_PX) / 2))
         self.name.setMaximumWidth(round(theme.scaled(NAME_WIDTH_PX)))
-        ContextMenuFilter(theme, self.name)
+        FieldContextMenu(theme, self.name)
         self.arm = Button(theme, _("Arm and send"), "lock", kind="primary", size="small")
         self.cancel = Button(theme, _("Cancel"), size="small")
         self.table.opened.connect(self._toggle)
@@ -146,7 +146,7 @@ class SendChooser(QWidget):
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         below = QWidget()
         below.setLayout(footer)
-        for index, widget in enumerate((self.words, self.table, self.problem, below)):
+        for index, widget in enumerate((self.text_label, self.table, self.problem, below)):
             scroll.column.insertWidget(index, widget)
         scroll.column.setStretchFactor(self.table, 1)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # the table takes the remaining height
@@ -180,7 +180,7 @@ class SendChooser(QWidget):
         hint = _("While armed, these topics are also sent to the live network during playback.")
         moving = _("Topics that move a robot are marked and need confirmation.")
         reading = _("Checking which topics move robots…")
-        self.words.setText(f"{hint} {moving if sending.is_analyzed else reading}")
+        self.text_label.setText(f"{hint} {moving if sending.is_analyzed else reading}")
         self.problem.setVisible(bool(self.problem.text()))
         self.arm.setEnabled(bool(sending.routes) and sending.is_analyzed)
 

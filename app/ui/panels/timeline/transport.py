@@ -41,13 +41,13 @@ class TransportRow(QWidget):
         self.previous = IconButton(theme, "skip-back", _("Previous bookmark"), "Ctrl+Left")
         self.back = IconButton(theme, "step-back", _("Previous message of the selected topic"))
         self.play = Button(theme, _("Play"), "play", kind="primary")
-        self.on = IconButton(theme, "step-forward", _("Next message of the selected topic"))
+        self.forward = IconButton(theme, "step-forward", _("Next message of the selected topic"))
         self.next = IconButton(theme, "skip-forward", _("Next bookmark"), "Ctrl+Right")
         self.speed = SliderTrack(theme, SPEED_STEP_COUNT)
         self.speed.setAccessibleName(_("Speed"))
         self.speed.setValue(SPEED_STEP_COUNT // 2)
         self.speed.setMaximumWidth(110)
-        self.said = label("", "code", role="textSecondary")
+        self.hint = label("", "code", role="textSecondary")
         self.loop = ToggleButton(theme, _("Loop"), "repeat")
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="small")
         self.armed = Switch(theme, _("Armed"))
@@ -59,8 +59,8 @@ class TransportRow(QWidget):
         flow = Flow(self, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 12, 6)
         for widget in (
-            self.time, self.length, self.date, self.previous, self.back, self.play, self.on, self.next,
-            self.speed, self.said, self.loop, self.bookmark,
+            self.time, self.length, self.date, self.previous, self.back, self.play, self.forward, self.next,
+            self.speed, self.hint, self.loop, self.bookmark,
         ):  # fmt: skip
             flow.addWidget(widget)
         flow.push()
@@ -87,7 +87,7 @@ class TransportRow(QWidget):
         )
         self.next.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.skip(forward=True)))
         self.back.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.step(forward=False)))
-        self.on.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.step(forward=True)))
+        self.forward.clicked.connect(lambda: self._apply_to_replay(lambda replay: replay.step(forward=True)))
         self.play.clicked.connect(lambda: self._apply_to_replay(Replay.toggle))
         self.loop.clicked.connect(lambda: self._apply_to_replay(Replay.toggle_loop))
         self.bookmark.clicked.connect(self.bookmark_requested)
@@ -140,9 +140,9 @@ class TransportRow(QWidget):
             )
         else:
             text = f"{requested:.1f}\u2009\u00d7" if requested >= 1 else f"{requested:.2g}\u2009\u00d7"
-        if text != self.said.text():
-            self.said.setText(text)
-            set_role(self.said, "warn" if is_slow else "textSecondary")
+        if text != self.hint.text():
+            self.hint.setText(text)
+            set_role(self.hint, "warn" if is_slow else "textSecondary")
 
 
 def speed_of(step: int) -> float:

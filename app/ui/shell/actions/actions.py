@@ -44,11 +44,11 @@ class Actions:
         self._actions: dict[str, QAction] = {}
         self._disabled_reasons: dict[str, Callable[[], str]] = {}
         for command in commands:
-            action = self._actions[command.id] = self._make(command, window)
+            action = self._actions[command.id] = self._create_action(command, window)
             action.triggered.connect(lambda _on=False, run=command.run: run(handlers))
             self._disabled_reasons[command.id] = partial(command.disabled_reason, handlers)
 
-    def _make(self, command: Command[Any], window: QWidget) -> QAction:
+    def _create_action(self, command: Command[Any], window: QWidget) -> QAction:
         action = QAction("\t".join(filter(None, (command.label, command.displayed_key))), window)
         action.setObjectName(command.id)
         if command.icon is not None and not command.group:
@@ -132,7 +132,7 @@ class Actions:
         """Check the action of an option in an exclusive group without running its command."""
         self[name].setChecked(True)
 
-    def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
+    def fill_menu_bar(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
         """Add menus with the actions of all commands to a menu bar.
 
         Titles are translated and have mnemonics.

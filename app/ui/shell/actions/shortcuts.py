@@ -116,7 +116,7 @@ FIXED_KEYS: tuple[FixedKey, ...] = (
 )
 
 
-def normal(key: str) -> str:
+def normalize_key(key: str) -> str:
     """Convert a shortcut to Qt's portable text format; return "" if it is invalid."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
@@ -142,7 +142,7 @@ class Shortcuts(QObject):
         # `report_error` is called with a message if the shortcuts can't be saved; `platform` is a
         # `sys.platform`.
         super().__init__()
-        self._settings, self._complain, self._platform = settings, report_error, platform
+        self._settings, self._report_error, self._platform = settings, report_error, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
         self._custom_keys = self._read()
 
@@ -151,7 +151,9 @@ class Shortcuts(QObject):
         shortcuts: dict[str, tuple[str, ...]] = {}
         for name, keys in saved.items():
             if name in self.commands and isinstance(keys, list):
-                valid_keys = tuple(normal(key) for key in keys if isinstance(key, str) and normal(key))
+                valid_keys = tuple(
+                    normalize_key(key) for key in keys if isinstance(key, str) and normalize_key(key)
+                )
                 shortcuts[name] = valid_keys
         return shortcuts
 
@@ -164,7 +166,7 @@ class Shortcuts(QObject):
         command = self.commands.get(name)
         if command is None:
             raise UnknownCommandError(name)
-        return tuple(normal(key) for key in command.default_keys(self._platform))
+        return tuple(normalize_key(key) for key in command.default_keys(self._platform))
 
     def keys_of(self, name: str) -> tuple[str, ...]:
         """Return the current shortcuts of a command; menus show the first one.
@@ -192,7 +194,7 @@ class Shortcuts(QObject):
 
     def command_for(self, key: str) -> str:
         """Return the name of the command to which a shortcut is assigned, or ""."""
-        return next((name for name in self.commands if normal(key) in self.keys_of(name)), "")
+        return next((name for name in self.commands if normalize_key(key) in self.keys_of(name)), "")
 
     def rejection_reason(self, name: str, pressed: QKeyCombination) -> str:
         """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
@@ -206,7 +208,11 @@ class Shortcuts(QObject):
             is_own_default = key in self.default_keys(
                 name
             )  # Ctrl+F is "find" both in the Inspector and in the blocks
-            if key in [normal(each) for each in fixed.key.split(", ")] and modifiers and not is_own_default:
+            if (
+                key in [normalize_key(each) for each in fixed.key.split(", ")]
+                and modifiers
+                and not is_own_default
+            ):
                 return _("{key} is reserved for “{command}” ({place}).").format(
                     key=shortcut_text(key), command=_(fixed.label), place=_(fixed.scope)
                 )
@@ -221,7 +227,7 @@ class Shortcuts(QObject):
             name: Name of the command.
             key: New shortcut; "" removes all.
         """
-        key, owner = normal(key), self.command_for(key)
+        key, owner = normalize_key(key), self.command_for(key)
         if owner and owner != name:
             self._custom_keys[owner] = tuple(each for each in self.keys_of(owner) if each != key)
         self._custom_keys[name] = (key,) if key else ()
@@ -233,7 +239,7 @@ class Shortcuts(QObject):
         Both commands lose their other shortcuts. F12 stays assigned to Stop.
         """
         owner, before = self.command_for(key), self.first(name)
-        self._custom_keys[name] = (normal(key),)
+        self._custom_keys[name] = (normalize_key(key),)
         if owner and owner != name:
             self._custom_keys[owner] = (before,) if before and before != STOP_KEY else ()
         self._save()
@@ -265,7 +271,7 @@ class Shortcuts(QObject):
         try:
             self._settings.set("shortcuts", {name: list(keys) for name, keys in self._custom_keys.items()})
         except SettingsError as error:
-            self._complain(str(error))
+            self._report_error(str(error))
         self.changed.emit()
 
     def update_tooltips(self) -> None:

@@ -152,7 +152,7 @@ def _fitting_word_count(font: QFont, words: Sequence[str], width: float) -> int:
 class Banner(AlertBox):
     """Banner with an icon, a title, a detail, up to two buttons, and a close button."""
 
-    icon_side, icon_left, left, high, gap = 18, 12, 40, 0, 6
+    icon_side, icon_left, left, vertical_margin, gap = 18, 12, 40, 0, 6
 
     pressed = Signal()
     second_pressed = Signal()
@@ -166,14 +166,14 @@ class Banner(AlertBox):
         self._step = ""
         self._icon: str | None = None
         self._announced = ""
-        self.words = BannerText(theme)
+        self.text_label = BannerText(theme)
         self.more = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
         for button in (self.button, self.second):
             button.allow_shrinking()
         self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
-        self.text_column.addWidget(self.words)
+        self.text_column.addWidget(self.text_label)
         for widget in (self.more, self.second, self.button, self.close_button):
             self.button_row.addWidget(widget)
         self.button.clicked.connect(self.pressed)
@@ -205,7 +205,7 @@ class Banner(AlertBox):
         """
         self._icon = self.button.icon_name = icon
         self.set_status(status)
-        self.words.show_text(title, detail)
+        self.text_label.show_text(title, detail)
         message = f"{title} {detail}".strip()
         self.setAccessibleName(message)
         text_without_digits = DIGITS.sub("", message)
@@ -269,14 +269,14 @@ class AlertBanner(QWidget):
         self._alerts: Sequence[AlertLike] = ()
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
         self._positioned_identity = ""
-        self._fresh_until = 0.0
+        self._guarded_until = 0.0
         self.on_action: Callable[[str], object] = lambda _name: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
         self.on_more: Callable[[], object] = lambda: None
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.banner)
-        self.banner.pressed.connect(self._next_step)
+        self.banner.pressed.connect(self._run_next_step)
         self.banner.second_pressed.connect(lambda: self._run_offer_action(1))
         self.banner.more_pressed.connect(self._show_more)
         self.banner.closed.connect(self._close)
@@ -356,7 +356,7 @@ class AlertBanner(QWidget):
             action()
             self.show_alerts(self._alerts)
 
-    def _next_step(self) -> None:
+    def _run_next_step(self) -> None:
         if self._offer is not None:
             self._run_offer_action(0)
         elif self._alert is not None and self._alert.action is not None:
@@ -388,8 +388,8 @@ class AlertBanner(QWidget):
             self._positioned_identity = self.identity
             self.setGeometry(area)
             self.raise_()
-            self._fresh_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
-        is_guarded = self.clock() < self._fresh_until
+            self._guarded_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
+        is_guarded = self.clock() < self._guarded_until
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, is_guarded)
 
     def _is_under_mouse(self) -> bool:

@@ -42,17 +42,17 @@ class RecordButton(Button):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Record"), "circle-dot", size="small")
         self.icon_role = "error"
-        self._is_on = self._is_bare = False
+        self._is_on = self._is_icon_only = False
 
     def set_icon_only(self, icon_only: bool) -> None:
         """Show only the icon if `icon_only`, else the icon and the text."""
-        if icon_only != self._is_bare:
-            self._is_bare = icon_only
+        if icon_only != self._is_icon_only:
+            self._is_icon_only = icon_only
             self.updateGeometry()
             self.update()
 
     def displayed_text(self) -> str:
-        return "" if self._is_bare else self.text()
+        return "" if self._is_icon_only else self.text()
 
     def show_recording(self, recordings: SessionRecordings) -> None:
         """Show the duration and size of the current recording, or "Record" if there is none."""
@@ -69,9 +69,9 @@ class RecordButton(Button):
 
     def sizeHint(self) -> QSize:
         height = super().sizeHint().height()
-        icon_width = self.icon_side() + 2 * self.measure.padding
+        icon_width = self.icon_side() + 2 * self.metrics.padding
         return QSize(
-            icon_width if self._is_bare else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), height
+            icon_width if self._is_icon_only else round(self._theme.scaled(RECORD_BUTTON_WIDTH_PX)), height
         )
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
@@ -175,7 +175,7 @@ class DeveloperTools(QObject):
         self.freeze.setChecked(frozen)
         self.freeze.setEnabled(bool(freeze_buttons(shell.bench)))
         self.record.show_recording(self._recordings)
-        self.keep.set_label(_("Save last {count} s").format(count=self._recordings.wish.seconds))
+        self.keep.set_label(_("Save last {count} s").format(count=self._recordings.ring_settings.seconds))
         custom_name = shell.saved_layouts.custom_name("developer")
         name = custom_name or _("Developer")
         self.layout.set_label(name)

@@ -35,14 +35,14 @@ class MenuBar(QMenuBar):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._shows_letters = False
+        self._shows_mnemonics = False
         self._alt = _AltKeyFilter(self)
         self._alt.held_changed.connect(self._show_mnemonics)
 
     @property
     def shows_mnemonics(self) -> bool:
         """True while the mnemonics are underlined."""
-        return self._shows_letters
+        return self._shows_mnemonics
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -53,8 +53,8 @@ class MenuBar(QMenuBar):
             window.installEventFilter(self._alt)
 
     def _show_mnemonics(self, visible: bool) -> None:
-        if visible != self._shows_letters:
-            self._shows_letters = visible
+        if visible != self._shows_mnemonics:
+            self._shows_mnemonics = visible
             self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -79,7 +79,7 @@ class MenuBar(QMenuBar):
             painter, QRectF(text_left, rect.top(), text_width + 1, rect.height()), text, font, colour
         )
         letter = action.text().find("&")
-        if letter >= 0 and (self._shows_letters or self.hasFocus()):
+        if letter >= 0 and (self._shows_mnemonics or self.hasFocus()):
             start = text_left + paint.width_of(font, text[:letter])
             line = QRectF(start, 0, paint.width_of(font, text[letter]), 1)
             line.moveTop(round(rect.center().y() + metrics.ascent() / 2 + 1))

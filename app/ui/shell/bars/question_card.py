@@ -23,7 +23,7 @@ from app.ui.shell.dialogs.overlay import stop_buttons_in
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.lists.scroll_areas import ContentScrollArea
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 WIDTH, WIDTH_WITH_CHOICES = 460, 560
@@ -44,19 +44,19 @@ class QuestionCard(FloatingCard):
         super().__init__(window)
         self._theme, self._on_answer = theme, answer
         self._question: AskedQuestion | None = None
-        self._before: QWidget | None = None
+        self._previous_focus: QWidget | None = None
         self._is_paused = False
-        self.words = label("", "heading", wrap=True)
+        self.text_label = label("", "heading", wrap=True)
         self.field = QLineEdit()
         self.field.setMaxLength(MAX_ANSWER_LENGTH)
         self.field.setProperty("focusRadius", theme.radius("control"))
-        ContextMenuFilter(theme, self.field)
+        FieldContextMenu(theme, self.field)
         self.button = Button(theme, _("Answer"), kind="primary", size="form")
         self.button.clicked.connect(self._submit)
         self.choices = ChoiceGrid(theme)
         self.choices.selected.connect(self._send)
-        self._offered = ContentScrollArea(self.choices)
-        self.choices.focus_moved.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
+        self._choice_area = ContentScrollArea(self.choices)
+        self.choices.focus_moved.connect(lambda button: self._choice_area.ensureWidgetVisible(button, 0, GAP))
         self._hint = label(_("Press Resume first"), "small", role="textSecondary")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # receives the keys while the card is disabled
         row = QHBoxLayout()
@@ -66,9 +66,9 @@ class QuestionCard(FloatingCard):
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 16)
         column.setSpacing(10)
-        column.addWidget(self.words)
+        column.addWidget(self.text_label)
         column.addLayout(row)
-        column.addWidget(self._offered)
+        column.addWidget(self._choice_area)
         column.addWidget(self._hint)
         shadow = QGraphicsDropShadowEffect(self)
         shadow.setBlurRadius(32)
@@ -94,19 +94,19 @@ class QuestionCard(FloatingCard):
 
     def _open(self, question: AskedQuestion) -> None:
         text = question.text.strip() or _("The behaviour has a question")
-        self.words.setText(text)
+        self.text_label.setText(text)
         self.setAccessibleName(text)
         self.field.setAccessibleName(text)
         self.field.clear()
         self.choices.show_choices(question.choices)
-        self._offered.updateGeometry()  # a hidden card isn't notified of changed size hints
+        self._choice_area.updateGeometry()  # a hidden card isn't notified of changed size hints
         self.choices.setAccessibleName(text)
         typed = not question.choices
         self.field.setVisible(typed)
         self.button.setVisible(typed)
-        self._offered.setVisible(not typed)
+        self._choice_area.setVisible(not typed)
         if not self.isVisible():
-            self._before = QApplication.focusWidget()
+            self._previous_focus = QApplication.focusWidget()
         self._set_paused(paused=False)
         self.show()
         self.place()
@@ -125,7 +125,7 @@ class QuestionCard(FloatingCard):
 
     def _close(self) -> None:
         had_focus = self._has_focus()
-        before, self._before = self._before, None
+        before, self._previous_focus = self._previous_focus, None
         if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()

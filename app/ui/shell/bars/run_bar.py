@@ -98,7 +98,7 @@ class RunStateLabel(QWidget):
         self._theme = theme
         self._title, self._detail, self._is_alarm = "", "", False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._shared_px: float | None = None
+        self._max_text_width: float | None = None
         theme.changed.connect(self.updateGeometry)
 
     def limit_width(self, width: float | None) -> None:
@@ -106,8 +106,8 @@ class RunStateLabel(QWidget):
 
         A limit is set while an alert covers the rest of the widget.
         """
-        if width != self._shared_px:
-            self._shared_px = width
+        if width != self._max_text_width:
+            self._max_text_width = width
             self.update()
 
     @property
@@ -148,7 +148,7 @@ class RunStateLabel(QWidget):
         return QSize(0, self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
+        width = self.width() if self._max_text_width is None else min(self.width(), self._max_text_width)
         if width < self._theme.scaled(MIN_STATE_TEXT_PX):
             return  # too narrow to be readable; the tooltip and screen readers have the full text
         painter = QPainter(self)
@@ -235,14 +235,14 @@ class StopResultLabel(QWidget):
             return font
         return self._theme.font("button")
 
-    def _icon(self) -> int:
+    def _icon_size(self) -> int:
         return 14 if self._compact else 16 if self._appearance == "reminder" else 20
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self._text)
         if self._appearance == "counting":
             return QSize(round(width) + 10, 44 if not self._compact else 28)
-        width += self._icon() + (6 if self._compact or self._appearance == "reminder" else 10)
+        width += self._icon_size() + (6 if self._compact or self._appearance == "reminder" else 10)
         if self._appearance != "reminder":
             width += 17 if self._compact else 28
         min_height = 28 if self._compact else 44
@@ -279,7 +279,7 @@ class StopResultLabel(QWidget):
     def _paint_line(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
         status = theme.status(self._status)
-        side = self._icon()
+        side = self._icon_size()
         icon_area = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
         paint_icon(painter, icon_area, status.icon, theme.colour(status.colour))
         text_left = side + (6 if self._compact or self._appearance == "reminder" else 10)
@@ -451,7 +451,7 @@ class ToolBar(Bar):
         super().__init__(theme, theme.size("toolBar"))
         self.setAccessibleName(_("Tools, run and stop"))
         self.mark = RunStateIcon(theme)
-        self.words = label("", "body", role="textSecondary")
+        self.text_label = label("", "body", role="textSecondary")
         self.result = StopResultLabel(theme, compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
@@ -474,7 +474,7 @@ class ToolBar(Bar):
         row.addStretch(1)
         row.addWidget(self.mark)
         row.addSpacing(-4)
-        row.addWidget(self.words)
+        row.addWidget(self.text_label)
         row.addWidget(self.result)
         for button in (self.restart, self.pause, self.step, self.confirm, self.run):
             row.addWidget(button)
@@ -489,7 +489,7 @@ class ToolBar(Bar):
         left = max((each.geometry().right() + 1 for each in self._visible_tools()), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
         right_widgets: list[QWidget] = [each for each in buttons if not each.isHidden()]
-        states = [each for each in (self.mark, self.words) if not each.isHidden()]
+        states = [each for each in (self.mark, self.text_label) if not each.isHidden()]
         area = free_area(self, left, [*right_widgets, *states])
         return (
             area
@@ -499,7 +499,15 @@ class ToolBar(Bar):
 
     def needed_width(self) -> int:
         """Return the width in px at which no text in the bar is shortened."""
-        run_state = (self.mark, self.words, self.result, self.restart, self.pause, self.step, self.confirm)
+        run_state = (
+            self.mark,
+            self.text_label,
+            self.result,
+            self.restart,
+            self.pause,
+            self.step,
+            self.confirm,
+        )
         visible_widgets = [each for each in (*run_state, self.run, self.stop) if not each.isHidden()]
         parts: list[QWidget] = [*visible_widgets, *self._visible_tools()]
         widths = [each.sizeHint().expandedTo(each.minimumSize()).width() for each in parts]
@@ -529,8 +537,8 @@ class ToolBar(Bar):
         is_result_shown = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
         self.mark.setVisible(not is_result_shown)
-        self.words.setText(view.compact_text)
-        self.words.setVisible(not is_result_shown)
+        self.text_label.setText(view.compact_text)
+        self.text_label.setVisible(not is_result_shown)
         self.run.set_label(_(view.run_label))
         self.run.setVisible(view.can_run)
         self.restart.setVisible(view.can_restart)

@@ -149,7 +149,7 @@ class SupportsRename(Protocol):
         """Open a text field for the name of the tab with this key."""
 
 
-def bring_into_view(shell: Shell) -> None:
+def show_blocks_panel(shell: Shell) -> None:
     """Show the Behaviour layout with the blocks panel in front."""
     shell.show_layout("behaviour")
     shell.open_panel("behaviour")
@@ -250,7 +250,7 @@ class BehaviourCommands:
             step: Number of positions to the right; negative to the left.
         """
         self._files.show(self._session.documents.neighbour(step))
-        bring_into_view(self._shell)
+        show_blocks_panel(self._shell)
 
     def close(self) -> None:
         """Close the current tab."""
@@ -282,7 +282,7 @@ class BehaviourCommands:
 
     def rename_current(self) -> None:
         """Open a text field for the name of the current tab."""
-        bring_into_view(self._shell)
+        show_blocks_panel(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsRename):
             editor.rename_tab(self._session.document.key)
@@ -366,7 +366,7 @@ class BehaviourCommands:
         """
         shows = block != "-"
         if shows:
-            bring_into_view(self._shell)
+            show_blocks_panel(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsPointAt):
             editor.point_at(block if shows else "")

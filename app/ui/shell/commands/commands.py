@@ -9,7 +9,7 @@ from app.ui.shell.actions.actions import STOP_COMMAND, Actions
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.acting import ActingCommands
-from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
+from app.ui.shell.commands.behaviours import BehaviourCommands, show_blocks_panel
 from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.menus import DynamicMenus
 from app.ui.shell.commands.palette_entries import PaletteEntries
@@ -35,7 +35,7 @@ class Commands:
         keys = Shortcuts(session.settings, shell.log_problem, COMMANDS)
         self.session = session
         self.files = DocumentController(
-            session, dialogs, shell.show_toast, partial(bring_into_view, shell), shell.editor
+            session, dialogs, shell.show_toast, partial(show_blocks_panel, shell), shell.editor
         )
         self.behaviours = BehaviourCommands(shell, session, self.files, dialogs)
         session.alarms.run_behaviour = self.behaviours.run_named
@@ -63,7 +63,7 @@ class Commands:
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._handlers)
         self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.disabled_reason, keys)
-        menus = self.actions.fill(shell.menu_bar, MENUS)
+        menus = self.actions.fill_menu_bar(shell.menu_bar, MENUS)
         self.menus = DynamicMenus(shell, session, self.actions, menus, self.view, self.files.open)
         self.view.set_actions(self.actions, self.entries)
         self.actions.select("run.full_speed")

@@ -47,15 +47,15 @@ class DynamicMenus:
                 continue
             menu.aboutToShow.connect(lambda name=name: self._refresh(name))
             menu.aboutToHide.connect(actions.enable_all)
-        self._arranging = Menu(theme, surface, _("Layouts"))
-        self._arranging.aboutToHide.connect(actions.enable_all)
+        self._layout_menu = Menu(theme, surface, _("Layouts"))
+        self._layout_menu.aboutToHide.connect(actions.enable_all)
 
     def open_layout_menu(self, anchor: QWidget) -> None:
         """Open a menu with the layouts and the commands for layouts below a button."""
         self.actions.disable_unavailable()
-        self._list_layouts(self._arranging)
-        self._arranging.addAction(self.actions["layout.reset"])
-        open_below(self._arranging, anchor)
+        self._list_layouts(self._layout_menu)
+        self._layout_menu.addAction(self.actions["layout.reset"])
+        open_below(self._layout_menu, anchor)
 
     def open_panel_menu(self, anchor: QWidget) -> None:
         """Open a menu with the panels below a button; open panels are checked."""

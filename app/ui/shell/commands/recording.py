@@ -35,7 +35,7 @@ class RecordCommands:
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
         self._shell, self._session, self._dialogs = shell, session, dialogs
         self._recordings = session.recordings
-        self._recordings.on_made = self._on_saved
+        self._recordings.on_created = self._on_saved
         self._sheet: record_sheet.RecordSheet | None = None
 
     def toggle(self) -> None:
@@ -93,7 +93,7 @@ class RecordCommands:
         If the flight recorder is off, a toast offers to turn it on.
         """
         recordings = self._recordings
-        if not recordings.wish.is_on:
+        if not recordings.ring_settings.is_on:
             self._shell.show_toast(
                 _("The flight recorder is off: there is nothing to save"),
                 _("Turn it on"),
@@ -106,9 +106,9 @@ class RecordCommands:
 
     def _enable_flight_recorder(self) -> None:
         recordings = self._recordings
-        recordings.set_ring_settings(replace(recordings.wish, is_on=True))
+        recordings.set_ring_settings(replace(recordings.ring_settings, is_on=True))
         message = _("The flight recorder now keeps the last {count} s")
-        self._shell.show_toast(message.format(count=recordings.wish.seconds))
+        self._shell.show_toast(message.format(count=recordings.ring_settings.seconds))
 
     def show(self, path: Path | None = None) -> None:
         """Show the recordings panel and select a recording in it, if one is given."""

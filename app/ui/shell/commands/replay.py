@@ -63,7 +63,7 @@ class ReplayCommands:
     def _replay(self) -> Replay | None:
         return self._session.replay
 
-    def play(self) -> None:
+    def toggle_playback(self) -> None:
         """Start the replay, or pause it."""
         if self._replay is not None:
             self._replay.toggle()

@@ -79,7 +79,7 @@ class ReportCommands:
         return [
             problem_report.ReportedWork(
                 documents.title(each),
-                encode_file(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
+                encode_file(BehaviourFile(each.name, each.workspace, each.robots, each.unknown_fields)),
             )
             for each in documents
             if not each.is_blank

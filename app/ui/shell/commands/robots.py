@@ -96,7 +96,7 @@ class RobotCommands:
             False if there is no such robot.
         """
         launcher = self._session.launcher
-        names = [robot for robot in launcher.wanted if name in {"", robot}]
+        names = [robot for robot in launcher.models_by_name if name in {"", robot}]
         for robot in names:
             launcher.stop_virtual_robot(robot)
         return bool(names)
@@ -107,7 +107,7 @@ class RobotCommands:
         if dock is not None and isinstance(dock.panel, SupportsFullScreen):
             dock.panel.toggle_full_screen()
 
-    def connect(self, name: str) -> None:
+    def reconnect(self, name: str) -> None:
         """Restart a missing virtual robot; show the Robots panel for a real robot or an unknown model."""
         kind = self._description(name).get("rb:robot")
         model = _virtual_model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
@@ -187,7 +187,7 @@ class RobotCommands:
             )
         self._other_networks.open()
 
-    def show_web_pages(self) -> None:
+    def open_web_pages(self) -> None:
         """Open the sheet of the web server."""
         if self._web_pages is None:
             self._web_pages = WebPagesSheet(

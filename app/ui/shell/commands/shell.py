@@ -67,7 +67,7 @@ class Shell(Protocol):
         """Return the panel with the block editor, or None if it wasn't created yet."""
 
     @property
-    def left(self) -> str:
+    def return_layout(self) -> str:
         """Name of the layout to return to from the start page, or "" if there is none."""
 
     def show_start(self) -> None:

@@ -101,7 +101,7 @@ def _custom_layout_disabled_reason(handlers: Handlers) -> str:
 def _previous_layout_disabled_reason(handlers: Handlers) -> str:
     if handlers.shell.current_layout != START_PAGE:
         return _("Only on the start page")
-    return "" if handlers.shell.left else _("Nothing open")
+    return "" if handlers.shell.return_layout else _("Nothing open")
 
 
 def _freeze_disabled_reason(handlers: Handlers) -> str:
@@ -128,7 +128,9 @@ def _room_disabled_reason(handlers: Handlers) -> str:
 
 
 def _virtual_robot_disabled_reason(handlers: Handlers) -> str:
-    return "" if handlers.session.launcher.wanted else _("No virtual robot was started in this window")
+    return (
+        "" if handlers.session.launcher.models_by_name else _("No virtual robot was started in this window")
+    )
 
 
 def _recording_disabled_reason(handlers: Handlers) -> str:
@@ -146,18 +148,18 @@ def _smaller_text_disabled_reason(handlers: Handlers) -> str:
 C = Command[Handlers]
 
 
-def _go_to_panel(number: int) -> C:
+def _panel_command(number: int) -> C:
     return C(
         f"panel.{number}",
         lazy("Go to panel {number}"),
-        lambda do: do.shell.panel_focus.number(number),
+        lambda do: do.shell.panel_focus.focus_at(number),
         keys=(f"Ctrl+{number}",),
         in_palette=False,
         number=number,
     )
 
 
-def _edit(edit: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
+def _edit_command(edit: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
     # A menu entry only; the focused widget handles its key.
     return C(
         f"edit.{edit}",
@@ -173,7 +175,7 @@ def _edit(edit: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
     )
 
 
-def releases(page: str) -> tuple[C, ...]:
+def releases_commands(page: str) -> tuple[C, ...]:
     """Return the command that opens the web page of releases, or an empty tuple if there is no such page.
 
     Args:
@@ -219,10 +221,10 @@ COMMANDS: tuple[C, ...] = (
       disabled_reason=_editor_disabled_reason),
     C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
       "rotate-cw", disabled_reason=_editor_disabled_reason),
-    _edit("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
-    _edit("copy", lazy("Copy"), "Ctrl+C", "copy"),
-    _edit("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
-    _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
+    _edit_command("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
+    _edit_command("copy", lazy("Copy"), "Ctrl+C", "copy"),
+    _edit_command("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
+    _edit_command("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
     C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
       "Edit", icon="image", separator_above=True, disabled_reason=_editor_disabled_reason),
     C("blocks.find", lazy("Find in blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
@@ -256,18 +258,19 @@ COMMANDS: tuple[C, ...] = (
       disabled_reason=_panels_disabled_reason),
     C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.next(-1), "View",
       ("Shift+F6",), disabled_reason=_panels_disabled_reason),
-    *map(_go_to_panel, range(1, 10)),
+    *map(_panel_command, range(1, 10)),
     C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.switch_tab(1), "View", ("Ctrl+Tab",),
       separator_above=True, mac_keys=("Meta+Tab", "Ctrl+Shift+]")),
     C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.switch_tab(-1), "View",
       ("Ctrl+Shift+Tab",), mac_keys=("Meta+Shift+Tab", "Ctrl+Shift+[")),
-    C("view.freeze", lazy("Freeze display"), lambda do: do.view.freeze(), "View", icon="snowflake",
+    C("view.freeze", lazy("Freeze display"), lambda do: do.view.toggle_frozen_panels(), "View",
+    icon="snowflake",
       tip=lazy("Freezes the Inspector and images"), is_checkable=True, separator_above=True,
       disabled_reason=_freeze_disabled_reason),
     C("replay.live", lazy("Back to live"), lambda do: do.replay.return_to_live(), "View", icon="radio-tower",
       tip=lazy("Closes the recording and returns to the live network"), separator_above=True,
       disabled_reason=_open_recording_disabled_reason),
-    C("replay.play", lazy("Play recording"), lambda do: do.replay.play(), icon="play",
+    C("replay.play", lazy("Play recording"), lambda do: do.replay.toggle_playback(), icon="play",
       disabled_reason=_loaded_recording_disabled_reason),
     C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.add_bookmark(), icon="bookmark",
       disabled_reason=_loaded_recording_disabled_reason),
@@ -337,7 +340,7 @@ COMMANDS: tuple[C, ...] = (
     C("network.look", lazy("Browse other robot networks"), lambda do: do.robots.open_other_networks(),
       "Robots",
       icon="waypoints"),
-    C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.show_web_pages(), "Robots",
+    C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.open_web_pages(), "Robots",
       icon="globe"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell",
       separator_above=True,
@@ -369,8 +372,8 @@ COMMANDS: tuple[C, ...] = (
     C("help.report", lazy("Report a problem"), lambda do: do.reports.report(), "Help",
       icon="message-square-warning", separator_above=True),
     C("help.log", lazy("Show the log"), lambda do: do.view.open_log_folder(), "Help", icon="folder-open"),
-    *releases(RELEASES_PAGE),
-    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info",
+    *releases_commands(RELEASES_PAGE),
+    C("help.about", lazy("About NEP Studio"), lambda do: do.view.open_about(), "Help", icon="info",
       separator_above=True),
 )  # fmt: skip
 
@@ -382,7 +385,7 @@ def _argument_command(
     return ArgumentCommand(id, lambda do, text: run(do, parse(text)) is not False)
 
 
-def _fix_blocks(verb: str) -> ArgumentCommand[Handlers]:
+def _fix_command(verb: str) -> ArgumentCommand[Handlers]:
     return _argument_command(verb, str, lambda do, what: do.files.fix(f"{verb}:{what}"))
 
 
@@ -407,7 +410,7 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _argument_command("variable.rename", str, lambda do, id: do.variables.ask_rename(id)),
     _argument_command("variable.delete", str, lambda do, id: do.variables.delete(id)),
     _argument_command("variable.watch", str, lambda do, id: do.variables.toggle_watch(id)),
-    _argument_command("variable.find", str, lambda do, id: do.variables.find(id)),
+    _argument_command("variable.find", str, lambda do, id: do.variables.show_next_use(id)),
     _argument_command("variable.put", str, lambda do, id: do.variables.ask_value(id)),
     _argument_command("point.block", str, lambda do, block: do.behaviours.point_at(block)),
     _argument_command("point.button", str, lambda do, command: do.view.point_at(command)),
@@ -420,12 +423,12 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
     _argument_command("tab.save", str, lambda do, key: do.behaviours.save_tab(key)),
     _argument_command("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
     _argument_command("tab.move", TabPosition.parse, lambda do, place: do.behaviours.move_tab(place)),
-    _argument_command("connect", str, lambda do, robot: do.robots.connect(robot)),
+    _argument_command("connect", str, lambda do, robot: do.robots.reconnect(robot)),
     _argument_command("robot.use", RobotReplacement.parse, lambda do, swap: do.robots.replace_robot(swap)),
     _argument_command("robot.end_virtual", str, lambda do, robot: do.robots.stop_virtual(robot)),
     _argument_command("robot.virtual", str, lambda do, missing: do.robots.start_virtual_model(missing)),
     *map(
-        _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
+        _fix_command, ("limit", "define", "add", "after", "begin", "receive")
     ),  # for buttons of problems (`app.blocks.fixes.fixes`)
 )
 """Commands that are run as ``id:argument``; tabs are identified by the key of their document."""

@@ -44,7 +44,7 @@ class VariableCommands:
     def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._sheet: name_sheet.NameSheet | None = None
-        self._used_before: dict[str, str] = {}  # id of the block found last, by variable
+        self._last_found_ids: dict[str, str] = {}  # id of the block found last, by variable
 
     def new(self, *, is_list: bool) -> None:
         """Ask for a name, then create a variable, or a list if `is_list`."""
@@ -109,15 +109,15 @@ class VariableCommands:
         """Show or hide the value of the variable with this id next to the blocks."""
         self._edit({"do": "watch", "id": id})
 
-    def find(self, id: str) -> None:
+    def show_next_use(self, id: str) -> None:
         """Scroll to the next block that uses the variable with this id, wrapping around."""
 
         def show() -> None:
             uses = uses_of(self._workspace(), id)
-            before = self._used_before.get(id, "")
+            before = self._last_found_ids.get(id, "")
             if uses:
                 index = (uses.index(before) + 1) % len(uses) if before in uses else 0
-                self._used_before = {id: uses[index]}
+                self._last_found_ids = {id: uses[index]}
                 self._edit({"do": "show", "id": uses[index]})
 
         self._run_after_flush(show)

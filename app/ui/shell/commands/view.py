@@ -147,8 +147,8 @@ class ViewCommands:
                 shell.theme, shell.surface, self._entries.all, self.run_entry, self._rebind
             )
             saved_ids: list[object] = self._session.settings.get("palette_last", [])
-            self._palette.last = [id for id in saved_ids if isinstance(id, str)]
-            self._palette.on_last = lambda ids: shell.state.save("palette_last", list(ids))
+            self._palette.last_used_ids = [id for id in saved_ids if isinstance(id, str)]
+            self._palette.on_last_used_changed = lambda ids: shell.state.save("palette_last", list(ids))
         self._palette.open()
 
     def run_entry(self, entry: Entry) -> None:
@@ -254,7 +254,7 @@ class ViewCommands:
                 shell.surface,
                 shell.state,
                 self._session.settings,
-                self._files.asks,
+                self._files.dialogs,
                 self._voice_text,
                 restart=self._restart if shell.can_restart else None,
             )
@@ -277,8 +277,8 @@ class ViewCommands:
 
     def exit_start_page(self) -> None:
         """Leave the start page and show the previous layout."""
-        if self._shell.current_layout == START_PAGE and self._shell.left:
-            self.show_layout(self._shell.left)
+        if self._shell.current_layout == START_PAGE and self._shell.return_layout:
+            self.show_layout(self._shell.return_layout)
 
     def show_layout(self, layout: str) -> None:
         """Show the layout "behaviour" or "developer" with its last arrangement."""
@@ -371,11 +371,11 @@ class ViewCommands:
 
         kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
         suggestion = Path.home() / f"{file_stem(name)}{kind.suffix}"
-        self._files.asks.save_as(_("Save layout to a file"), suggestion, [kind], save)
+        self._files.dialogs.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
     def ask_layout(self) -> None:
         """Ask for a layout file and import it."""
-        self._files.asks.open_layout(str(Path.home()), self.open_layout)
+        self._files.dialogs.open_layout(str(Path.home()), self.open_layout)
 
     def open_layout(self, path: Path) -> None:
         """Import a layout file and show the layout; an error is shown in a toast."""
@@ -414,7 +414,7 @@ class ViewCommands:
             )
         shell.show_toast(message, _("Undo"), undo)
 
-    def freeze(self) -> None:
+    def toggle_frozen_panels(self) -> None:
         """Freeze all panels, or unfreeze them if all are frozen."""
         toggle_freeze(self._shell.bench)
 
@@ -497,7 +497,7 @@ class ViewCommands:
         if not open_externally(QUrl.fromLocalFile(str(folder))):
             self._shell.show_toast(_("The log files are in {folder}").format(folder=folder))
 
-    def about(self) -> None:
+    def open_about(self) -> None:
         """Open the About sheet."""
         AboutSheet(self._shell.theme, self._shell.surface, self._shell.show_toast).open()
 

@@ -82,7 +82,7 @@ class AboutSheet(Overlay):
         QGuiApplication.clipboard().setText(text)
         self._notify(_("Copied version information"))
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self._close
 
     def preferred_size(self, room: QSize) -> QSize:

@@ -16,7 +16,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy, ngettext
 
 WIDTH, TOP, FIELD, FOOTER_HEIGHT = 640, 128, 56, 36
@@ -36,7 +36,7 @@ class _Field(QLineEdit):
         self.setProperty("bare", "true")
         self.setProperty("ownFocus", True)
         self.setFrame(False)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self.restyle()
 
     def restyle(self) -> None:
@@ -71,7 +71,7 @@ class _Footer(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.counted = ""
+        self.result_text = ""
         self.setFixedHeight(round(theme.scaled(FOOTER_HEIGHT)))
 
     def sizeHint(self) -> QSize:
@@ -82,7 +82,7 @@ class _Footer(QWidget):
         font, quiet = theme.font("body"), theme.colour("textSecondary")
         middle, x = self.height() / 2, 18.0
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
-        count = paint.width_of(font, self.counted)
+        count = paint.width_of(font, self.result_text)
         for keys, hint in self.KEY_HINTS:
             text = _(hint)
             caps = [shortcut_text(key) for key in keys]
@@ -96,7 +96,7 @@ class _Footer(QWidget):
             paint.text_line(painter, area, text, font, quiet)
             x += paint.width_of(font, text) + 17
         area = QRectF(0, 0, self.width() - 19, self.height())
-        paint.text_line(painter, area, self.counted, font, quiet, paint.RIGHT)
+        paint.text_line(painter, area, self.result_text, font, quiet, paint.RIGHT)
         painter.end()
 
 
@@ -125,18 +125,18 @@ class CommandPalette(Overlay):
         super().__init__(theme, window, _("Command palette"))
         self._offers, self._run, self._rebind = offers, run, rebind
         self._finder = Finder(())
-        self.last: list[str] = []
-        self.on_last: Callable[[Sequence[str]], object] = lambda _ids: None
+        self.last_used_ids: list[str] = []
+        self.on_last_used_changed: Callable[[Sequence[str]], object] = lambda _ids: None
         self.field = _Field(theme)
         self.rows = EntryList(theme, _("Matches"))
-        self.nothing = label("", "bodyLarge", role="textSecondary", wrap=True)
-        self.nothing.setContentsMargins(20, 14, 20, 16)
+        self.no_result_label = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.no_result_label.setContentsMargins(20, 14, 20, 16)
         self.foot = _Footer(theme)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 1, 1, 1)
         column.setSpacing(0)
         column.addWidget(self.field)
-        column.addWidget(self.nothing)
+        column.addWidget(self.no_result_label)
         inner = QHBoxLayout()
         inner.setContentsMargins(0, 2, 0, 6)
         inner.addWidget(self.rows)
@@ -144,11 +144,11 @@ class CommandPalette(Overlay):
         column.addWidget(self.foot)
         self.field.installEventFilter(self)
         self.field.textChanged.connect(self._search)
-        self.rows.selection_moved.connect(self._update_status)
+        self.rows.selection_moved.connect(self._announce_selection)
         self.rows.row_activated.connect(self.run_selected)
         theme.changed.connect(self._restyle)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.field
 
     def open(self) -> None:
@@ -166,7 +166,7 @@ class CommandPalette(Overlay):
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         rows = min(self.rows.content_height(), round(scaled(40) * MAX_VISIBLE_ROWS)) + 8
-        content_height = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
+        content_height = rows if self.rows.lines.lines else self.no_result_label.sizeHint().height()
         height = self.field.height() + content_height + self.foot.height() + 2
         return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), height))
 
@@ -180,14 +180,16 @@ class CommandPalette(Overlay):
         lines = self._default_lines() if not query else []
         if query:
             matches, count = self._finder.find(query, MAX_RESULTS)
-            self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
+            self.foot.result_text = _("{shown} of {count}").format(
+                shown=count, count=len(self._finder.entries)
+            )
             for match in matches:
                 heading = Heading(_(GROUP_TITLES[match.entry.kind]))
                 if heading not in lines:
                     lines.append(heading)
                 lines.append(match)
-        self.nothing.setText(_("No results for “{words}”.").format(words=query))
-        paint.show_when(self.nothing, not lines)
+        self.no_result_label.setText(_("No results for “{words}”.").format(words=query))
+        paint.show_when(self.no_result_label, not lines)
         paint.show_when(self.rows, bool(lines))
         self.rows.show_lines(lines)
         self.foot.update()
@@ -196,8 +198,8 @@ class CommandPalette(Overlay):
     def _default_lines(self) -> list[Line]:
         # The last used entries, then the first ones of each kind.
         entries = self._finder.entries
-        entries_by_id = {entry.id: entry for entry in entries if entry.id in self.last}
-        last = [entries_by_id[id] for id in self.last if id in entries_by_id][:MAX_LAST_SHOWN]
+        entries_by_id = {entry.id: entry for entry in entries if entry.id in self.last_used_ids}
+        last = [entries_by_id[id] for id in self.last_used_ids if id in entries_by_id][:MAX_LAST_SHOWN]
         lines: list[Line] = [Heading(_(GROUP_TITLES["recent"])), *map(Match, last)] if last else []
         kinds: dict[str, list[Match]] = {}
         for entry in entries:
@@ -207,12 +209,12 @@ class CommandPalette(Overlay):
         for kind, of_kind in kinds.items():
             if of_kind:
                 lines += [Heading(_(GROUP_TITLES[kind])), *of_kind]
-        self.foot.counted = ngettext("{count} result", "{count} results", len(entries)).format(
+        self.foot.result_text = ngettext("{count} result", "{count} results", len(entries)).format(
             count=len(entries)
         )
         return lines
 
-    def _update_status(self) -> None:
+    def _announce_selection(self) -> None:
         # The focus stays in the field; therefore the selected row is announced to screen readers.
         entry = self.rows.entry
         if entry is not None and self.isVisible():
@@ -222,7 +224,7 @@ class CommandPalette(Overlay):
         if watched is self.field and event.type() == QEvent.Type.KeyPress:
             pressed = cast("QKeyEvent", event)
             is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-            if is_unmodified and self.rows.handle(pressed.key()):
+            if is_unmodified and self.rows.handle_key(pressed.key()):
                 return True
             if pressed.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
                 if pressed.modifiers() & Qt.KeyboardModifier.ControlModifier:
@@ -240,8 +242,8 @@ class CommandPalette(Overlay):
         if entry.reason:
             paint.announce(self.field, entry.reason)
             return
-        self.last = [entry.id, *(id for id in self.last if id != entry.id)][:MAX_LAST_SAVED]
-        self.on_last(self.last)
+        self.last_used_ids = [entry.id, *(id for id in self.last_used_ids if id != entry.id)][:MAX_LAST_SAVED]
+        self.on_last_used_changed(self.last_used_ids)
         self.dismiss()
         self._run(entry)
 

@@ -43,10 +43,10 @@ from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
 from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_SUFFIXES, FileKind, pictures_folder, resolve_kind
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy
 
-WIDTH, HEIGHT, PLACES_WIDTH, FOLDER_NAME_WIDTH = 860, 560, 190, 200
+WIDTH, HEIGHT, LOCATIONS_WIDTH, FOLDER_NAME_WIDTH = 860, 560, 190, 200
 NAME, CHANGED, SIZE = range(3)
 
 
@@ -183,7 +183,7 @@ class FileSheet(Overlay):
         self.folder_name.setAccessibleName(_("Folder name"))
         self.make_folder = Button(theme, _("Create"), size="small")
         self.make_folder.clicked.connect(self._create_folder)
-        self.places = ScrollColumn(_("Locations"), gap=2)
+        self.location_list = ScrollColumn(_("Locations"), gap=2)
         self.list = QTreeWidget()
         self.name = QLineEdit()
         self.name.setAccessibleName(_("File name"))
@@ -192,11 +192,11 @@ class FileSheet(Overlay):
         self.folder_name.returnPressed.connect(self._create_folder)
         for field in (self.name, self.folder_name):
             field.setProperty("focusRadius", theme.radius("control"))
-            ContextMenuFilter(theme, field)
-        self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
+            FieldContextMenu(theme, field)
+        self.suffix_label = label(SUFFIX, "bodyLarge", role="textTertiary")
         self.kind = ComboBox(theme, name=_("File type"))
         self.kind.currentIndexChanged.connect(self._on_kind_changed)
-        self.said = label("", "body", role="textSecondary", wrap=True)
+        self.hint = label("", "body", role="textSecondary", wrap=True)
         self.cancel = Button(theme, _("Cancel"), size="form")
         self.cancel.clicked.connect(self.dismiss)
         self.keep_both = Button(theme, _("Keep both"), size="form")
@@ -239,14 +239,14 @@ class FileSheet(Overlay):
         right.setSpacing(8)
         right.addLayout(path_row)
         right.addWidget(self.list, 1)
-        right.addWidget(self.said)
+        right.addWidget(self.hint)
         self._naming = QWidget()
         naming = QHBoxLayout(self._naming)
         naming.setContentsMargins(0, 0, 0, 0)
         naming.setSpacing(8)
         naming.addWidget(label(_("Name"), "bodyLarge", role="textSecondary"))
         naming.addWidget(self.name, 1)
-        naming.addWidget(self.ending)
+        naming.addWidget(self.suffix_label)
         naming.addWidget(self.kind)
         right.addWidget(self._naming)
         footer = QHBoxLayout()
@@ -257,7 +257,7 @@ class FileSheet(Overlay):
         right.addLayout(footer)
         middle = QHBoxLayout()
         middle.setSpacing(16)
-        middle.addWidget(self.places)
+        middle.addWidget(self.location_list)
         middle.addLayout(right, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 14, 20, 16)
@@ -326,7 +326,7 @@ class FileSheet(Overlay):
         self.kind.blockSignals(False)
         self.kind.updateGeometry()
         paint.show_when(self.kind, len(question.kinds) > 1)
-        self.ending.setText(question.kinds[0].suffix)
+        self.suffix_label.setText(question.kinds[0].suffix)
         self._ask(question, suggestion.parent, callback)
         self.name.selectAll()
 
@@ -339,7 +339,7 @@ class FileSheet(Overlay):
         name = self.name.text()
         typed = next((each for each in self.question.suffixes if name.lower().endswith(each)), "")
         self.name.setText(name[: len(name) - len(typed)])
-        self.ending.setText(self._kind.suffix)
+        self.suffix_label.setText(self._kind.suffix)
         self._validate()
 
     def _ask(self, question: FileQuestion, folder: Path, callback: Callable[[Path], object]) -> None:
@@ -362,7 +362,7 @@ class FileSheet(Overlay):
     def _can_create_folders(self) -> bool:
         return self.is_saving or self.question.selects_folder
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.name if self.is_saving else self.list
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -374,7 +374,7 @@ class FileSheet(Overlay):
         ...
 
     def _show_locations(self) -> None:
-        column = self.places.column
+        column = self.location_list.column
         while column.count() > 1 and (item := column.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
@@ -384,7 +384,7 @@ class FileSheet(Overlay):
             button.setToolTip(plain.tip(str(location.folder)))
             button.clicked.connect(lambda _on=False, folder=location.folder: self.go_to(folder))
             column.insertWidget(number, button)
-        self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDTH)))
+        self.location_list.setFixedWidth(round(self.theme.scaled(LOCATIONS_WIDTH)))
 
     def go_to(self, folder: Path) -> None:
         """Show the contents of a folder.
@@ -473,7 +473,7 @@ class FileSheet(Overlay):
             return
         self._show_folder_field(False)
         self.go_to(self.folder / name)
-        self.first().setFocus(Qt.FocusReason.OtherFocusReason)
+        self.initial_focus().setFocus(Qt.FocusReason.OtherFocusReason)
 
     @property
     def target(self) -> Path | None:
@@ -536,15 +536,15 @@ class FileSheet(Overlay):
         )
 
     def _set_status(self, text: str, role: str) -> None:
-        if self.said.text() == text:
+        if self.hint.text() == text:
             return
-        self.said.setText(text)
-        self.said.setProperty("role", role)
-        self.said.style().unpolish(self.said)
-        self.said.style().polish(self.said)
-        paint.show_when(self.said, bool(text))
+        self.hint.setText(text)
+        self.hint.setProperty("role", role)
+        self.hint.style().unpolish(self.hint)
+        self.hint.style().polish(self.hint)
+        paint.show_when(self.hint, bool(text))
         if text:
-            paint.announce(self.said, text)
+            paint.announce(self.hint, text)
 
     def _accept(self) -> None:
         target, selected = self.target, self.selected_entry

@@ -47,7 +47,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, label, paint
 from nep.i18n import ENGLISH, _, ngettext
 
-WIDE, HIGH, LIST_WIDTH = 920, 640, 220
+WIDTH, HEIGHT, LIST_WIDTH = 920, 640, 220
 LINE_HEIGHT_PERCENT = 115.0
 IMAGE_PIXEL_RATIO = 1.5
 """Pixels of an image file per logical pixel; greater than 1 for sharp images on high-DPI screens."""
@@ -112,7 +112,7 @@ class PageView(QTextBrowser):
         super().__init__()
         self._theme = theme
         self._page = GuidePage("", "")
-        self._laid_for = 0
+        self._fitted_width = 0
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setProperty("bare", "true")
         self.setOpenLinks(False)
@@ -136,7 +136,7 @@ class PageView(QTextBrowser):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._laid_for and self._laid_for != self._available_width():
+        if self._fitted_width and self._fitted_width != self._available_width():
             self._fit_timer.start(0)
 
     def _available_width(self) -> int:
@@ -144,7 +144,7 @@ class PageView(QTextBrowser):
 
     def _fit_pictures(self) -> None:
         # Scales each image to device pixels, so that it stays sharp.
-        self._laid_for = self._available_width()
+        self._fitted_width = self._available_width()
         document, ratio = self.document(), self.devicePixelRatioF()
         cursor = QTextCursor(document)
         for position in self._image_positions():
@@ -156,7 +156,7 @@ class PageView(QTextBrowser):
             )
             if not isinstance(image, QImage) or image.isNull():
                 continue
-            width = min(self._laid_for, round(image.width() / IMAGE_PIXEL_RATIO))
+            width = min(self._fitted_width, round(image.width() / IMAGE_PIXEL_RATIO))
             plain_image = image.convertToFormat(QImage.Format.Format_RGB32)
             pixels = plain_image.scaledToWidth(
                 round(width * ratio), Qt.TransformationMode.SmoothTransformation
@@ -196,7 +196,7 @@ class GuideSheet(Overlay):
     def __init__(self, theme: Theme, window: QWidget, pages: Callable[[], Sequence[GuidePage]]) -> None:
         # `pages` is called whenever the sheet opens, because keys may have changed.
         super().__init__(theme, window, _("Guide"))
-        self._read = pages
+        self._read_pages = pages
         self._pages: tuple[GuidePage, ...] = ()
         self.search = SearchField(theme, _("Search the guide"))
         self.search.textChanged.connect(self._apply_filter)
@@ -207,7 +207,7 @@ class GuideSheet(Overlay):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.installEventFilter(self)
         self.list.currentRowChanged.connect(self._show_page)
-        self.none = label(_("No matching pages."), "body", role="textSecondary", wrap=True)
+        self.no_match_label = label(_("No matching pages."), "body", role="textSecondary", wrap=True)
         self.page = PageView(theme)
         self._lay_out()
         theme.changed.connect(self._restyle)
@@ -217,7 +217,7 @@ class GuideSheet(Overlay):
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(self.search)
-        left.addWidget(self.none)
+        left.addWidget(self.no_match_label)
         left.addWidget(self.list, 1)
         sides = QHBoxLayout()
         sides.setSpacing(18)
@@ -232,16 +232,16 @@ class GuideSheet(Overlay):
         column.addLayout(header)
         column.addLayout(sides, 1)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.list
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), round(scaled(HEIGHT))))
 
     def open(self) -> None:
         row = max(0, self.list.currentRow())
-        self._pages = tuple(self._read())
+        self._pages = tuple(self._read_pages())
         self.search.clear()
         self._apply_filter("")
         self.list.setCurrentRow(row)
@@ -262,7 +262,7 @@ class GuideSheet(Overlay):
             self.list.addItem(item)
         self.list.blockSignals(False)
         count = self.list.count()
-        paint.show_when(self.none, count == 0)
+        paint.show_when(self.no_match_label, count == 0)
         if query:
             paint.announce(self, ngettext("{count} page", "{count} pages", count).format(count=count))
         if count:
@@ -284,14 +284,14 @@ class GuideSheet(Overlay):
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
                 self._format_table(frame)
-        self._set_text(document)
+        self._format_text(document)
         query_words = self.search.text().split()
         if query_words:
             self.page.find(query_words[0])
         else:
             self.page.verticalScrollBar().setValue(0)
 
-    def _set_text(self, document: QTextDocument) -> None:
+    def _format_text(self, document: QTextDocument) -> None:
         # Sets paragraph spacing, and makes emphasis semibold instead of italic.
         cursor = QTextCursor(document)
         block = document.begin()

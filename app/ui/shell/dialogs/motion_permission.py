@@ -55,20 +55,20 @@ class MotionPermissionCard(QWidget):
     ) -> None:
         # `report_error` is called with a message if "always" can't be saved.
         super().__init__(window)
-        self._theme, self._moving = theme, permission
+        self._theme, self._permission = theme, permission
         self._last_revision = permission.revision
-        self._before: QWidget | None = None
-        self._complain = report_error
+        self._previous_focus: QWidget | None = None
+        self._report_error = report_error
         self._always_for = ""
         self.title = label("", "heading", wrap=True)
-        self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
-        self.always = Switch(theme, "")
-        self.let = Button(theme, _("Allow motion"), "footprints", kind="primary", size="form")
-        self.not_now = Button(theme, _("Cancel"), size="form")
-        for button in (self.let, self.not_now):
+        self.message = label("", "bodyLarge", role="textSecondary", wrap=True)
+        self.always_switch = Switch(theme, "")
+        self.allow_button = Button(theme, _("Allow motion"), "footprints", kind="primary", size="form")
+        self.cancel_button = Button(theme, _("Cancel"), size="form")
+        for button in (self.allow_button, self.cancel_button):
             button.allow_shrinking()
-        self.let.clicked.connect(lambda: self._answer(is_allowed=True))
-        self.not_now.clicked.connect(lambda: self._answer(is_allowed=False))
+        self.allow_button.clicked.connect(lambda: self._answer(is_allowed=True))
+        self.cancel_button.clicked.connect(lambda: self._answer(is_allowed=False))
         self._lay_out(theme)
         shadow = QGraphicsDropShadowEffect(self)
         shadow.setBlurRadius(32)
@@ -83,17 +83,17 @@ class MotionPermissionCard(QWidget):
         text_column = QVBoxLayout()
         text_column.setSpacing(4)
         text_column.addWidget(self.title)
-        text_column.addWidget(self.sentence)
+        text_column.addWidget(self.message)
         top = QHBoxLayout()
         top.setSpacing(14)
         top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
         top.addLayout(text_column, 1)
         footer = QHBoxLayout()
         footer.setSpacing(BETWEEN)
-        footer.addWidget(self.always)
+        footer.addWidget(self.always_switch)
         footer.addStretch(1)
-        footer.addWidget(self.not_now)
-        footer.addWidget(self.let)
+        footer.addWidget(self.cancel_button)
+        footer.addWidget(self.allow_button)
         column = QVBoxLayout(self)
         column.setContentsMargins(EDGE, 18, EDGE, 16)
         column.setSpacing(16)
@@ -102,44 +102,46 @@ class MotionPermissionCard(QWidget):
 
     def refresh(self) -> None:
         """Show the pending question, or hide the card if there is none."""
-        if self._moving.revision == self._last_revision:
+        if self._permission.revision == self._last_revision:
             return
-        self._last_revision = self._moving.revision
-        question = self._moving.question
+        self._last_revision = self._permission.revision
+        question = self._permission.question
         if question is None:
             self._close()
             return
         names = list(question.names)
         self.title.setText(plain.make_breakable(question.title))
-        self.sentence.setText(plain.make_breakable(question.message))
+        self.message.setText(plain.make_breakable(question.message))
         self._always_for = _("Always for these")
         if len(names) == 1:
             self._always_for = _("Always for {robot}").format(robot=names[0])
-        self.always.setAccessibleName(self._always_for)
-        self.always.setChecked(False)
-        self.let.set_label(_("Allow motion"))
+        self.always_switch.setAccessibleName(self._always_for)
+        self.always_switch.setChecked(False)
+        self.allow_button.set_label(_("Allow motion"))
         self.setAccessibleName(question.title)
         self.setAccessibleDescription(question.message)
         if not self.isVisible():
-            self._before = QApplication.focusWidget()
+            self._previous_focus = QApplication.focusWidget()
         self.show()  # before measuring: showing the card applies fonts and margins of the style sheet
         self._reposition()
         self.raise_()
-        self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
+        self.cancel_button.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _close(self) -> None:
         focus = QApplication.focusWidget()
         had_focus = focus is not None and self.isAncestorOf(focus)
         self.hide()
-        before, self._before = self._before, None
+        before, self._previous_focus = self._previous_focus, None
         if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _answer(self, *, is_allowed: bool) -> None:
         try:
-            self._moving.answer(is_allowed=is_allowed, always=is_allowed and self.always.isChecked())
+            self._permission.answer(
+                is_allowed=is_allowed, always=is_allowed and self.always_switch.isChecked()
+            )
         except SettingsError as error:
-            self._complain(error.sentence)
+            self._report_error(error.sentence)
         self.refresh()
 
     def _reposition(self) -> None:
@@ -160,11 +162,11 @@ class MotionPermissionCard(QWidget):
 
     def _set_always_text(self, width: int) -> None:
         # The robot's name is on the switch only if it fits there; the title always contains it.
-        self.always.setText(self._always_for)
-        buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()
-        if self.always.sizeHint().width() > width - 2 * EDGE - 2 * BETWEEN - buttons:
-            self.always.setText(_("Always"))
-        self.always.updateGeometry()
+        self.always_switch.setText(self._always_for)
+        buttons = self.cancel_button.sizeHint().width() + self.allow_button.sizeHint().width()
+        if self.always_switch.sizeHint().width() > width - 2 * EDGE - 2 * BETWEEN - buttons:
+            self.always_switch.setText(_("Always"))
+        self.always_switch.updateGeometry()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize and self.isVisible():

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 WIDTH = 420
@@ -29,8 +29,8 @@ class NameSheet(Overlay):
         self.heading = label("", "heading")
         self.field = QLineEdit()
         self.field.setProperty("focusRadius", theme.radius("control"))
-        ContextMenuFilter(theme, self.field)
-        self.wrong = label("", "body", role="error", wrap=True)
+        FieldContextMenu(theme, self.field)
+        self.error_label = label("", "body", role="error", wrap=True)
         self.button = Button(theme, "", kind="primary", size="form")
         cancel = Button(theme, _("Cancel"), size="form")
         cancel.clicked.connect(self.dismiss)
@@ -41,7 +41,7 @@ class NameSheet(Overlay):
         column = QVBoxLayout(self)
         column.setContentsMargins(20, 16, 20, 16)
         column.setSpacing(10)
-        for widget in (self.heading, self.field, self.wrong):
+        for widget in (self.heading, self.field, self.error_label):
             column.addWidget(widget)
         column.addLayout(row)
         self.field.textEdited.connect(self._on_edited)
@@ -74,7 +74,7 @@ class NameSheet(Overlay):
         self._on_edited(name)
         self.open()
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.field
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -89,14 +89,14 @@ class NameSheet(Overlay):
         super().keyPressEvent(event)
 
     def _show_error(self, message: str) -> None:
-        self.wrong.setText(message)
-        paint.show_when(self.wrong, bool(message))
+        self.error_label.setText(message)
+        paint.show_when(self.error_label, bool(message))
         self.field.setProperty("wrong", "true" if message else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)
         self.place()
         if message:
-            paint.announce(self.wrong, message)
+            paint.announce(self.error_label, message)
 
     def _on_edited(self, text: str) -> None:
         # No error is shown for an empty field until the button is pressed.

@@ -29,14 +29,14 @@ class NetworkAccessSheet(Overlay):
         self._access = access
         self.heading = label("", "heading", wrap=True)
         self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
-        self.where = QHBoxLayout()
-        self.where_word = label(_("Network address"), "bodyLarge", role="textSecondary")
+        self.address_row = QHBoxLayout()
+        self.address_title = label(_("Network address"), "bodyLarge", role="textSecondary")
         self.choice: ComboBox | None = None
-        self.typed_word = label(_("On the other computers, set:"), "body", role="textSecondary")
-        self.typed = label("", "code")
-        self.typed.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.setting_title = label(_("On the other computers, set:"), "body", role="textSecondary")
+        self.setting_label = label("", "code")
+        self.setting_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.copy = IconButton(theme, "copy", _("Copy setting"))
-        self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.typed.text()))
+        self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.setting_label.text()))
         self.yes = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
         self.no = Button(theme, _("Cancel"), size="form")
         self.end = Button(theme, _("This computer only"), "lock", size="form")
@@ -51,15 +51,15 @@ class NetworkAccessSheet(Overlay):
         column.setSpacing(12)
         column.addWidget(self.heading)
         column.addWidget(self.warning)
-        self.where.addWidget(self.where_word)
-        self.where.addStretch(1)
-        column.addLayout(self.where)
+        self.address_row.addWidget(self.address_title)
+        self.address_row.addStretch(1)
+        column.addLayout(self.address_row)
         typed = QHBoxLayout()
         typed.setSpacing(8)
-        typed.addWidget(self.typed)
+        typed.addWidget(self.setting_label)
         typed.addWidget(self.copy)
         typed.addStretch(1)
-        column.addWidget(self.typed_word)
+        column.addWidget(self.setting_title)
         column.addLayout(typed)
         row = QHBoxLayout()
         row.setSpacing(8)
@@ -68,7 +68,7 @@ class NetworkAccessSheet(Overlay):
             row.addWidget(button)
         column.addLayout(row)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.no
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -90,17 +90,17 @@ class NetworkAccessSheet(Overlay):
         self.heading.setText(self._heading(is_open=is_open, can_open=can_open))
         self.warning.setText(self._message(is_open=is_open, can_open=can_open))
         if self.choice is not None:
-            self.where.removeWidget(self.choice)
+            self.address_row.removeWidget(self.choice)
             self.choice.deleteLater()
             self.choice = None
         if can_open and not is_open:
             options = [(address.host, f"{address.host} ({address.interface})") for address in addresses]
             self.choice = ComboBox(self.theme, options, name=_("Address"))
             self.choice.currentIndexChanged.connect(lambda _index: self._show_selected())
-            self.where.insertWidget(1, self.choice)
-        paint.show_when(self.where_word, self.choice is not None)
+            self.address_row.insertWidget(1, self.choice)
+        paint.show_when(self.address_title, self.choice is not None)
         self._show_setting(access.hosts[0] if is_open else addresses[0].host if addresses else "")
-        for widget in (self.typed, self.copy, self.typed_word):
+        for widget in (self.setting_label, self.copy, self.setting_title):
             paint.show_when(widget, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_local)
@@ -126,7 +126,7 @@ class NetworkAccessSheet(Overlay):
         return _("Join a Wi-Fi network or plug in a cable, then try again.")
 
     def _show_setting(self, host: str) -> None:
-        self.typed.setText(self._access.environment_variable(host))
+        self.setting_label.setText(self._access.environment_variable(host))
 
     def _show_selected(self) -> None:
         if self.choice is not None:

@@ -14,7 +14,7 @@ from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, Switch, label, paint, set_role
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
 
@@ -65,7 +65,7 @@ class OtherNetworksSheet(Overlay):
         self._timer.timeout.connect(self.show_states)
         self.closed.connect(self._timer.stop)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.rows[0].switch
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -197,7 +197,7 @@ class AddressField(QLineEdit):
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(round(theme.scaled(190)))
         self.setMaxLength(400)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
 
     def set_invalid(self, *, is_invalid: bool) -> None:
         """Show the address as invalid if `is_invalid`, else as valid."""

@@ -157,7 +157,7 @@ class Overlay(QWidget):
         self._scrim.pressed.connect(self.dismiss)
         self._stops = StopButtonWatcher(window, self)
         self._stops.changed.connect(self._on_stop_moved)
-        self._before: QWidget | None = None
+        self._previous_focus: QWidget | None = None
         self._opening = QVariantAnimation(self)
         self._opening.setStartValue(0.0)
         self._opening.setEndValue(1.0)
@@ -175,7 +175,7 @@ class Overlay(QWidget):
         """
         return self.sizeHint().boundedTo(room)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         """Return the widget that gets the focus when the sheet opens."""
         return self
 
@@ -183,7 +183,7 @@ class Overlay(QWidget):
         """Open the sheet, animated unless motion is reduced."""
         if self.isVisible():
             return
-        self._before = QApplication.focusWidget()
+        self._previous_focus = QApplication.focusWidget()
         window = self.covered_window()
         window.installEventFilter(self)
         self._stops.watch()
@@ -200,7 +200,7 @@ class Overlay(QWidget):
             self._scrim.set_opacity(1.0)
         self.show()
         self.raise_()
-        self.first().setFocus(Qt.FocusReason.PopupFocusReason)
+        self.initial_focus().setFocus(Qt.FocusReason.PopupFocusReason)
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
@@ -226,7 +226,7 @@ class Overlay(QWidget):
         self._stops.unwatch()
         self._opening.stop()
         self._finish_opening()
-        before = self._before
+        before = self._previous_focus
         if had_focus and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()

@@ -38,7 +38,7 @@ from app.ui.widgets import (
 )
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.pattern_field import PatternField
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.errors import BadTopicError
@@ -49,12 +49,12 @@ if TYPE_CHECKING:
     from app.ui.panels.base import ShowToast
     from nep.recordings.recorder import TopicSelection
 
-WIDE, HIGH, SIDE = 640, 812, 20
+WIDTH, HEIGHT, SIDE = 640, 812, 20
 MIN_DOCKED_WIDTH = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
 TOP_OFFSET = 88
 REFRESH_MS = 300
 MIN_TABLE_HEIGHT = 170
-LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
+LABEL_WIDTH, NUMBER_WIDTH, BAR_WIDTH = 80, 84, 120
 MAX_DISPLAYED_S = 2 * 86_400.0
 """Threshold in s; if the disk has space for a longer recording, the remaining time is not shown."""
 _BYTES_PER_GB = 1e9
@@ -108,7 +108,7 @@ class RecordSheet(Overlay):
         self._session, self._recordings, self._show_toast = session, session.recordings, show_toast
         self._last_state: object = None
         self._included: set[str] = set()
-        self._written: tuple[float, int] | None = None
+        self._last_size: tuple[float, int] | None = None
         self._speed: float | None = None
         self._make_meters()
         self._make_form()
@@ -122,15 +122,15 @@ class RecordSheet(Overlay):
 
     def _make_meters(self) -> None:
         self.length = RecordMeter(_("Length"))
-        self.size_so_far = RecordMeter(_("Current size"))
-        self.unkept = RecordMeter(_("Write errors"))
+        self.current_size = RecordMeter(_("Current size"))
+        self.write_errors = RecordMeter(_("Write errors"))
         self.disk = RecordMeter(_("Free space"))
         self.at_end = RecordMeter(_("Expected"))
         self._meters = Card(self.theme)
         row = QHBoxLayout(self._meters)
         row.setContentsMargins(1, 1, 1, 1)
         row.setSpacing(0)
-        meters = (self.length, self.size_so_far, self.unkept, self.disk, self.at_end)
+        meters = (self.length, self.current_size, self.write_errors, self.disk, self.at_end)
         for index, meter in enumerate(meters):
             if index:
                 self._end_line = Separator(self.theme, upright=True)
@@ -152,7 +152,7 @@ class RecordSheet(Overlay):
         self.count = label("", "small", role="textSecondary")
         self.patterns = PatternField(theme, _("Patterns"), _("/arm/* *camera* not /arm/raw"))
         self.patterns.changed.connect(self._apply_patterns)
-        self.wrong = label("", "small", role="error", wrap=True)
+        self.pattern_error = label("", "small", role="error", wrap=True)
         self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to record"))
@@ -164,12 +164,14 @@ class RecordSheet(Overlay):
             wrap=True,
         )  # fmt: skip
 
-        self.ends_min = NumberEdit(theme, MIN_MINUTES, MAX_MINUTES, pgettext("minutes", "min"), 1, empty=True)
-        self.ends_min.setAccessibleName(_("Stop after (minutes)"))
-        self.ends_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
-        self.ends_gb.setAccessibleName(_("Stop at (GB)"))
-        for field, name in ((self.ends_min, "max_minutes"), (self.ends_gb, "max_gb")):
-            field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
+        self.limit_minutes = NumberEdit(
+            theme, MIN_MINUTES, MAX_MINUTES, pgettext("minutes", "min"), 1, empty=True
+        )
+        self.limit_minutes.setAccessibleName(_("Stop after (minutes)"))
+        self.limit_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
+        self.limit_gb.setAccessibleName(_("Stop at (GB)"))
+        for field, name in ((self.limit_minutes, "max_minutes"), (self.limit_gb, "max_gb")):
+            field.setFixedWidth(round(theme.scaled(NUMBER_WIDTH)))
             field.number.connect(lambda value, name=name: self._update_limits(**{name: value}))
             field.cleared.connect(lambda name=name: self._update_limits(**{name: None}))
             field.problem_changed.connect(self._show_limits_problem)
@@ -181,7 +183,7 @@ class RecordSheet(Overlay):
         field.setPlaceholderText(example)
         field.setProperty("focusRadius", self.theme.radius("control"))
         field.setMaxLength(400)
-        ContextMenuFilter(self.theme, field)
+        FieldContextMenu(self.theme, field)
         return field
 
     def _make_flight_recorder(self, save_last: Callable[[], None]) -> None:
@@ -195,7 +197,7 @@ class RecordSheet(Overlay):
         self.size_gb.setAccessibleName(_("Maximum size on disk (GB)"))
         self.size_gb.number.connect(lambda value: self._update_flight_recorder(size_gb=value))
         for field in (self.seconds, self.size_gb):
-            field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
+            field.setFixedWidth(round(theme.scaled(NUMBER_WIDTH)))
             field.problem_changed.connect(self._show_flight_recorder_problem)
         self.ring_topics = PatternField(theme, _("Topics to keep"), _("all topics; or /arm/* *camera*"))
         self.ring_topics.editing_finished.connect(self._apply_flight_recorder_topics)
@@ -220,7 +222,7 @@ class RecordSheet(Overlay):
         form = QGridLayout()
         form.setHorizontalSpacing(8)
         form.setVerticalSpacing(8)
-        form.setColumnMinimumWidth(0, round(self.theme.scaled(LABEL_WIDE)))
+        form.setColumnMinimumWidth(0, round(self.theme.scaled(LABEL_WIDTH)))
         form.setColumnStretch(1, 1)
         modes = _flow(self.mode, self.count)
         for row, (text, field) in enumerate(((_("Name"), self.name), (_("Note"), self.note))):
@@ -229,14 +231,14 @@ class RecordSheet(Overlay):
         form.addWidget(label(_("Topics"), "body", role="textSecondary"), 2, 0)
         form.addLayout(modes, 2, 1)
         form.addWidget(self.patterns, 3, 1)
-        form.addWidget(self.wrong, 4, 1)
+        form.addWidget(self.pattern_error, 4, 1)
         return form
 
     def _limits_row(self) -> Flow:
         title = label(_("Stop"), "body", role="textSecondary")
-        title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDE)))
+        title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDTH)))
         labels = [label(_("after")), label(_("or at"))]
-        return _flow(title, labels[0], self.ends_min, labels[1], self.ends_gb, self.ends_words)
+        return _flow(title, labels[0], self.limit_minutes, labels[1], self.limit_gb, self.ends_words)
 
     def _flight_recorder_card(self) -> Card:
         box = Card(self.theme, fill="sunken")
@@ -244,7 +246,7 @@ class RecordSheet(Overlay):
         rows.setContentsMargins(12, 10, 12, 10)
         rows.setSpacing(8)
         labels = [label(each) for each in (_("keeps the last"), _("using up to"), _("on disk"))]
-        self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDE)))
+        self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDTH)))
         settings_row = _flow(self.ring, labels[0], self.seconds, labels[1], self.size_gb, labels[2])
         state_row = _flow(self.ring_bar, self.ring_words, self.keep)
         rows.addLayout(settings_row)
@@ -290,13 +292,13 @@ class RecordSheet(Overlay):
         column.addWidget(Separator(self.theme))
         column.addLayout(footer)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.record
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         min_width = self._content.minimumSizeHint().width() + 2
-        return QSize(max(round(scaled(WIDE)), min_width), round(scaled(HIGH))).boundedTo(room)
+        return QSize(max(round(scaled(WIDTH)), min_width), round(scaled(HEIGHT))).boundedTo(room)
 
     def _is_docked(self) -> bool:
         return self.covered_window().width() >= self.theme.scaled(MIN_DOCKED_WIDTH)
@@ -386,13 +388,13 @@ class RecordSheet(Overlay):
         return topic in self._included
 
     def _show_settings(self) -> None:
-        choice, settings = self.choice, self._recordings.wish
+        choice, settings = self.choice, self._recordings.ring_settings
         self.mode.set_value(choice.mode)
         self.patterns.show_patterns(choice.patterns, choice.excluded)
         self.patterns.setVisible(choice.mode == "pattern")
         problem = choice.problem if choice.mode == "pattern" else ""
         self._show_pattern_problem(problem)
-        for field, limit in ((self.ends_min, choice.max_minutes), (self.ends_gb, choice.max_gb)):
+        for field, limit in ((self.limit_minutes, choice.max_minutes), (self.limit_gb, choice.max_gb)):
             if limit is not None:
                 field.show_number(limit)
             else:
@@ -406,8 +408,8 @@ class RecordSheet(Overlay):
         self._last_state = None
 
     def _show_pattern_problem(self, problem: str) -> None:
-        self.wrong.setText(problem)
-        self.wrong.setVisible(bool(problem))
+        self.pattern_error.setText(problem)
+        self.pattern_error.setVisible(bool(problem))
         self.patterns.set_invalid(bool(problem))
 
     def show_state(self) -> None:
@@ -417,7 +419,7 @@ class RecordSheet(Overlay):
         self.record.set_label(_("Stop recording") if is_recording else _("Record"))
         self.record.setEnabled(recordings.client.state.phase != "ending")
         self.bookmark.setEnabled(recordings.client.state.phase == "recording")
-        for field in (self.name, self.note, self.mode, self.patterns, self.ends_min, self.ends_gb):
+        for field in (self.name, self.note, self.mode, self.patterns, self.limit_minutes, self.limit_gb):
             field.setEnabled(not is_recording)
         self._show_meters()
         self._show_topics()
@@ -432,24 +434,24 @@ class RecordSheet(Overlay):
     def _show_meters(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         if not recordings.is_recording:
-            self._written = self._speed = None
-            for meter in (self.length, self.size_so_far, self.unkept, self.disk):
+            self._last_size = self._speed = None
+            for meter in (self.length, self.current_size, self.write_errors, self.disk):
                 meter.set_value("")
             self._show_end(None)
             return
         elapsed = recordings.elapsed_s
-        if self._written is None or state.size_bytes < self._written[1]:
-            self._written = (elapsed, state.size_bytes)
-        elif elapsed - self._written[0] >= 1.0 and state.size_bytes != self._written[1]:
-            self._speed = (state.size_bytes - self._written[1]) / (elapsed - self._written[0])
-            self._written = (elapsed, state.size_bytes)
+        if self._last_size is None or state.size_bytes < self._last_size[1]:
+            self._last_size = (elapsed, state.size_bytes)
+        elif elapsed - self._last_size[0] >= 1.0 and state.size_bytes != self._last_size[1]:
+            self._speed = (state.size_bytes - self._last_size[1]) / (elapsed - self._last_size[0])
+            self._last_size = (elapsed, state.size_bytes)
         speed = self._speed
         begins = state.phase == "starting"
         self.length.set_value(length_text(elapsed), _("starting") if begins else _("recording"), "error")
         written = _("{speed} written").format(speed=bandwidth_text(speed)) if speed is not None else ""
-        self.size_so_far.set_value(size_text(state.size_bytes), written)
+        self.current_size.set_value(size_text(state.size_bytes), written)
         count = ngettext("{count} message", "{count} messages", state.unwritten_count)
-        self.unkept.set_value(
+        self.write_errors.set_value(
             count.format(count=group_digits(state.unwritten_count)) if state.unwritten_count else _("none"),
             _("the disk is too slow") if state.unwritten_count else _("all data written"),
             "warn" if state.unwritten_count else "ok",
@@ -473,8 +475,8 @@ class RecordSheet(Overlay):
 
     def _show_limits_problem(self, message: str) -> None:
         # Explains the limits, or what is wrong with them.
-        both = bool(self.ends_min.text() and self.ends_gb.text())
-        none = not (self.ends_min.text() or self.ends_gb.text())
+        both = bool(self.limit_minutes.text() and self.limit_gb.text())
+        none = not (self.limit_minutes.text() or self.limit_gb.text())
         usual = _("whichever comes first") if both else _("no limit") if none else ""
         self.ends_words.setText(message or usual)
         set_role(self.ends_words, "error" if message else "textSecondary")
@@ -503,7 +505,7 @@ class RecordSheet(Overlay):
 
     def _show_flight_recorder(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
-        settings = recordings.wish
+        settings = recordings.ring_settings
         self.keep.set_label(_("Save last {count} s").format(count=settings.seconds))
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
@@ -559,14 +561,14 @@ class RecordSheet(Overlay):
 
     def _update_flight_recorder(self, **changes: object) -> None:
         recordings = self._recordings
-        settings = replace(recordings.wish, **changes)  # type: ignore[arg-type]
-        if settings != recordings.wish:
+        settings = replace(recordings.ring_settings, **changes)  # type: ignore[arg-type]
+        if settings != recordings.ring_settings:
             recordings.set_ring_settings(settings)
         self._show_flight_recorder()
 
     def _apply_flight_recorder_topics(self) -> None:
         included, unwanted = self.ring_topics.patterns()
-        problem = replace(self._recordings.wish, patterns=included, excluded=unwanted).problem
+        problem = replace(self._recordings.ring_settings, patterns=included, excluded=unwanted).problem
         self.ring_topics.set_invalid(bool(problem))
         if problem:
             self._show_flight_recorder_problem(problem)

@@ -33,7 +33,7 @@ from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from app.ui.widgets.inputs.fields import LongTextField
 from nep.i18n import _, lazy
 
-WIDE, SIDE, SCROLL_BAR = 620, 19, 10
+WIDTH, SIDE, SCROLL_BAR = 620, 19, 10
 POLL_MS = 50
 ICON_SIZE = 15
 ZIP_KIND = FileKind(lazy("Zip file"), FILE_SUFFIX)
@@ -80,10 +80,10 @@ class ReportSheet(Overlay):
         self._parts: ReportParts | None = None
         self._behaviours: ReportedWorkGetter = tuple
         self._writer: ReportWriter | None = None
-        self.written: Path | None = None
+        self.written_path: Path | None = None
         """Path of the last report, or None."""
         self.introduction = label(_(INTRODUCTION), "body", role="textSecondary", wrap=True)
-        self.happened = LongTextField(theme, _("What happened?"))
+        self.description = LongTextField(theme, _("What happened?"))
         self.list = QVBoxLayout()
         self.list.setSpacing(4)
         self.work = Switch(theme, _("Include my open behaviours"))
@@ -92,9 +92,9 @@ class ReportSheet(Overlay):
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.show_file = Button(theme, _("Show the file"), "folder-open", kind="primary", size="form")
         self.write = Button(theme, _("Write report"), "file-archive", kind="primary", size="form")
-        self._looking = QTimer(self)
-        self._looking.setInterval(POLL_MS)
-        self._looking.timeout.connect(self._check_writer)
+        self._poll_timer = QTimer(self)
+        self._poll_timer.setInterval(POLL_MS)
+        self._poll_timer.timeout.connect(self._check_writer)
         self.write.clicked.connect(self._ask_path)
         self.show_file.clicked.connect(self._show_file)
         self._lay_out()
@@ -134,7 +134,7 @@ class ReportSheet(Overlay):
         column.addWidget(self.introduction)
         column.addSpacing(6)
         column.addWidget(label(_("What happened?"), "title"))
-        column.addWidget(self.happened)
+        column.addWidget(self.description)
         column.addSpacing(6)
         column.addWidget(label(_("Included"), "title"))
         column.addLayout(self.list)
@@ -167,7 +167,7 @@ class ReportSheet(Overlay):
                 line.deleteLater()
         for text in describe_contents(parts):
             self.list.addWidget(_PartRow(self.theme, text, "check"))
-        self._excluded_rows[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
+        self._excluded_rows[0].text_label.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
         self.names.setText(work_text(names) if names else "")
         for widget in (self.work, self.names):
@@ -176,12 +176,12 @@ class ReportSheet(Overlay):
             self._set_status("")
         self.open()
 
-    def first(self) -> QWidget:
-        return self.happened.edit
+    def initial_focus(self) -> QWidget:
+        return self.description.edit
 
     def preferred_size(self, room: QSize) -> QSize:
         buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
-        width = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
+        width = min(room.width(), max(round(self.theme.scaled(WIDTH)), buttons))
         layout = self._content.layout()
         inner = width - 2 - SCROLL_BAR
         content_height = layout.totalHeightForWidth(inner) if layout is not None else 0
@@ -193,7 +193,7 @@ class ReportSheet(Overlay):
 
     def _set_status(self, text: str, role: str = "textSecondary", path: Path | None = None) -> None:
         # If there is a path, the button to show the file appears.
-        self.written = path
+        self.written_path = path
         set_role(self.state, role)
         self.state.setText(text)
         paint.show_when(self.state, bool(text))
@@ -215,19 +215,19 @@ class ReportSheet(Overlay):
         parts = self._parts
         if parts is None or self._writer is not None:
             return
-        happened = self.happened.text()
+        happened = self.description.text()
         behaviours = tuple(self._behaviours()) if self.work.isChecked() else ()
         # A copy, because settings may change while the thread reads them.
         parts_copy = replace(parts, settings=dict(parts.settings))
         self._writer = ReportWriter(path, lambda: create_report(parts_copy, happened, behaviours))
         self._set_status(_("Writing the report."))
-        self._looking.start()
+        self._poll_timer.start()
 
     def _check_writer(self) -> None:
         writer = self._writer
         if writer is None or not writer.is_done:
             return
-        self._looking.stop()
+        self._poll_timer.stop()
         self._writer = None
         if writer.problem:
             self._set_status(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
@@ -235,15 +235,15 @@ class ReportSheet(Overlay):
         else:
             message = _("The report is in {file}").format(file=without_home(str(writer.path)))
             self._set_status(message, path=writer.path)
-            self.happened.set_text("")
+            self.description.set_text("")
         if self.isVisible():
             (self.show_file if not writer.problem else self.write).setFocus(Qt.FocusReason.OtherFocusReason)
         else:
             self._notify(message)
 
     def _show_file(self) -> None:
-        if self.written is not None:
-            folder = self.written.parent
+        if self.written_path is not None:
+            folder = self.written_path.parent
             if not open_externally(QUrl.fromLocalFile(str(folder))):
                 self._notify(_("The file is in {folder}").format(folder=folder))
 
@@ -254,10 +254,10 @@ class _PartRow(QWidget):
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__()
         self._theme, self._icon = theme, icon
-        self.words: QLabel = label(text, "body", wrap=True)
+        self.text_label: QLabel = label(text, "body", wrap=True)
         row = QHBoxLayout(self)
         row.setContentsMargins(ICON_SIZE + 8, 0, 0, 0)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

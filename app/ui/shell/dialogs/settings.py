@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
-from app.core.robots.last_robots import COME_BACK
+from app.core.robots.last_robots import RESTART_SETTING
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
@@ -56,7 +56,7 @@ class SettingsSheet(Overlay):
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
-        self.from_next_start = label(_("Applies after restarting Studio"), "body", role="textSecondary")
+        self.restart_hint = label(_("Applies after restarting Studio"), "body", role="textSecondary")
         self.restart = Button(theme, _("Restart now"), "rotate-ccw", size="form")
         self._can_restart = restart is not None
         if restart is not None:
@@ -79,7 +79,7 @@ class SettingsSheet(Overlay):
         self.text.changed.connect(lambda percent: self._apply(lambda: theme.set_text_percent(int(percent))))
         self.contrast.changed.connect(self._set_contrast)
         self.motion.changed.connect(self._set_motion)
-        self.robots.clicked.connect(lambda on: state.save(COME_BACK, on))
+        self.robots.clicked.connect(lambda on: state.save(RESTART_SETTING, on))
         self.choose.clicked.connect(self._ask_folder)
         self._lay_out()
         theme.changed.connect(self._show)
@@ -124,7 +124,7 @@ class SettingsSheet(Overlay):
         pictures.addWidget(self.choose)
         language_row = QHBoxLayout()
         language_row.addWidget(self.language)
-        language_row.addWidget(self.from_next_start)
+        language_row.addWidget(self.restart_hint)
         language_row.addWidget(self.restart)
         language_row.addStretch(1)
         voice_row = QHBoxLayout()
@@ -148,7 +148,7 @@ class SettingsSheet(Overlay):
             else:
                 grid.addLayout(control, row, 1)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         if isinstance(self.language, ComboBox):
             return self.language
         return self.language.selected_button() or self
@@ -170,13 +170,13 @@ class SettingsSheet(Overlay):
         language = self._selected_language()
         self.language.set_value(language)
         is_new = language != i18n.language()
-        self.from_next_start.setVisible(is_new and not self._can_restart)
+        self.restart_hint.setVisible(is_new and not self._can_restart)
         self.restart.setVisible(is_new and self._can_restart)
         self.mode.set_value(theme.mode)
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
         self.motion.set_value(theme.motion)
-        self.robots.setChecked(self._settings.get(COME_BACK, True))
+        self.robots.setChecked(self._settings.get(RESTART_SETTING, True))
         self.folder.setText(str(snapshots.folder(self._settings)))
         if self.isVisible():
             self.place()

@@ -18,7 +18,7 @@ from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Match, match
 from nep.i18n import _, lazy
 
-WIDE, HIGH = 680, 640
+WIDTH, HEIGHT = 680, 640
 MODIFIER_KEYS = frozenset(
     {
         Qt.Key.Key_Control,
@@ -44,11 +44,11 @@ class ShortcutSheet(Overlay):
     def __init__(self, theme: Theme, window: QWidget, shortcuts: Shortcuts) -> None:
         super().__init__(theme, window, _("Keyboard shortcuts"))
         self._shortcuts = shortcuts
-        self._waiting = ""
+        self._recorded_command = ""
         self._offer: tuple[str, str] | None = None  # command, and the key that another command holds
         self.field = SearchField(theme, _("Find a command or key"))
         self.rows = EntryList(theme, _("Keyboard shortcuts"))
-        self.said = label(_(HINT), "body", role="textSecondary", wrap=True)
+        self.hint = label(_(HINT), "body", role="textSecondary", wrap=True)
         self.swap = Button(theme, _("Swap shortcuts"), size="small")
         self.reset = Button(theme, _("Reset this shortcut"), size="small")
         self.reset_all = Button(theme, _("Reset all"), size="small")
@@ -66,7 +66,7 @@ class ShortcutSheet(Overlay):
         header = self.make_header(label(_("Keyboard shortcuts"), "heading"))
         footer = QHBoxLayout()
         footer.setSpacing(8)
-        footer.addWidget(self.said, 1)
+        footer.addWidget(self.hint, 1)
         for button in (self.swap, self.reset, self.reset_all):
             footer.addWidget(button)
         column = QVBoxLayout(self)
@@ -82,12 +82,12 @@ class ShortcutSheet(Overlay):
             column.addLayout(row, 1 if part is self.rows else 0)
         paint.show_when(self.swap, False)
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.field
 
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
+        return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), round(scaled(HEIGHT))))
 
     def open(self) -> None:
         """Open the sheet without a filter."""
@@ -146,7 +146,7 @@ class ShortcutSheet(Overlay):
         self.reset_all.setEnabled(
             any(self._shortcuts.is_customised(name) for name in self._shortcuts.commands)
         )
-        if entry is not None and self.isVisible() and not self._waiting:
+        if entry is not None and self.isVisible() and not self._recorded_command:
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
     def record(self) -> None:
@@ -157,8 +157,8 @@ class ShortcutSheet(Overlay):
         if entry.kind != "command":
             self._set_status(_("The shortcut of “{command}” wasn't changed.").format(command=entry.text))
             return
-        self._waiting, self._offer = entry.name, None
-        self.rows.look.waiting = entry.id
+        self._recorded_command, self._offer = entry.name, None
+        self.rows.delegate.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
         message = _("Press the new shortcut for “{command}”. Esc cancels.")
@@ -166,21 +166,21 @@ class ShortcutSheet(Overlay):
         self.rows.viewport().update()
 
     def _stop_recording(self, message: str = "") -> None:
-        self._waiting = self.rows.look.waiting = ""
+        self._recorded_command = self.rows.delegate.waiting = ""
         self._offer = None
         paint.show_when(self.swap, False)
         self._set_status(message or _(HINT))
         self.rows.viewport().update()
 
     def _set_status(self, message: str) -> None:
-        self.said.setText(message)
+        self.hint.setText(message)
         if message != _(HINT) and self.isVisible():
-            paint.announce(self.said, message)
+            paint.announce(self.hint, message)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is not self.field:
             return super().eventFilter(watched, event)
-        if event.type() == QEvent.Type.ShortcutOverride and self._waiting:
+        if event.type() == QEvent.Type.ShortcutOverride and self._recorded_command:
             pressed = cast("QKeyEvent", event)
             if pressed.key() != Qt.Key.Key_F12:  # F12 triggers Stop even while a key is recorded
                 event.accept()
@@ -191,7 +191,7 @@ class ShortcutSheet(Overlay):
 
     def _handle_key(self, pressed: QKeyEvent) -> bool:
         key = pressed.key()
-        if self._waiting:
+        if self._recorded_command:
             if key not in MODIFIER_KEYS:
                 self._assign(pressed)
             return True
@@ -202,10 +202,10 @@ class ShortcutSheet(Overlay):
             self._remove_shortcut()
             return True
         is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-        return is_unmodified and self.rows.handle(key)
+        return is_unmodified and self.rows.handle_key(key)
 
     def _assign(self, pressed: QKeyEvent) -> None:
-        name, key = self._waiting, format_key(pressed.keyCombination())
+        name, key = self._recorded_command, format_key(pressed.keyCombination())
         if pressed.key() == Qt.Key.Key_Escape:
             self._stop_recording()
             return

@@ -74,7 +74,7 @@ class VersionHistorySheet(Overlay):
         # `open_copy` gets the file of a version and a name for the copy.
         super().__init__(theme, window, _("Earlier versions"))
         self._open_copy, self._save = open_copy, save
-        self._now: Mapping[str, object] = {}
+        self._current_workspace: Mapping[str, object] = {}
         self._name = ""
         self._versions: dict[str, Version] = {}
         self._unread: deque[str] = deque()
@@ -84,8 +84,8 @@ class VersionHistorySheet(Overlay):
         self.empty = EmptyState(theme, "history", "", "")
         self.hint = label(_(HINT), "body", role="textSecondary", wrap=True)
         self.button = Button(theme, _("Open a copy"), "file-plus", kind="primary", size="form")
-        self._reading = QTimer(self)
-        self._reading.timeout.connect(self._read_next)
+        self._read_timer = QTimer(self)
+        self._read_timer.timeout.connect(self._read_next)
         self._lay_out()
         self.rows.installEventFilter(self)
         self.rows.doubleClicked.connect(lambda _index: self.open_selected())
@@ -126,7 +126,7 @@ class VersionHistorySheet(Overlay):
             now: Current time, for the formatted dates; default: the system time.
             title: Name with folder, if another open behaviour has the same name.
         """
-        self._name, self._now = name, workspace
+        self._name, self._current_workspace = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
         own_versions = versions_of(path) if path is not None else []
         others = namesakes_of(path) if path is not None else []
@@ -144,7 +144,7 @@ class VersionHistorySheet(Overlay):
         for widget, needs_lines in ((self.rows, True), (self._footer, True), (self.empty, False)):
             paint.show_when(widget, needs_lines == bool(lines))
         self.rows.show_lines(lines)
-        self._reading.start(0)
+        self._read_timer.start(0)
         self.open()
 
     def _show_empty_state(self, name: str, path: Path | None) -> None:
@@ -159,7 +159,7 @@ class VersionHistorySheet(Overlay):
         written = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
         return Match(Entry(f"version:{version.copy}", date_time_text(written, now), "history"))
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.rows if self._versions else self.empty.findChild(Button) or self
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -174,19 +174,21 @@ class VersionHistorySheet(Overlay):
 
     def _read_next(self) -> None:
         if not self._unread or not self.isVisible():
-            self._reading.stop()
+            self._read_timer.stop()
             return
         id = self._unread.popleft()
         note = reason = ""
         try:
             version = self._versions[id]
-            note = difference_text(difference(read_file(version.copy, version.name).workspace, self._now))
+            note = difference_text(
+                difference(read_file(version.copy, version.name).workspace, self._current_workspace)
+            )
         except DocumentError as error:
             reason = error.reason
         self.rows.update_entry(id, note, reason)
 
     @property
-    def read(self) -> bool:
+    def has_read_all(self) -> bool:
         """True once all versions were read and compared."""
         return not self._unread
 
@@ -196,7 +198,7 @@ class VersionHistorySheet(Overlay):
             if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
                 self.open_selected()
                 return True
-            return self.rows.handle(key)
+            return self.rows.handle_key(key)
         return super().eventFilter(watched, event)
 
     def open_selected(self) -> None:

@@ -130,7 +130,7 @@ class FailedPanel(PanelWidget):
         self._description = description
         self._error: BaseException | None = error
         self._state: Mapping[str, object] = {}
-        self.take: Callable[[PanelWidget], object] = lambda _panel: None
+        self.on_created: Callable[[PanelWidget], object] = lambda _panel: None
         """Called with the panel when its creation succeeds."""
 
     def refresh(self) -> None:
@@ -138,7 +138,7 @@ class FailedPanel(PanelWidget):
         if error is not None:
             raise error
         panel = self._description.make(self.context)
-        self.take(panel)
+        self.on_created(panel)
         panel.restore_state(self._state)
 
     def save_state(self) -> dict[str, object]:
@@ -403,7 +403,7 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
         traceback.clear_frames(error.__traceback__)
         failed_panel = FailedPanel(context, description, error)
     dock = Dock(context.theme, description, failed_panel, density, number)
-    failed_panel.take = dock.replace
+    failed_panel.on_created = dock.replace
     return dock
 
 

@@ -34,7 +34,7 @@ class SavedLayouts:
 
     def __init__(self, state: WindowState, report_error: Callable[[str], object]) -> None:
         # `report_error` is called with a message about damaged entries.
-        self._state, self._complain = state, report_error
+        self._state, self._report_error = state, report_error
         self._current: dict[str, str] = {}
 
     def all(self) -> tuple[CustomLayout, ...]:
@@ -87,11 +87,11 @@ class SavedLayouts:
             restored = bench.restore(saved)
         except Exception as error:  # noqa: BLE001  whatever was in the file, the window opens
             restored = False
-            self._complain(f"{type(error).__name__}: {error}")
+            self._report_error(f"{type(error).__name__}: {error}")
         if not restored:
             bench.reset_layout()
             message = _("Can't restore the layout “{name}”; using its default.")
-            self._complain(message.format(name=name or _(layout_named(base).title)))
+            self._report_error(message.format(name=name or _(layout_named(base).title)))
 
     def save(self, bench: Workbench, base: str) -> None:
         """Save the arrangement of a workbench for its current layout."""
@@ -133,7 +133,7 @@ class SavedLayouts:
         try:
             return bench.restore(saved)
         except Exception as error:  # noqa: BLE001  whatever was in the file, the window stays
-            self._complain(f"{type(error).__name__}: {error}")
+            self._report_error(f"{type(error).__name__}: {error}")
             return False
         finally:
             self.restore(bench, base)

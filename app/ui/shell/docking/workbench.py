@@ -51,15 +51,15 @@ class Workbench(QMainWindow):
         self.docks: dict[str, Dock] = {}
         self._prepared_docks: dict[str, Dock] = {}  # created in advance
         self._floating: list[Dock] = []
-        self._sharing: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
+        self._tab_groups: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
         self._folded: tuple[Fold, ...] = ()  # active folds, because of a small window or large text
         self._unfolded_state = QByteArray()  # state before folding
         self._arranged = False
-        self._moved = False  # the user has moved a separator
+        self._has_moved_separator = False  # the user has moved a separator
         self._focus_order: list[str] = []  # panels by last focus, latest at the end
-        self._halves: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
-        self._heights: dict[str, int] = {}  # last heights of closed panels below all others
-        self._set_aside: dict[str, Mapping[str, object]] = {}  # states of panels that a reset deleted
+        self._split_pair: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
+        self._bottom_heights: dict[str, int] = {}  # last heights of closed panels below all others
+        self._deleted_states: dict[str, Mapping[str, object]] = {}  # states of panels that a reset deleted
         self._reopened: Dock | None = None  # dock whose height is to be restored
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
@@ -96,9 +96,9 @@ class Workbench(QMainWindow):
             self.removeDockWidget(old)
             if old.description.allows_multiple and old.key not in self._layout.default_panels:
                 if old.number == 1:
-                    self._set_aside[old.key] = old.saved_state()
+                    self._deleted_states[old.key] = old.saved_state()
                 self._delete_dock(old)  # otherwise a plot would keep its subscriptions
-        self._halves = None
+        self._split_pair = None
         # All columns first, then the rows of each: otherwise the rows would extend across the columns.
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
@@ -113,7 +113,7 @@ class Workbench(QMainWindow):
             above = top_dock
             for names in rows:
                 above = self._add_docks(names, above, None) or above
-        self._arranged, self._moved, self._folded = True, False, ()
+        self._arranged, self._has_moved_separator, self._folded = True, False, ()
         self._resize_docks()
         self._size_timer.start(0)
         self._update_folds()
@@ -141,16 +141,16 @@ class Workbench(QMainWindow):
 
     def _resize_docks(self) -> None:
         # Has no effect if the user has moved a separator.
-        halves, self._halves = self._halves, None
+        halves, self._split_pair = self._split_pair, None
         if halves is not None:
             orientation = HORIZONTAL if halves[0].y() == halves[1].y() else VERTICAL
             self.resizeDocks(halves, [1, 1], orientation)
         reopened, self._reopened = self._reopened, None
-        if reopened is not None and self._moved:
+        if reopened is not None and self._has_moved_separator:
             gap = self._theme.size("gap", self._layout.density)
             below = self._resize_bottom_dock(self._theme.scaled(1))
             shrink_above(self, self.docks.values(), MAIN_AREA, gap, below=below + gap)
-        if self._arranged and not self._moved and not self._fold_timer.isActive():
+        if self._arranged and not self._has_moved_separator and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
             below = self._resize_bottom_dock(scale)
             fit(
@@ -174,7 +174,7 @@ class Workbench(QMainWindow):
                 or self.dockWidgetArea(dock) != BOTTOM_AREA
             ):
                 continue
-            dock_height = self._heights.get(name) if self._moved else None
+            dock_height = self._bottom_heights.get(name) if self._has_moved_separator else None
             dock_height = dock_height or round(min(height * scale, MAX_BOTTOM_SHARE * self.height()))
             self.resizeDocks([dock], [dock_height], VERTICAL)
             return dock_height
@@ -182,7 +182,9 @@ class Workbench(QMainWindow):
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
-            self._moved = self._moved or self.isSeparator(event.position().toPoint())
+            self._has_moved_separator = self._has_moved_separator or self.isSeparator(
+                event.position().toPoint()
+            )
         return super().event(event)
 
     def _dock(self, key: str) -> Dock | None:
@@ -203,8 +205,8 @@ class Workbench(QMainWindow):
         if name in self._layout.min_heights:
             dock.visibilityChanged.connect(lambda: self._size_timer.start(0))
         self.docks[key] = dock
-        if key in self._set_aside:
-            dock.restore_state(self._set_aside.pop(key))
+        if key in self._deleted_states:
+            dock.restore_state(self._deleted_states.pop(key))
         return dock
 
     def open(self, name: str) -> Dock | None:
@@ -272,7 +274,7 @@ class Workbench(QMainWindow):
             return None
         old = self.docks.get(key)
         insert_beside(self, self._layout, self.docks, dock, old)
-        self._moved, self._halves = True, (old, dock) if old is not None else None
+        self._has_moved_separator, self._split_pair = True, (old, dock) if old is not None else None
         self._size_timer.start(0)
         dock.show()
         dock.raise_()
@@ -304,7 +306,7 @@ class Workbench(QMainWindow):
         # An additional panel is deleted unless it is reopened immediately.
         dock = self.docks.get(key)
         if dock is not None and key in self._layout.bottom_heights and not dock.isFloating():
-            self._heights[key] = dock.height()
+            self._bottom_heights[key] = dock.height()
         if dock is None or dock.number == 1:
             return
         state = dock.saved_state()
@@ -321,13 +323,13 @@ class Workbench(QMainWindow):
 
     def _delete_dock(self, dock: Dock) -> None:
         self.docks.pop(dock.key, None)
-        self._sharing.pop(dock, None)
-        for together in self._sharing.values():
+        self._tab_groups.pop(dock, None)
+        for together in self._tab_groups.values():
             if dock in together:
                 together.remove(dock)
         self._focus_order = [key for key in self._focus_order if key != dock.key]
         self._floating = [each for each in self._floating if each is not dock]
-        self._halves = None
+        self._split_pair = None
         dock.dispose()
         self.removeDockWidget(dock)
         dock.deleteLater()
@@ -358,7 +360,7 @@ class Workbench(QMainWindow):
                         for other in together
                     ]
                 )
-            self._sharing[dock] = together
+            self._tab_groups[dock] = together
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -472,7 +474,7 @@ class Workbench(QMainWindow):
                 continue
             self._report_failure(name, dock.refresh())
             if dock.is_displayed():
-                dock.title.show_badges([other.badge() for other in self._sharing.get(dock, ())])
+                dock.title.show_badges([other.badge() for other in self._tab_groups.get(dock, ())])
 
     def _report_failure(self, name: str, message: str | None) -> None:
         if message is not None:
@@ -502,7 +504,7 @@ class Workbench(QMainWindow):
             "wide": encode_state(self._unfolded_state),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
             "folds": [fold.panels[0] for fold in self._folded],
-            "moved": self._moved,
+            "moved": self._has_moved_separator,
         }
 
     def restore(self, saved: Mapping[str, object]) -> bool:
@@ -523,7 +525,7 @@ class Workbench(QMainWindow):
             return False
         self._size_timer.stop()  # keep the saved sizes instead of those of `_resize_docks`
         self._unfolded_state = decode_state(saved.get("wide"))
-        self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
+        self._folded, self._has_moved_separator = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             panel_state = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(panel_state, Mapping):

@@ -28,7 +28,7 @@ class Art(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(300, ART_HEIGHT)
 
-    def picture(self, painter: QPainter, area: QRectF) -> None:
+    def paint_picture(self, painter: QPainter, area: QRectF) -> None:
         """Paint the illustration into a rectangle. Subclasses implement this."""
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -36,7 +36,7 @@ class Art(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         area = QRectF(self.rect())
         painter.setClipPath(upper_corners(area, self._theme.radius("card") - 1))
-        self.picture(painter, area)
+        self.paint_picture(painter, area)
         paint.hairline(painter, area, Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
 
@@ -59,7 +59,7 @@ class RobotArt(Art):
         self._pixmap_cache: tuple[tuple[object, ...], QPixmap] | None = None
         self.setAccessibleName(_("A small white robot in a room, waving"))
 
-    def picture(self, painter: QPainter, area: QRectF) -> None:
+    def paint_picture(self, painter: QPainter, area: QRectF) -> None:
         room = QRectF(area.left(), area.top() - 55, area.width(), ROOM_HEIGHT)
         painter.drawPixmap(area.topLeft(), self._cached_pixmap(room, area))
 
@@ -88,7 +88,7 @@ class EmptyPageArt(Art):
             _("An empty page with the block “{block}”").format(block=pgettext("block", "when started"))
         )
 
-    def picture(self, painter: QPainter, area: QRectF) -> None:
+    def paint_picture(self, painter: QPainter, area: QRectF) -> None:
         theme = self._theme
         paint_grid(painter, area, theme)
         left, top = area.left() + max(24.0, area.width() / 2 - 108), area.top() + 41
@@ -127,7 +127,7 @@ class StepsArt(Art):
         super().__init__(theme)
         self.setAccessibleName(_("Three steps, two of them done"))
 
-    def picture(self, painter: QPainter, area: QRectF) -> None:
+    def paint_picture(self, painter: QPainter, area: QRectF) -> None:
         theme = self._theme
         painter.fillRect(area, theme.colour("workspace"))
         font, strong = theme.font("body"), theme.font("body")

@@ -17,7 +17,7 @@ from app.ui.widgets import label, paint
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
-HEIGHT, TILE, LEFT = 56, 30, 54
+HEIGHT, TILE_SIZE, TEXT_LEFT = 56, 30, 54
 COLUMNS = 3
 DOT_SIZE = 7.0
 
@@ -79,14 +79,14 @@ class OpenRow(PaintedButton):
         edge = theme.colour("borderStrong" if self.is_highlighted else "border")
         fill = theme.colour("hover" if self.is_highlighted else "panel")
         paint.box(painter, rect, theme.radius("panel"), fill, edge)
-        tile = QRectF(12, rect.center().y() - TILE / 2, TILE, TILE)
+        tile = QRectF(12, rect.center().y() - TILE_SIZE / 2, TILE_SIZE, TILE_SIZE)
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
         link, text = theme.font("button"), _("Resume")
         side = theme.scaled(14)
         link_width = paint.width_of(link, text) + 6 + side
-        room = QRectF(LEFT, rect.top(), rect.width() - LEFT - link_width - 26, rect.height())
+        room = QRectF(TEXT_LEFT, rect.top(), rect.width() - TEXT_LEFT - link_width - 26, rect.height())
         self._paint_text(painter, room)
         accent = theme.colour("accentText")
         area = QRectF(rect.right() - 14 - link_width, rect.top(), link_width - side - 6, rect.height())

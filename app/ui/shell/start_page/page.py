@@ -37,7 +37,7 @@ from nep.i18n import _, lazy, ngettext, translate
 
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
 TOP_MARGIN = 35
-BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
+BANNER_ROOM, TALL_PAGE_HEIGHT, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
 """Space above the question for an alert, so that it covers no text; a low page has space for one line.
 
 Values are in px at 100 % text.
@@ -54,7 +54,7 @@ ALL_EXAMPLES_TEXTS = {
 }
 """Texts of the link to all examples, by the number of examples, which is spelled out."""
 MAX_RECENT = 3
-FIRST, OTHER = 408, 318  # relative widths of the first card and the others
+FIRST_CARD_STRETCH, OTHER_CARD_STRETCH = 408, 318  # relative widths of the first card and the others
 LEARN_TEXTS = (
     lazy("Learn in five minutes"),
     lazy("Six steps to a robot that speaks and turns. Each is checked off as you go."),
@@ -130,8 +130,8 @@ class StartPage(QWidget):
         leave = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         leave.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         leave.activated.connect(self.exited)
-        self._use = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
-        self._use.clicked.connect(self.virtual_robot_pressed)
+        self._use_button = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
+        self._use_button.clicked.connect(self.virtual_robot_pressed)
         self._new = Button(theme, _("New behaviour"), size="large")
         self._new.clicked.connect(self.new_behaviour_pressed)
         self.robot_card = StartCard(
@@ -139,7 +139,7 @@ class StartPage(QWidget):
             RobotArt(theme),
             _("Connect a robot"),
             _("A virtual Pepper comes with Studio. You can use it now and connect a real one later."),
-            [self._use],
+            [self._use_button],
         )
         self.new_card = StartCard(
             theme,
@@ -155,7 +155,7 @@ class StartPage(QWidget):
         self._not_now.hide()
         title, text = LEARN_TEXTS
         self.learn_card = StartCard(theme, StepsArt(theme), _(title), _(text), [self._learn, self._not_now])
-        self._offers = False
+        self._is_offering_first_steps = False
         self._shows_all = False
         self._recent_box = QWidget()
         self._open = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
@@ -189,14 +189,14 @@ class StartPage(QWidget):
         cards = self._cards = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         cards.setSpacing(CARD_GAP)
         for index, card in enumerate(self._ordered_cards()):
-            cards.addWidget(card, OTHER if index else FIRST)
+            cards.addWidget(card, OTHER_CARD_STRETCH if index else FIRST_CARD_STRETCH)
         column.addLayout(cards)
         column.addSpacing(26)
-        self._all = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
-        self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
+        self._all_button = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
+        self._all_button.clicked.connect(lambda: self.show_all(not self._shows_all))
         header = self._heading_row(label(_("Open an example"), "heading"), self._open)
         header.addSpacing(8)
-        header.addWidget(self._all)
+        header.addWidget(self._all_button)
         column.addLayout(header)
         column.addSpacing(10)
         column.addLayout(self._example_grid(examples))
@@ -248,7 +248,7 @@ class StartPage(QWidget):
 
     def _fit_room(self) -> None:
         min_room = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP_MARGIN
-        room = max(BANNER_ROOM if self.height() >= HIGH else 0, min_room)
+        room = max(BANNER_ROOM if self.height() >= TALL_PAGE_HEIGHT else 0, min_room)
         if room != self._banner_room.sizeHint().height():
             self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
             self._content.invalidate()
@@ -263,27 +263,27 @@ class StartPage(QWidget):
         if self._cards.direction() != direction:
             self._cards.setDirection(direction)
         for card in cards:
-            card.art.setVisible(fits_in_row or self.height() >= HIGH)
+            card.art.setVisible(fits_in_row or self.height() >= TALL_PAGE_HEIGHT)
 
     def _ordered_cards(self) -> list[StartCard]:
         # The first card is the widest and has the primary button.
         cards = [self.robot_card, self.new_card]
-        cards.insert(0 if self._offers else len(cards), self.learn_card)
+        cards.insert(0 if self._is_offering_first_steps else len(cards), self.learn_card)
         return cards
 
     @property
     def offers_first_steps(self) -> bool:
         """True if the card with the first steps is the primary one."""
-        return self._offers
+        return self._is_offering_first_steps
 
     def offer_first_steps(self, offers: bool = True) -> None:
         """Make the card with the first steps the primary one if `offers`, else one of three equal cards."""
-        if offers == self._offers:
+        if offers == self._is_offering_first_steps:
             return
-        self._offers = offers
+        self._is_offering_first_steps = offers
         had_focus = self._not_now.hasFocus()
         self._learn.set_kind("primary" if offers else "plain")
-        self._use.set_kind("plain" if offers else "primary")
+        self._use_button.set_kind("plain" if offers else "primary")
         title, text = OFFER_TEXTS if offers else LEARN_TEXTS
         self.learn_card.set_texts(_(title), _(text))
         self.learn_card.border = "accent" if offers else "border"
@@ -291,7 +291,7 @@ class StartPage(QWidget):
         cards = self._ordered_cards()
         for index, card in enumerate(cards):
             self._cards.removeWidget(card)
-            self._cards.insertWidget(index, card, OTHER if index else FIRST)
+            self._cards.insertWidget(index, card, OTHER_CARD_STRETCH if index else FIRST_CARD_STRETCH)
         for before, after in itertools.pairwise(
             [each for card in cards for each in card.findChildren(Button)]
         ):
@@ -330,9 +330,9 @@ class StartPage(QWidget):
         self._shows_all = visible
         for card in self.example_cards[EXAMPLES_PER_ROW:]:
             paint.show_when(card, visible)
-        paint.show_when(self._all, len(self.example_cards) > EXAMPLES_PER_ROW)
+        paint.show_when(self._all_button, len(self.example_cards) > EXAMPLES_PER_ROW)
         text = _("Fewer examples") if visible else all_examples_text(len(self.example_cards))
-        self._all.set_label(text, None if visible else "arrow-right")
+        self._all_button.set_label(text, None if visible else "arrow-right")
 
     def focus_examples(self) -> None:
         """Show all examples and focus the first one."""
@@ -401,5 +401,5 @@ class StartPage(QWidget):
         """Set the focus to the primary button and scroll to the top."""
         self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
-        first = self._learn if self._offers else self._use
+        first = self._learn if self._is_offering_first_steps else self._use_button
         (rows[0] if rows else first).setFocus(Qt.FocusReason.OtherFocusReason)

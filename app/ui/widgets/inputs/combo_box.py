@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QComboBox, QStyledItemDelegate
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.menus import cut, set_round_corners
+from app.ui.widgets.menus import clip_corners, set_round_corners
 
 MAX_VISIBLE_ITEMS = 12
 
@@ -56,7 +56,7 @@ class ComboBox(QComboBox):
 
     def showPopup(self) -> None:
         super().showPopup()
-        cut(self.view().window(), self._theme.radius("panel"))
+        clip_corners(self.view().window(), self._theme.radius("panel"))
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self.hasFocus():

@@ -11,7 +11,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import has_no_modifiers
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 from nep.i18n import number as number_text
 
@@ -33,7 +33,7 @@ class SearchField(QLineEdit):
         self.setProperty("quiet", "true")
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumHeight(26)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self._arrange()
         theme.changed.connect(self._arrange)
 
@@ -107,7 +107,7 @@ class NumberEdit(QLineEdit):
         self._may_be_empty = empty
         self._theme, self._unit, self._decimals = theme, unit, decimals
         self._minimum, self._maximum = minimum, maximum
-        self.sentence = ""
+        self.problem = ""
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setMinimumHeight(theme.size("control", "form") - 2)
         self.setProperty("focusRadius", theme.radius("control"))
@@ -150,9 +150,9 @@ class NumberEdit(QLineEdit):
         return f"{number_text(value)} {self._unit}".rstrip()
 
     def _set_problem(self, message: str) -> None:
-        if message == self.sentence:
+        if message == self.problem:
             return
-        self.sentence = message
+        self.problem = message
         self.setProperty("wrong", "true" if message else "false")
         self.style().unpolish(self)
         self.style().polish(self)
@@ -166,7 +166,7 @@ class NumberEdit(QLineEdit):
         paint.text_line(
             painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT
         )
-        if self.sentence:
+        if self.problem:
             icon_rect = QRectF(7, self.height() / 2 - 7, 14, 14)
             paint_icon(painter, icon_rect, theme.status("error").icon, theme.colour("error"))
         painter.end()
@@ -222,7 +222,7 @@ class LongTextField(QWidget):
         self.setProperty("focusRadius", theme.radius("control"))
         self.edit = _MultiLineEdit()
         self.edit.setAccessibleName(name)
-        ContextMenuFilter(theme, self.edit)
+        FieldContextMenu(theme, self.edit)
         self.setFocusProxy(self.edit)
         row = QHBoxLayout(self)
         row.setContentsMargins(3, 2, 3, 1)
@@ -255,7 +255,7 @@ class LongTextField(QWidget):
             self._is_invalid = is_invalid
             self.update()
 
-    def _lines(self) -> int:
+    def _line_count(self) -> int:
         lines = 0
         block = self.edit.document().firstBlock()
         while block.isValid() and lines < MAX_LINES:
@@ -267,7 +267,7 @@ class LongTextField(QWidget):
         return paint.height_of(self.edit.font())
 
     def _grow(self) -> None:
-        lines = self._lines()
+        lines = self._line_count()
         text = round(lines * self._line_height()) + SHEET_PADDING
         height = max(round(self._theme.scaled(MIN_HEIGHT)), text + 8)
         self.edit.setFixedHeight(text)

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QTextEdit, QVBoxLayout, QW
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 
 INDENT = 2
 # The first matching rule applies: strings before their contents, keys before strings.
@@ -87,9 +87,9 @@ class JsonLinesEdit(QPlainTextEdit):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setTabChangesFocus(True)
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        self.colours = _JsonHighlighter(self.document(), theme)
+        self.highlighter = _JsonHighlighter(self.document(), theme)
         self._numbers = _LineNumberArea(self)
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self.blockCountChanged.connect(self._update_margins)
         self.updateRequest.connect(self._on_scrolled)
         theme.changed.connect(self._restyle)
@@ -99,7 +99,7 @@ class JsonLinesEdit(QPlainTextEdit):
         font = self._theme.font("code")
         font.setPixelSize(round(self._theme.scaled(13)))
         self.setFont(font)
-        self.colours.rehighlight()
+        self.highlighter.rehighlight()
         self._update_margins()
         self.mark_line(self.wrong_line)
 
@@ -242,9 +242,9 @@ class JsonEdit(QWidget):
 
     def set_highlighting(self, is_json: bool) -> None:
         """Enable syntax highlighting if the text is JSON, else disable it."""
-        if self.edit.colours.is_on != is_json:
-            self.edit.colours.is_on = is_json
-            self.edit.colours.rehighlight()
+        if self.edit.highlighter.is_on != is_json:
+            self.edit.highlighter.is_on = is_json
+            self.edit.highlighter.rehighlight()
 
     def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""

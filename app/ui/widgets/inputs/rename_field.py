@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets.keyboard import has_no_modifiers
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 
 
 class RenameField(QLineEdit):
@@ -41,7 +41,7 @@ class RenameField(QLineEdit):
         self._callback, self._is_closed = callback, False
         self.setAccessibleName(accessible_name)
         self.setProperty("focusRadius", theme.radius("control"))
-        ContextMenuFilter(theme, self)
+        FieldContextMenu(theme, self)
         self.setGeometry(rect)
         self.selectAll()
         self.show()

@@ -43,7 +43,7 @@ class SliderTrack(QSlider):
     def minimumSizeHint(self) -> QSize:
         return QSize(80, self._theme.size("sliderHandle") + 4)
 
-    def handle(self) -> QPointF:
+    def handle_centre(self) -> QPointF:
         """Return the position of the handle's centre."""
         half = self._theme.size("sliderHandle") / 2
         span = max(1, self.maximum() - self.minimum())
@@ -83,7 +83,7 @@ class SliderTrack(QSlider):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme
         painter = QPainter(self)
-        middle = self.handle()
+        middle = self.handle_centre()
         thick, side = theme.size("sliderTrack"), theme.size("sliderHandle")
         track = QRectF(side / 2 - 2, middle.y() - thick / 2, self.width() - side + 4, thick)
         paint.box(painter, track, thick / 2, theme.colour("borderStrong"))

@@ -15,10 +15,10 @@ from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.keyboard import has_no_modifiers
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
-HIGH, PAD, GAP, CROSS, MIN_VALUE = 22, 7, 5, 10, 40
+TOKEN_HEIGHT, PADDING, GAP, CROSS_SIZE, MIN_EDIT_WIDTH = 22, 7, 5, 10, 40
 MAX_TEXT_LENGTH = 400
 
 
@@ -38,10 +38,10 @@ class Token(PaintedButton):
 
     def sizeHint(self) -> QSize:
         theme = self._theme
-        width = 2 * PAD + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS)
+        width = 2 * PADDING + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS_SIZE)
         if self.is_left_out:
             width += paint.width_of(theme.font("small"), _(EXCLUDE_KEYWORD)) + GAP
-        return QSize(round(width) + 1, round(theme.scaled(HIGH)))
+        return QSize(round(width) + 1, round(theme.scaled(TOKEN_HEIGHT)))
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -59,12 +59,12 @@ class Token(PaintedButton):
         paint.box(painter, bounds, theme.radius("small"), theme.colour(fill))
         role = "textDisabled" if not self.isEnabled() else "text" if self.is_left_out else "accentText"
         colour = theme.colour(role)
-        rest = bounds.adjusted(PAD, 0, -PAD, 0)
+        rest = bounds.adjusted(PADDING, 0, -PADDING, 0)
         if self.is_left_out:
             font = theme.font("small")
             paint.text_line(painter, rest, _(EXCLUDE_KEYWORD), font, theme.colour("textSecondary"))
             rest.setLeft(rest.left() + paint.width_of(font, _(EXCLUDE_KEYWORD)) + GAP)
-        side = theme.scaled(CROSS)
+        side = theme.scaled(CROSS_SIZE)
         icon_rect = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
         paint_icon(painter, icon_rect, "x", colour)
         rest.setRight(icon_rect.left() - GAP + 1)
@@ -84,11 +84,11 @@ class _TokenEdit(QLineEdit):
 
     def sizeHint(self) -> QSize:
         text = self.text() or self.placeholderText()
-        width = self.fontMetrics().horizontalAdvance(text) + 2 * PAD
-        return QSize(max(MIN_VALUE, width), super().sizeHint().height())
+        width = self.fontMetrics().horizontalAdvance(text) + 2 * PADDING
+        return QSize(max(MIN_EDIT_WIDTH, width), super().sizeHint().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(MIN_VALUE, super().minimumSizeHint().height())
+        return QSize(MIN_EDIT_WIDTH, super().minimumSizeHint().height())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         is_unmodified = has_no_modifiers(event)
@@ -137,7 +137,7 @@ class TokenField(QWidget):
         self.edit.setMaxLength(MAX_TEXT_LENGTH)
         self.edit.setProperty("bare", "true")
         self.edit.setProperty("ownFocus", True)
-        ContextMenuFilter(theme, self.edit)
+        FieldContextMenu(theme, self.edit)
         self.edit.textEdited.connect(self._on_edited)
         self.edit.textChanged.connect(self.edit.updateGeometry)
         self.edit.completed.connect(self._end_typing)
@@ -145,7 +145,7 @@ class TokenField(QWidget):
         self.edit.focus_changed.connect(self.update)
         self.setFocusProxy(self.edit)
         self._flow = Flow(self, gap=GAP, row_gap=4)
-        self._flow.setContentsMargins(PAD, 5, PAD, 5)
+        self._flow.setContentsMargins(PADDING, 5, PADDING, 5)
         self._flow.add_elastic(self.edit, greedy=True)
 
     @property

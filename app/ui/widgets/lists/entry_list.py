@@ -21,7 +21,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _
 
-ROW, HEADING, INSET = 40, 30, 8
+ROW_HEIGHT, HEADING_HEIGHT, INSET = 40, 30, 8
 ICON_LEFT, TEXT_LEFT, RIGHT = 10, 38, 10
 Index = QModelIndex | QPersistentModelIndex
 
@@ -102,7 +102,7 @@ class EntryDelegate(QStyledItemDelegate):
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
         model = index.model()
         heading = isinstance(model, EntryModel) and isinstance(model.lines[index.row()], Heading)
-        return QSize(100, round(self._theme.scaled(HEADING if heading else ROW)))
+        return QSize(100, round(self._theme.scaled(HEADING_HEIGHT if heading else ROW_HEIGHT)))
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         model = index.model()
@@ -207,9 +207,9 @@ class EntryList(QListView):
         super().__init__()
         self._theme = theme
         self.lines = EntryModel()
-        self.look = EntryDelegate(theme)
+        self.delegate = EntryDelegate(theme)
         self.setModel(self.lines)
-        self.setItemDelegate(self.look)
+        self.setItemDelegate(self.delegate)
         self.setAccessibleName(name)
         self.setProperty("raised", "true")
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -251,7 +251,7 @@ class EntryList(QListView):
 
     def content_height(self) -> int:
         """Return the total height in px of all headings and entries."""
-        heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
+        heights = {Heading: self._theme.scaled(HEADING_HEIGHT), Match: self._theme.scaled(ROW_HEIGHT)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
 
     def step(self, steps: int) -> None:
@@ -262,9 +262,9 @@ class EntryList(QListView):
             index = rows.index(current) if current in rows else 0
             self._select_row(rows[max(0, min(len(rows) - 1, index + steps))])
 
-    def handle(self, key: int) -> bool:
+    def handle_key(self, key: int) -> bool:
         """Move the selection on Up, Down, Page Up, Page Down, Home and End; return False for other keys."""
-        page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
+        page = max(1, self.viewport().height() // round(self._theme.scaled(ROW_HEIGHT)) - 1)
         row_count = len(self.lines.lines)
         steps = {
             Qt.Key.Key_Up: -1,

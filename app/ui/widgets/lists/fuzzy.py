@@ -12,8 +12,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
-WHOLE, WORD, INITIALS, INSIDE, SPREAD = 100.0, 80.0, 70.0, 55.0, 40.0
-MIN_SPREAD = 0.8  # minimum share of letters that begin a word or follow the previous letter
+TEXT_START_SCORE, WORD_START_SCORE, INITIALS_SCORE, SUBSTRING_SCORE, SCATTERED_SCORE = (
+    100.0,
+    80.0,
+    70.0,
+    55.0,
+    40.0,
+)
+MIN_STRONG_SHARE = 0.8  # minimum share of letters that begin a word or follow the previous letter
 LETTER_PENALTY = 0.05
 MAX_FUZZY_ENTRIES = 400  # maximum number of entries of a kind that are matched letter by letter
 UNAVAILABLE_PENALTY = 5.0  # penalty of entries that are unavailable now
@@ -94,18 +100,18 @@ def match(query: str, text: str) -> tuple[float, tuple[Span, ...]] | None:
 def _match_piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
     index = text.find(piece)
     if index == 0:
-        return WHOLE, [(0, len(piece))]
+        return TEXT_START_SCORE, [(0, len(piece))]
     first = index
     while index > 0:
         if not text[index - 1].isalnum():
-            return WORD - min(10.0, index / 10), [(index, index + len(piece))]
+            return WORD_START_SCORE - min(10.0, index / 10), [(index, index + len(piece))]
         index = text.find(piece, index + 1)
     if first > 0:
-        return INSIDE - min(10.0, first / 10), [(first, first + len(piece))]
-    return _match_spread(piece, text)
+        return SUBSTRING_SCORE - min(10.0, first / 10), [(first, first + len(piece))]
+    return _match_scattered(piece, text)
 
 
-def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
+def _match_scattered(piece: str, text: str) -> tuple[float, list[Span]] | None:
     # Matches letters in order, preferably contiguous or at the start of a word.
     positions: list[int] = []
     strong_hits, start = 0, 0
@@ -123,9 +129,9 @@ def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
         positions.append(position)
         start = position + 1
     share = strong_hits / len(piece)
-    if share < MIN_SPREAD:
+    if share < MIN_STRONG_SHARE:
         return None
-    return SPREAD * share - min(15.0, (positions[-1] - positions[0]) / 10), [
+    return SCATTERED_SCORE * share - min(15.0, (positions[-1] - positions[0]) / 10), [
         (position, position + 1) for position in positions
     ]
 
@@ -199,7 +205,7 @@ def _match_entry(query: str, entry: Entry) -> Match | None:
         return None
     score, spans = result
     if is_initials(query, entry.text):
-        score = max(score, INITIALS - LETTER_PENALTY * len(entry.text))
+        score = max(score, INITIALS_SCORE - LETTER_PENALTY * len(entry.text))
     return Match(entry, score - (UNAVAILABLE_PENALTY if entry.reason else 0.0), spans)
 
 

@@ -93,7 +93,7 @@ class CellDelegate(QStyledItemDelegate):
         self._view = view
         self._painted: dict[tuple[int, int], Cell] = {}
 
-    def changed(self, row: int, columns: Sequence[int]) -> list[int]:
+    def changed_columns(self, row: int, columns: Sequence[int]) -> list[int]:
         """Return the columns of a row whose contents differ from the last painted ones."""
         if len(self._painted) > MAX_CACHED_CELLS:
             self._painted.clear()

@@ -167,7 +167,7 @@ class TableView(QTableView, Generic[Row]):
         columns = [column for column in range(len(self.columns)) if not self.isColumnHidden(column)]
         dirty = QRegion()
         for row in range(max(first.row(), top), min(last.row(), bottom) + 1):
-            changed = self._cells.changed(row, columns)
+            changed = self._cells.changed_columns(row, columns)
             if changed:
                 x = self.columnViewportPosition(changed[0])
                 width = self.columnViewportPosition(changed[-1]) + self.columnWidth(changed[-1]) - x

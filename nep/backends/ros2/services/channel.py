@@ -99,7 +99,7 @@ class ServiceChannel:
         self._is_server = is_server = guid is None
         self._guid = guid
         self._ready: frozenset[bytes] = frozenset()
-        self._ready_there: tuple[int, ...] = ()
+        self._ready_handles: tuple[int, ...] = ()
         self._is_all_ready = False
         self._known_writers: dict[int, DdsEndpoint] = {}
         self._first_seen: dict[bytes, float] = {}
@@ -268,9 +268,9 @@ class ServiceChannel:
         if self.is_closed:
             return frozenset()
         found_here = self._match_handles()
-        if found_here != self._ready_there:
+        if found_here != self._ready_handles:
             self._ready = self._find_ready_servers()
-            self._ready_there = found_here if self._is_all_ready else ()
+            self._ready_handles = found_here if self._is_all_ready else ()
         return self._ready
 
     def _match_handles(self) -> tuple[int, ...]:

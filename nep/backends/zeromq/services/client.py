@@ -150,7 +150,7 @@ class SocketClient:
         """
         self._connected_endpoint = ""
         """Endpoint of the current connection; cleared to force a reconnection."""
-        self._leave_at = math.inf
+        self._switch_at = math.inf
         """Time at which the connection to an unlisted server is closed if new calls wait."""
         self._attempts = 0
         self._retry_at = 0.0
@@ -242,7 +242,7 @@ class SocketClient:
         if connection is None or not connection.is_open or self._current not in self._servers:
             return
         codec = self.spec.codec.number
-        connection.send(self._framing.call(call.number, codec, call.timeout_s, call.data))
+        connection.send(self._framing.encode_call(call.number, codec, call.timeout_s, call.data))
         call.is_sent = True
         self._unanswered[call.number] = call.size
         self._unanswered_bytes += call.size
@@ -388,7 +388,7 @@ class SocketClient:
             if self._current not in self._servers:
                 self._switch_after_replies(now, outcomes)
             else:
-                self._leave_at = math.inf
+                self._switch_at = math.inf
         if not self.is_connected and now >= self._retry_at:
             self._connect_next(now)
 
@@ -402,16 +402,16 @@ class SocketClient:
     def _switch_after_replies(self, now: float, outcomes: _Outcomes) -> None:
         # The server closed or was replaced: wait for its last replies, then connect to another one.
         is_waited_for = any(each.is_sent for each in self._calls.values())
-        if is_waited_for and self._leave_at == math.inf:
-            self._leave_at = now + _HANDOVER_TIMEOUT_S
-        is_next_due = now >= self._leave_at and any(not each.is_sent for each in self._calls.values())
+        if is_waited_for and self._switch_at == math.inf:
+            self._switch_at = now + _HANDOVER_TIMEOUT_S
+        is_next_due = now >= self._switch_at and any(not each.is_sent for each in self._calls.values())
         if not is_waited_for or is_next_due:
             self._switch_server(outcomes)
 
     def _fail_sent_calls(self, outcomes: _Outcomes) -> None:
         # The connection has ended: all calls sent over it fail.
         self._disconnect()
-        self._leave_at = math.inf
+        self._switch_at = math.inf
         self._unanswered.clear()
         self._unanswered_bytes = 0
         for call in [each for each in self._calls.values() if each.is_sent]:
@@ -463,7 +463,7 @@ class SocketClient:
     def _next_deadline(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
         if self.is_connected and any(not each.is_sent for each in self._calls.values()):
-            due = min(due, self._leave_at)
+            due = min(due, self._switch_at)
         if self.is_connected or not self._servers:
             return due
         if self._calls:

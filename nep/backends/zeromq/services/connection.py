@@ -46,7 +46,7 @@ class ServerConnection:
         self._io: IoThread = shared.io
         owner = f"a client of '{service}'"
         self._socket = shared.socket(zmq.DEALER, owner)
-        self._sides: tuple[_PolledSocket, ...] = ()
+        self._polled_sockets: tuple[_PolledSocket, ...] = ()
         self._monitor: Socket | None = None
         try:
             self._monitor = monitor = shared.socket(zmq.PAIR, owner)
@@ -55,8 +55,8 @@ class ServerConnection:
         except BaseException:
             self.close()
             raise
-        self._sides = sides
-        for side in self._sides:
+        self._polled_sockets = sides
+        for side in self._polled_sockets:
             self._io.add(side)
 
     def _connect(self, monitor: Socket) -> None:
@@ -99,7 +99,7 @@ class ServerConnection:
 
     def close(self) -> None:
         """Close the sockets and discard unread replies."""
-        sides, self._sides = self._sides, ()
+        sides, self._polled_sockets = self._polled_sockets, ()
         for side in sides:
             self._io.remove(side)
         self.is_open, self.has_ended = False, True

@@ -202,7 +202,7 @@ class RouterServer:
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
-            is_sent = self._send_locked(route, self._framing.reply(number, reply))
+            is_sent = self._send_locked(route, self._framing.encode_reply(number, reply))
             has_input = bool(int(self.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
         if has_input:
             self._serve_soon(self)

@@ -48,7 +48,7 @@ class SurveyClient:
         self._closer = closer
         self._lock = threading.Lock()
         self._clients: dict[int, SocketClient] = {}
-        self._leaving: list[SocketClient] = []
+        self._removed_clients: list[SocketClient] = []
         """Clients of respondents that are no longer listed; their last replies are still accepted."""
         self._replied = self._failed = self._late = 0
         """Statistics of closed clients."""
@@ -94,12 +94,12 @@ class SurveyClient:
                 sent.client.cancel(sent.call)
 
     def _all_clients(self) -> list[SocketClient]:
-        return [*self._clients.values(), *self._leaving]
+        return [*self._clients.values(), *self._removed_clients]
 
     def _close_idle_removed_clients(self) -> None:
         with self._lock:
-            ended = [each for each in self._leaving if not each.is_busy]
-            self._leaving = [each for each in self._leaving if each not in ended]
+            ended = [each for each in self._removed_clients if not each.is_busy]
+            self._removed_clients = [each for each in self._removed_clients if each not in ended]
         self._close_clients(ended)
 
     def _close_clients(self, clients: Iterable[SocketClient]) -> None:
@@ -138,7 +138,7 @@ class SurveyClient:
         client = self._clients.pop(respondent, None)
         if client is not None:
             client.publisher_removed(0, 0, is_closed=True)
-            self._leaving.append(client)
+            self._removed_clients.append(client)
 
     def reconnect_remote(self) -> None:
         """Reconnect to respondents on other computers, because the address of this computer has changed."""
@@ -186,7 +186,7 @@ class SurveyClient:
             self.is_closed = True
             clients = self._all_clients()
             self._clients.clear()
-            self._leaving.clear()
+            self._removed_clients.clear()
         self._close_clients(clients)
 
     def forked(self) -> None:

@@ -181,7 +181,7 @@ class TcpServer:
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
-            stream.send(NATIVE.reply(number, reply))
+            stream.send(NATIVE.encode_reply(number, reply))
             is_served = stream.backlog > 0 or stream.has_ended
         if is_served:
             self._io.serve_soon(peer)

@@ -18,7 +18,7 @@ from nep.protocol.service_wire import HEADER_BYTES, MAX_PAYLOAD_BYTES
 from nep.system.addresses import host_of, is_loopback
 
 _SIZE = struct.Struct("<I")
-_CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
+_CHUNK_BYTES, _MAX_BYTES_PER_TURN = 262_144, 1_048_576
 _SMALL_BYTES = 65_536
 """Size in bytes below which a copy is cheaper than another system call."""
 _KEEPALIVE_IDLE_S, _KEEPALIVE_INTERVAL_S, _KEEPALIVE_PROBES = 4, 2, 4
@@ -50,7 +50,7 @@ class TcpStream:
     def read(self) -> bool:
         """Receive a limited amount of the available data; return True if there was any."""
         was = len(self._input)
-        while not self.has_ended and len(self._input) - was < _TURN_BYTES:
+        while not self.has_ended and len(self._input) - was < _MAX_BYTES_PER_TURN:
             try:
                 data = self._socket.recv(_CHUNK_BYTES)
             except (BlockingIOError, InterruptedError):
@@ -92,7 +92,7 @@ class TcpStream:
             ]
         if self._start == len(self._input):
             self._clear_input()
-        elif self._start > _TURN_BYTES:
+        elif self._start > _MAX_BYTES_PER_TURN:
             del self._input[: self._start]
             self._start = 0
         return pair

@@ -34,7 +34,7 @@ class SharedPayloads:
         self._offer = offer
         self._offered: dict[int, tuple[int, float]] = {}
         self._writer = SharedWriter(publisher)
-        self._tidied_at = float("-inf")
+        self._reclaimed_at = float("-inf")
 
     def confirm(self, shares: OfferAcceptance) -> None:
         """Handle a subscriber's confirmation that it has opened the offered memory."""
@@ -63,8 +63,8 @@ class SharedPayloads:
         lent = self._writer.find_loan(data) if isinstance(data, memoryview) else None
         number = self._writer.copy(data, size) if lent is None else self._writer.send(lent)
         if number is None:
-            if now >= self._tidied_at + _RECLAIM_INTERVAL_S:
-                self._tidied_at = now
+            if now >= self._reclaimed_at + _RECLAIM_INTERVAL_S:
+                self._reclaimed_at = now
                 self._writer.reclaim_slots()
             return None
         return _NUMBER.pack(number)

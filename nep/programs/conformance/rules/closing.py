@@ -44,7 +44,7 @@ def _bye(bench: Bench) -> None:
     expect("received", len(subscriber.messages), 5)
     expect("publisher-.last_seq", bench.wait_for_request("publisher-", "id", id).fields.get("last_seq"), 5)
     subscriber.disconnect()
-    bench.finish(number, "close_publisher")
+    bench.wait_for_reply(number, "close_publisher")
 
 
 @rule("bye-again", lazy("A publisher repeats its bye until no hello remains, and then closes."), _SECTION)
@@ -53,7 +53,7 @@ def _bye_repeats(bench: Bench) -> None:
     number = bench.adapter.send_request("close_publisher", pub=pub)
     bench.discard_opened()
     bench.require(lambda: len(subscriber.byes) >= 3, "bye again")
-    bench.finish(number, "close_publisher")
+    bench.wait_for_reply(number, "close_publisher")
 
 
 @rule("bye-disconnects", lazy("A subscriber disconnects after reading the bye."), _SECTION)
@@ -99,7 +99,7 @@ def _closed_publisher_is_disconnected(bench: Bench) -> None:
 )
 def _lapsed_publisher_stays_connected(bench: Bench) -> None:
     publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
-    bench.master.drop(publisher.node.id)
+    bench.master.expire_lease(publisher.node.id)
     bench.wait(0.5)
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
@@ -142,6 +142,6 @@ def _node_leaves(bench: Bench) -> None:
     if first.do == "renew":
         seqs = [each.get("last_seq") for each in first.fields.get("publishers", ())]
         expect("renew.publishers.last_seq", 4 in seqs, True)
-    bench.finish(number, "close")
+    bench.wait_for_reply(number, "close")
     bench.require(lambda: bench.adapter.has_ended, "end of the adapter")
-    expect("exit code", bench.adapter.lines.wait(10.0), 0)
+    expect("exit code", bench.adapter.streams.wait(10.0), 0)

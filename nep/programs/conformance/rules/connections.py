@@ -102,7 +102,7 @@ def _endpoint_change(bench: Bench) -> None:
     publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     bench.require(lambda: bool(bench.events(sub)), "message")
-    publisher.bind_elsewhere()
+    publisher.bind_other_port()
     bench.register_publisher(publisher)
     bench.require(lambda: bool(publisher.hellos), "hello", 10.0)
     _expect_next(bench, publisher, sub)

@@ -14,7 +14,7 @@ _SECTION = "the-handshake"
 _MAX_WAIT_S = 3.0  # the wire allows 0.5 s; the margin is for busy computers
 
 
-def level_of(bench: Bench) -> int:
+def hello_level(bench: Bench) -> int:
     """Return the highest hello level (1 to 3) that the adapter announces; 0 if it announces none."""
     announced = bench.features.get("features", ())
     return max((level for level in (1, 2, 3) if f"hello{level}" in announced), default=0)
@@ -55,7 +55,7 @@ def _hello_after_topic(bench: Bench) -> None:
 def _hello_form(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, _sub = bench.create_subscribed_publisher(topic)
-    level = level_of(bench)
+    level = hello_level(bench)
     expected = hello_part(
         int(bench.latest_record("subscriber", topic)["id"]),
         topic,
@@ -88,7 +88,7 @@ def _echo(bench: Bench) -> None:
     lazy("A publisher ignores hellos for another topic: they were meant for the port's previous owner."),
     "who-connects",
 )
-def _foreign_hello(bench: Bench) -> None:
+def _hello_for_other_topic(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     subscriber = connect_subscriber(bench, topic, 3)
@@ -162,7 +162,7 @@ def _new_sub_waits(bench: Bench) -> None:
     has_returned = bench.adapter.reply(number) is not None
     for hello in list(publisher.hellos):
         publisher.send_echo(hello)
-    bench.close_sub(int(bench.finish(number, "subscriber")["sub"]))
+    bench.close_sub(int(bench.wait_for_reply(number, "subscriber")["sub"]))
     if has_returned:
         raise broken_rule_error(_("'new_sub' returned before the echo"))
 

@@ -81,7 +81,7 @@ def _statistics(bench: Bench) -> None:
 def _next_s(bench: Bench) -> None:
     bench.new_sub(bench.new_topic())
     wanted_s = 2.5 * bench.scale
-    bench.master.change = lambda _request, reply: (
+    bench.master.reply_filter = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "next_s": wanted_s}} if reply["is"] == "renewed" else reply
     )
     first = bench.wait_for_renewal(len(bench.master.received))
@@ -92,7 +92,7 @@ def _next_s(bench: Bench) -> None:
                 wanted=wanted_s, seconds=second.at - first.at
             )
         )
-    bench.master.change = lambda _request, reply: reply
+    bench.master.reply_filter = lambda _request, reply: reply
     bench.wait_for_renewal(len(bench.master.received), 10.0)
 
 
@@ -107,7 +107,7 @@ def _rejoin_on_request(bench: Bench) -> None:
     bench.new_sub(topic)
     ids = bench.latest_record("publisher", topic)["id"], bench.latest_record("subscriber", topic)["id"]
     count = len(bench.master.received)
-    bench.master.drop(bench.node_id)
+    bench.master.expire_lease(bench.node_id)
     bench.require(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join")
     join = next(each for each in bench.master.received[count:] if each.do == "join")
     expect("join.publishers", ids[0] in _ids(join, "publishers"), True)
@@ -183,7 +183,7 @@ def _renewed_topics(bench: Bench) -> None:
         "node_id": publisher.node.id,
         "node_name": publisher.node.name,
     }
-    bench.master.change = lambda _request, reply: (
+    bench.master.reply_filter = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "topics": [{"topic": topic, "publishers": [entry]}]}}
         if reply["is"] == "renewed"
         else reply

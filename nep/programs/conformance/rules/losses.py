@@ -28,7 +28,7 @@ def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
 
     From the second reply on, missing messages count as lost.
     """
-    bench.master.change = lambda _request, reply: (
+    bench.master.reply_filter = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "last_seqs": {publisher: seq}}}
         if reply["is"] == "renewed"
         else reply

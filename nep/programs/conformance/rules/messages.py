@@ -17,10 +17,10 @@ from nep.programs.conformance.peers import ScriptedSubscriber
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.verdict import broken_rule_error, expect, printable
 from nep.protocol.batch import read_parts
-from nep.protocol.wire import BATCH, Parts, topic_part, unpack_header_at
+from nep.protocol.wire import BATCH, ParsedMessage, topic_part, unpack_header_at
 
 _BURST = 200
-_STAMP_NS = 60_000_000_000
+_MAX_STAMP_ERROR_NS = 60_000_000_000
 _SAMPLES: Mapping[str, tuple[dict[str, object], bytes]] = {
     "json": ({"value": {"text": "größe", "n": 2**53 - 1}}, b""),
     "string": ({"text": "größe\n機器人"}, "größe\n機器人".encode()),
@@ -60,7 +60,7 @@ def connect_publisher(
     return topic, pub, connect_subscriber(bench, topic, level, msg_type)
 
 
-def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
+def messages_of(subscriber: ScriptedSubscriber) -> list[ParsedMessage]:
     """Return all messages received by a subscriber. Raises `BrokenRuleError` for a malformed message."""
     try:
         return subscriber.messages
@@ -202,7 +202,7 @@ def _stamp(bench: Bench) -> None:
     bench.require(lambda: len(messages_of(subscriber)) >= 20, "message")
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
     now = time.time_ns()
-    if any(abs(now - each) > _STAMP_NS for each in stamps):
+    if any(abs(now - each) > _MAX_STAMP_ERROR_NS for each in stamps):
         raise broken_rule_error(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
     if stamps != sorted(stamps):
         raise broken_rule_error(_("the stamps are {seen}").format(seen=printable(stamps)))

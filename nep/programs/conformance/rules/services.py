@@ -22,7 +22,7 @@ from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, err
 from nep.protocol.wire import topic_part
 
 _SECTION = "services.md#calls-and-answers"
-_JSON, _CALL_S = 1, 5.0
+_JSON, _CALL_TIMEOUT_S = 1, 5.0
 
 
 @contextmanager
@@ -34,7 +34,9 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
         socket.close(0)
 
 
-def _replies(bench: Bench, socket: zmq.Socket[bytes], call_numbers: set[int]) -> dict[int | None, Reply]:
+def _wait_for_replies(
+    bench: Bench, socket: zmq.Socket[bytes], call_numbers: set[int]
+) -> dict[int | None, Reply]:
     """Wait for the replies to the calls with these numbers, and return all replies received, by number."""
     replies: dict[int | None, Reply] = {}
 
@@ -74,8 +76,8 @@ def _service_reply(bench: Bench) -> None:
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for number in (7, 2**64 - 1):
-            socket.send_multipart(NATIVE.call(number, _JSON, _CALL_S, b'{"a":1}'))
-        for reply in _replies(bench, socket, {7, 2**64 - 1}).values():
+            socket.send_multipart(NATIVE.encode_call(number, _JSON, _CALL_TIMEOUT_S, b'{"a":1}'))
+        for reply in _wait_for_replies(bench, socket, {7, 2**64 - 1}).values():
             expect("kind", int(reply.kind), int(CallKind.REPLY))
             expect("codec", reply.codec, _JSON)
             expect("payload", json.loads(bytes(reply.data)), {"a": 1})
@@ -90,7 +92,7 @@ def _service_reply(bench: Bench) -> None:
 def _service_malformed(bench: Bench) -> None:
     name = bench.new_topic()
     bench.call("serve", service=name)
-    (header, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
+    (header, payload) = NATIVE.encode_call(1, _JSON, _CALL_TIMEOUT_S, b"{}")
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for parts in (
@@ -100,9 +102,9 @@ def _service_malformed(bench: Bench) -> None:
             [header, payload, b""],
         ):
             socket.send_multipart(parts)
-        socket.send_multipart(NATIVE.call(2, _JSON, _CALL_S, b'{"a":'))
-        socket.send_multipart(NATIVE.call(3, _JSON, _CALL_S, b"[]"))
-        replies = _replies(bench, socket, {2, 3})
+        socket.send_multipart(NATIVE.encode_call(2, _JSON, _CALL_TIMEOUT_S, b'{"a":'))
+        socket.send_multipart(NATIVE.encode_call(3, _JSON, _CALL_TIMEOUT_S, b"[]"))
+        replies = _wait_for_replies(bench, socket, {2, 3})
         expect("answers", sorted(each or 0 for each in replies), [2, 3])
         expect("kind", int(replies[2].kind), int(CallKind.REJECTED))
 
@@ -133,12 +135,12 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
     sender, *parts = socket.recv_multipart()
     call = NATIVE.read_call(parts)
     expect("call.codec", call.codec in {1, 4}, True)
-    if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
+    if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_TIMEOUT_S:
         raise broken_rule_error(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
     data = reply.data if reply.kind != CallKind.REPLY else call.data
     sent_reply = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON)
-    socket.send_multipart([sender, *NATIVE.reply(call.number, sent_reply)])
-    return bench.finish(number, "call").get("value")
+    socket.send_multipart([sender, *NATIVE.encode_reply(call.number, sent_reply)])
+    return bench.wait_for_reply(number, "call").get("value")
 
 
 @rule(
@@ -150,7 +152,9 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
 def _service_call(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
-        number = bench.adapter.send_request("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
+        number = bench.adapter.send_request(
+            "call", service=name, value={"a": [1, None]}, timeout_s=_CALL_TIMEOUT_S
+        )
         value = _reply_to_call(bench, socket, number, Reply(CallKind.REPLY, b""))
         expect("value", value, {"a": [1, None]})
 
@@ -169,7 +173,7 @@ def _other_socket_at_server(bench: Bench) -> None:
     with closed_port() as endpoint:
         pass
     with _registered_server(bench, name, endpoint):
-        number = bench.adapter.send_request("call", service=name, value=1, timeout_s=_CALL_S)
+        number = bench.adapter.send_request("call", service=name, value=1, timeout_s=_CALL_TIMEOUT_S)
         bench.fail_handshake("PUB", endpoint)
         with _socket(bench, zmq.ROUTER) as socket:
             bind_again(socket, endpoint)
@@ -187,7 +191,7 @@ def _service_error(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
         for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REJECTED, "")):
-            number = bench.adapter.send_request("call", service=name, value={}, timeout_s=_CALL_S)
+            number = bench.adapter.send_request("call", service=name, value={}, timeout_s=_CALL_TIMEOUT_S)
             try:
                 value = _reply_to_call(
                     bench, socket, number, error_reply(kind, error, "rejected by the tester")

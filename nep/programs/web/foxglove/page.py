@@ -212,7 +212,7 @@ class FoxglovePage(PageConnection):
             ("unadvertise", "channelIds", self._unadvertise),
         ):
             if name == operation:
-                for item in wire.items(fields.get(member)):
+                for item in wire.as_list(fields.get(member)):
                     await carry_out(item)
                 return
         raise NepError(_("the operation '{op}' isn't supported here").format(op=quotable(name)))

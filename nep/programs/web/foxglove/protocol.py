@@ -86,7 +86,7 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
     raise NepError(_("this isn't a message of Foxglove's WebSocket protocol"))
 
 
-def items(value: object) -> list[object]:
+def as_list(value: object) -> list[object]:
     """Return `value` if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 

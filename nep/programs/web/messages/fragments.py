@@ -62,6 +62,6 @@ class FragmentBuffer:
         self._size -= sum(map(len, self._parts.pop(id_, {}).values()))
 
 
-def cut(text: str, size: int) -> list[str]:
+def split_text(text: str, size: int) -> list[str]:
     """Split text into pieces of at most `size` characters."""
     return [text[offset : offset + size] for offset in range(0, len(text), size)] or [""]

@@ -49,7 +49,7 @@ def decode_png(data: str) -> bytes:
                     most=MAX_MESSAGE_BYTES
                 )
             )
-        return bytes(image_codec.read_file(file)[:, :, ::-1].tobytes().rstrip(b"\n"))
+        return bytes(image_codec.decode_file(file)[:, :, ::-1].tobytes().rstrip(b"\n"))
     except (binascii.Error, ValueError):
         raise OperationError(_("the 'data' of a 'png' isn't valid base64")) from None
     except (DecodeError, EncodeError) as error:

@@ -36,7 +36,7 @@ else:
 _logger = logging.getLogger("nep.programs.web")
 
 
-class Page(PageConnection):
+class RosbridgePage(PageConnection):
     """Connection of a page or program with the rosbridge protocol. Runs in the server's event loop.
 
     Args:
@@ -107,7 +107,7 @@ class Page(PageConnection):
     async def _encode_frames(self, queued: QueuedMessage) -> list[Frame]:
         topic = queued.feed.topic
         try:
-            return publish_frames(topic, queued.message, queued.feed.form)
+            return publish_frames(topic, queued.message, queued.feed.options)
         except NepError as error:
             raise op.OperationError(f"'{topic}': {error}", level="warning") from error
 

@@ -82,7 +82,7 @@ class PageServices:
     async def _call_service(self, operation: CallService) -> object:
         if is_rosapi(operation.service):
             api = RosApi(self._context.node, self._context.motion_denial_reason)
-            return await self._context.run_in_thread(api.reply, operation.service, operation.args)
+            return await self._context.run_in_thread(api.execute, operation.service, operation.args)
         client = self._clients.pop(operation.service, None)
         if client is None:
             client = await self._context.run_in_thread(self._context.node.new_client, operation.service)

@@ -60,7 +60,7 @@ class RosApi:
         self._node = node
         self._motion_denial_reason = motion_refusal
 
-    def reply(self, service: str, args: object) -> Mapping[str, object]:
+    def execute(self, service: str, args: object) -> Mapping[str, object]:
         """Execute a service of rosapi and return the fields of its reply.
 
         Raises `NepError` if the service isn't supported or fails.
@@ -83,7 +83,7 @@ class RosApi:
         topics = self._view.topics.values()
         return {each.name: ros_type_of(each.msg_type) for each in topics if is_visible(each.name)}
 
-    def _name(self, node_id: str) -> str:
+    def _node_name(self, node_id: str) -> str:
         node = self._view.nodes.get(node_id)
         return node_id if node is None else node.name
 
@@ -128,13 +128,13 @@ class RosApi:
         """Return the names of the nodes that publish a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
         publishers = () if topic is None else topic.publishers
-        return {"publishers": list(dict.fromkeys(self._name(each.node_id) for each in publishers))}
+        return {"publishers": list(dict.fromkeys(self._node_name(each.node_id) for each in publishers))}
 
     def subscribers(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of the nodes that subscribe to a topic."""
         topic = self._view.topics.get(_text(args, "topic"))
         subscribers = () if topic is None else topic.subscribers
-        return {"subscribers": list(dict.fromkeys(self._name(each.node_id) for each in subscribers))}
+        return {"subscribers": list(dict.fromkeys(self._node_name(each.node_id) for each in subscribers))}
 
     def message_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the fields of a message type."""
@@ -183,7 +183,7 @@ class RosApi:
     def _nodes_serving(self, service: str) -> list[str]:
         info = self._view.services.get(service)
         servers = () if info is None else info.servers
-        return list(dict.fromkeys(self._name(each.node_id) for each in servers))
+        return list(dict.fromkeys(self._node_name(each.node_id) for each in servers))
 
     def service_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return a type definition without fields, because services of NEP have no schema."""

@@ -151,7 +151,7 @@ class SimulatedStudio:
         source.node, self._source = self.node, source
         fleet, runs = self.session.fleet, self.session.runs
         fleet._heartbeat = cast("Any", SimulatedHeartbeat(clock, "studio"))
-        fleet._tries._rest = fleet._heartbeat.stop
+        fleet._invocations._on_idle = fleet._heartbeat.stop
         runs._make_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
         self.session.stopper = stopper = RobotStopper(cast("Any", self.node), clock.now)
         stopper._changed = clock.condition()

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.network.mailbox import Batch
 from app.ui.panels.plot import PANEL
-from app.ui.panels.plot.curve_style import DASH_PATTERNS, CurveLook
+from app.ui.panels.plot.curve_style import DASH_PATTERNS, CurveStyle
 from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND
 from app.ui.panels.plot.panel import IDLE_STATS_UPDATE_TICKS, PlotPanel
 from app.ui.panels.plot.plotted_curve import MINUS, value_text
@@ -53,7 +53,7 @@ def message(session: Session, topic: str, time_s: float, payload: object, seq: i
 
 def send(panel: PlotPanel, topic: str, rows, *, dropped: int = 0) -> None:
     messages = [message(panel.session, topic, time_s, payload) for time_s, payload in rows]
-    panel.session.series.add({topic: Batch(messages, dropped)})
+    panel.session.series.dispatch({topic: Batch(messages, dropped)})
 
 
 def show(panel: PlotPanel, *texts: str, right: bool = False) -> None:
@@ -169,7 +169,7 @@ def test_curves_differ_in_more_than_their_colour(panel) -> None:
     looks = [each.style for each in panel.shown]
     assert len({(each.colour, each.pattern) for each in looks}) == 8
     assert len({each.pattern for each in looks[:4]}) == 4
-    pens = [CurveLook(0, pattern).pen(panel.theme) for pattern in range(4)]
+    pens = [CurveStyle(0, pattern).pen(panel.theme) for pattern in range(4)]
     assert [bool(pen.dashPattern()) for pen in pens] == [bool(dash) for dash in DASH_PATTERNS]
 
 
@@ -225,7 +225,7 @@ def test_footer_reports_undecodable_messages_and_discarded_points(panel) -> None
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 60))
     bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.series.origin_ns, publisher=1)
-    panel.session.series.add({"/odom": Batch([bad])})
+    panel.session.series.dispatch({"/odom": Batch([bad])})
     send(panel, "/odom", [(30, {"speed": 1})])
     look(panel)
     assert "1 message can't be decoded" in panel.about.text()
@@ -375,7 +375,7 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     actions["Pink"].trigger()
     look(panel)
     assert panel.shown[1].right
-    assert panel.shown[1].look.colour == 3
+    assert panel.shown[1].style.colour == 3
     assert panel.canvas.ranges["right"].high > 1000
     assert not panel.canvas.plot.getAxis("left").style["showValues"]
     panel.table.setCurrentIndex(panel.model.index(1, 2))
@@ -474,7 +474,7 @@ def test_nonexistent_topic_stays_in_the_input_with_a_suggestion(adding) -> None:
     panel = adding
     panel.add.setText("/odon.speed + 1")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
-    assert panel.add.sentence == "Topic /odon doesn't exist; did you mean /odom?"
+    assert panel.add.error_message == "Topic /odon doesn't exist; did you mean /odom?"
     assert panel.add.text() == "/odon.speed + 1"
     assert panel.shown == []
     QTest.keyClick(panel.add, Qt.Key.Key_Escape)

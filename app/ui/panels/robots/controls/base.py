@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 
 from app.robots.description.description import Parameter
 from app.ui.theme.theme import Theme
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _
 
 VALUE_WIDTH, ROW_HEIGHT = 104, 36
@@ -88,7 +88,7 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
     The line edit accepts any text, because validation explains errors afterwards.
     """
     field = QLineEdit()
-    ContextMenuFilter(theme, field)
+    FieldContextMenu(theme, field)
     field.setAccessibleName(parameter.title)
     field.setMinimumHeight(ROW_HEIGHT - 2)
     if not parameter.required and parameter.default is None:

@@ -56,7 +56,7 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
         show,
         changed,
         finished=lambda tell: connect(slider.field.editingFinished, tell),
-        error_text=lambda: slider.field.sentence,
+        error_text=lambda: slider.field.problem,
     )
 
 
@@ -198,7 +198,7 @@ def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
         show,
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
-        error_text=lambda: field.sentence,
+        error_text=lambda: field.problem,
     )
 
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, paint
-from app.ui.widgets.menus import ContextMenuFilter
+from app.ui.widgets.menus import FieldContextMenu
 
 _PADDING, _BUTTON = 10, 26
 
@@ -53,7 +53,7 @@ class CopyField(QWidget):
         self.line.setAccessibleName(name)
         self.line.setProperty("bare", "true")
         self.line.setProperty("ownFocus", True)
-        ContextMenuFilter(theme, self.line)
+        FieldContextMenu(theme, self.line)
         self.copy = IconButton(theme, "copy", copy_words, size=_BUTTON)
         self.copy.clicked.connect(self.copy_requested)
         self.line.copy_requested.connect(self.copy_requested)

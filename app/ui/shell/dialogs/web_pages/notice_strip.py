@@ -31,12 +31,12 @@ class NoticeStrip(AlertBox):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
         self.notice: WebNotice | None = None
-        self.words = label("", "body", wrap=True)
+        self.text_label = label("", "body", wrap=True)
         self.more = label("", "body", role="textSecondary")
         self.button = Button(theme, "", size="small")
         self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
         line = Flow(gap=8, row_gap=2)
-        line.addWidget(self.words)
+        line.addWidget(self.text_label)
         line.addWidget(self.more)
         self.text_column.addLayout(line)
         self.button_row.addWidget(self.button)
@@ -55,7 +55,7 @@ class NoticeStrip(AlertBox):
         if notice != self.notice:
             self.notice = notice
             self.set_status(notice.status)
-            self.words.setText(notice.message)
+            self.text_label.setText(notice.message)
             self.setAccessibleName(notice.message)
             button_text = _BUTTON_LABELS.get(notice.next_step, "")
             self.button.set_label(_(button_text) if button_text else "")

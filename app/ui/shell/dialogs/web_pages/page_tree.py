@@ -102,12 +102,12 @@ class _RowHeightDelegate(QStyledItemDelegate):
         self.measure(theme)
 
     def measure(self, theme: Theme) -> None:
-        self._page, self._topic = (
+        self._page_size, self._topic_size = (
             QSize(40, round(theme.scaled(height))) for height in (PAGE_ROW_HEIGHT, TOPIC_ROW_HEIGHT)
         )
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
-        return self._topic if index.internalId() else self._page
+        return self._topic_size if index.internalId() else self._page_size
 
 
 class PageTree(QTreeView):

@@ -29,7 +29,7 @@ class OriginField(TokenField):
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__(theme, _("Origins"), EXAMPLE_ORIGIN, _("Add an origin"))
         self._web = web
-        self.is_wrong = False
+        self.is_invalid = False
 
     def show_origins(self, origins: Sequence[str]) -> None:
         """Set the tokens to the given origins. Text that is being typed is preserved."""
@@ -64,7 +64,7 @@ class OriginField(TokenField):
         super()._remove(token)
 
     def _set_invalid(self, *, invalid: bool) -> None:
-        self.is_wrong = invalid
+        self.is_invalid = invalid
         self.set_invalid(invalid)
 
 
@@ -91,22 +91,22 @@ class RobotChoice(QWidget):
         # `robots` returns the names of connected robots.
         super().__init__()
         self._theme, self._web, self._robots = theme, web, robots
-        self.words = label("", "body", wrap=True)
+        self.text_label = label("", "body", wrap=True)
         self.icon = RoleIcon(theme, "bot")
         self.choose = Button(theme, _("Choose robots"), size="small")
         self.choose.setCheckable(True)
-        self.none = label(_("No robots are connected."), "small", role="textTertiary", wrap=True)
+        self.no_robots_label = label(_("No robots are connected."), "small", role="textTertiary", wrap=True)
         self.boxes: dict[str, CheckBox] = {}
         self.list = QWidget()
         self._flow = Flow(self.list, gap=16, row_gap=2)
         self._flow.setContentsMargins(2, 4, 2, 0)
-        self._flow.addWidget(self.none)
+        self._flow.addWidget(self.no_robots_label)
         line = _ReadOnlyRow(theme)
         row = QHBoxLayout(line)
         row.setContentsMargins(10, 2, 3, 2)
         row.setSpacing(8)
         row.addWidget(self.icon)
-        row.addWidget(self.words, 1)
+        row.addWidget(self.text_label, 1)
         row.addWidget(self.choose)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -127,10 +127,10 @@ class RobotChoice(QWidget):
         names = self._web.robots
         names_text = format_list(list(names)) if names else _("none")
         text = _("Robots that pages can move: {robots}").format(robots=names_text)
-        if text != self.words.text():
-            self.words.setText(text)
+        if text != self.text_label.text():
+            self.text_label.setText(text)
         role = "warn" if names else "text"
-        set_role(self.words, role)
+        set_role(self.text_label, role)
         self.icon.set("triangle-alert" if names else "bot", role if names else "textSecondary")
         if self.choose.isChecked():
             self._show_boxes()
@@ -157,7 +157,7 @@ class RobotChoice(QWidget):
                 self._flow.addWidget(box)
                 box.show()
             self.boxes[name].setChecked(name in self._web.robots)
-        self.none.setVisible(not robots)
+        self.no_robots_label.setVisible(not robots)
 
     def _apply(self) -> None:
         self._web.set_robots([name for name, box in self.boxes.items() if box.isChecked()])
@@ -204,10 +204,10 @@ class PermissionForm(QWidget):
     def show_state(self) -> None:
         """Update the fields and explanations to the current permissions."""
         self.origins.show_origins(self._web.origins)
-        set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
+        set_role(self.origins_state, "error" if self.origins.is_invalid else "textTertiary")
         self.origins_state.setText(
             _("Enter an origin such as {example}.").format(example=EXAMPLE_ORIGIN)
-            if self.origins.is_wrong
+            if self.origins.is_invalid
             else _("Pages from other origins are blocked. Programs need only the token.")
         )
         self.robots.show_state()

@@ -91,7 +91,7 @@ class WebPagesSheet(Overlay):
 
     def _make_table(self) -> None:
         self.heading = label(_("Connected pages"), "title")
-        self.sums = label("", "body", role="textTertiary")
+        self.totals = label("", "body", role="textTertiary")
         self.model = PageTreeModel(self)
         self.table = PageTree(self.theme, self.model)
         self.table.setMinimumHeight(_MIN_TABLE_HEIGHT)
@@ -167,7 +167,7 @@ class WebPagesSheet(Overlay):
         heading.setContentsMargins(_SIDE - _TABLE_SIDE, 0, _SIDE - _TABLE_SIDE, 0)
         heading.setSpacing(8)
         heading.addWidget(self.heading)
-        heading.addWidget(self.sums, 1)
+        heading.addWidget(self.totals, 1)
         part = QVBoxLayout()
         part.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
         part.setSpacing(4)
@@ -210,7 +210,7 @@ class WebPagesSheet(Overlay):
         self.copy_page.clicked.connect(self._copy_page)
         self.test_page.clicked.connect(lambda: self._open_url(QUrl(self._web.local_page_url)))
 
-    def first(self) -> QWidget:
+    def initial_focus(self) -> QWidget:
         return self.switch
 
     def preferred_size(self, room: QSize) -> QSize:
@@ -293,7 +293,7 @@ class WebPagesSheet(Overlay):
         sums = _("{count}, {bandwidth} in total").format(
             count=group_digits(count), bandwidth=bandwidth_text(web.bytes_per_s)
         )
-        self.sums.setText(sums if count else "")
+        self.totals.setText(sums if count else "")
         paint.show_when(self.table, bool(pages))
         paint.show_when(self.empty, not pages)
         if web.state == "on":
