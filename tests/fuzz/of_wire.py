@@ -62,7 +62,7 @@ def split(data: bytes) -> None:
 
 
 def notices() -> Iterator[bytes]:
-    for kind in ({}, {"one_part": True}, {"tells": True}, {"batches": True}):
+    for kind in ({}, {"one_part": True}, {"acknowledges_echoes": True}, {"batches": True}):
         yield wire.hello_part(0x1234, "tö/pic", **kind)
     yield wire.acknowledgement_part(wire.Acknowledgement(1, 2, 3, 2**64 - 1))
     yield wire.acceptance_part(wire.OfferAcceptance(1, 2, 3))

@@ -35,7 +35,7 @@ class World:
     def answer(self, reach):
         assert self.came.wait(5.0)
         self.came.clear()
-        reach.changed(self.posted.pop())
+        reach.on_changed(self.posted.pop())
 
 
 @pytest.fixture

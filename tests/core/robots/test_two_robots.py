@@ -96,7 +96,7 @@ def test_real_robot_does_not_move_before_permission(session: Session, node: nep.
             assert moving.question.title == "Allow Turtle to move?"
         lit = session.fleet.invoke("Turtle", "light", {})  # an action without motion
         tick_until(session, lambda: lit.state == "succeeded")
-        assert wheels.still()
+        assert wheels.is_still()
         session.runs.stop()  # Stop needs no permission and closes the question
         assert moving.question is None
         tick_until(session, lambda: session.runs.view().state == "proven")
@@ -157,10 +157,10 @@ def test_permission_continues_the_requested_run_without_asking_again(
         session.runs.run()
         session.fleet.permission.answer(is_allowed=True)
         tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
-        tick_until(session, lambda: not wheels.still())
+        tick_until(session, lambda: not wheels.is_still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
-        assert wheels.still()
+        assert wheels.is_still()
         tried = session.fleet.invoke("Turtle", "move", {"distance": -0.1})
         tick_until(session, lambda: tried.state == "succeeded", FOUND_S)
 
@@ -196,14 +196,14 @@ def test_pause_halts_a_driving_robot_and_resume_continues_the_drive(session: Ses
         assert not [p for p in session.document.problems() if p.severity == "error"]
         session.runs.run()
         tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
-        tick_until(session, lambda: not wheels.still())
+        tick_until(session, lambda: not wheels.is_still())
         session.runs.pause()
-        tick_until(session, lambda: session.runs.view().state == "paused" and wheels.still())
+        tick_until(session, lambda: session.runs.view().state == "paused" and wheels.is_still())
         session.runs.resume()
-        tick_until(session, lambda: not wheels.still())
+        tick_until(session, lambda: not wheels.is_still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
-        assert wheels.still()
+        assert wheels.is_still()
 
 
 def test_robot_stands_still_after_a_single_step(session: Session, node: nep.Node) -> None:
@@ -215,9 +215,9 @@ def test_robot_stands_still_after_a_single_step(session: Session, node: nep.Node
         tick_until(session, lambda: session.runs.stopped_blocks == ("d",), FOUND_S)
         session.runs.step()
         tick_until(session, lambda: session.runs.stopped_blocks == ("w",), FOUND_S)
-        tick_until(session, wheels.still)
+        tick_until(session, wheels.is_still)
         session.runs.resume()
-        tick_until(session, lambda: not wheels.still())
+        tick_until(session, lambda: not wheels.is_still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
 
@@ -232,7 +232,7 @@ def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node)
         session.runs.set_pace(1.5)
         session.runs.run()
         tick_until(session, lambda: session.runs.running_blocks == ("h",), FOUND_S)
-        tick_until(session, wheels.still)
+        tick_until(session, wheels.is_still)
         tick_until(session, lambda: not session.runs.active, FOUND_S)
         way = math.dist(first, wheels.pose()[:2])
         assert 0.05 < way < 0.2  # 0.1 m; driving on during the pauses would give at least 0.4 m

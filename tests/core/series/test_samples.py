@@ -169,7 +169,7 @@ def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other)
         assert int(np.isnan(line.values).sum()) >= gaps_inside
     else:
         assert len(line.times) <= 3 * (columns + 2)
-        assert line.points > MAX_SAMPLES_PER_PIXEL * columns
+        assert line.sample_count > MAX_SAMPLES_PER_PIXEL * columns
 
 
 def test_long_gap_is_not_drawn_at_any_zoom_level() -> None:

@@ -58,7 +58,7 @@ class FakeNative:
     def data_of(self, message):
         return message.data
 
-    def show(self, programs):
+    def set_programs(self, programs):
         self._set(lambda: setattr(self, "programs", programs))
 
     def tick(self):

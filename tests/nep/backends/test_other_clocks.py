@@ -181,7 +181,7 @@ def test_invalid_clock_data_of_a_master_is_counted_and_ignored(
     with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
         sub, pub = node.new_sub("t"), node.new_pub("t")
         session = node._transport._sessions[master.address]
-        eventually(lambda: session._calls.rejections.count > 0)
+        eventually(lambda: session._client.rejections.count > 0)
         pub.publish({"x": 1})
         message = sub.receive(LONG_S)
         assert message is not None

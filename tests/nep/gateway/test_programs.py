@@ -32,7 +32,10 @@ def scene():
     known, processes = PortMap(None), FakeProcesses()
     known.assign(LINE, 9000)
     pair = SimpleNamespace(
-        ends=endpoints_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
+        ends=endpoints_of(LINE, 9000),
+        connections={"publisher": 0, "subscriber": 0},
+        openings=0,
+        unsupported_versions={},
     )
     now = [0.0]
     programs = ProgramTable(known, processes, lambda line: pair if line == LINE else None, lambda: now[0])

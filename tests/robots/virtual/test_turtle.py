@@ -194,8 +194,8 @@ def test_missing_heartbeat_of_the_program_stops_a_driving_robot(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "drive", program="test", speed=-0.2, turn=30)
     assert ears.final("1")["state"] == "succeeded"
-    eventually(lambda: not body.wheels.still())
-    eventually(body.wheels.still)  # no heartbeat was sent
+    eventually(lambda: not body.wheels.is_still())
+    eventually(body.wheels.is_still)  # no heartbeat was sent
     assert ears.heard["state"][-1]["figure"] == "turtle"
 
 
@@ -208,19 +208,19 @@ def test_robot_keeps_driving_while_its_program_sends_heartbeats_until_stopped(tu
         seen = len(ears.heard["pose"])
         ears.command(op="alive", id="a", **{"from": "test"})
         eventually(lambda seen=seen: len(ears.heard["pose"]) > seen)
-    assert not body.wheels.still()
+    assert not body.wheels.is_still()
     ears.command(id="s", op="stop")
     assert ears.final("s", "stop")["state"] == "succeeded"
-    assert body.wheels.still()
+    assert body.wheels.is_still()
 
 
 def test_stop_during_a_move_ends_the_move_immediately(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "move", distance=1.0)
-    eventually(lambda: not body.wheels.still())
+    eventually(lambda: not body.wheels.is_still())
     ears.command(id="s", op="stop")
     assert ears.final("s", "stop")["state"] == "succeeded"
-    assert body.wheels.still()
+    assert body.wheels.is_still()
     assert ears.final("1")["state"] == "canceled"
     where = pose(ears)
     seen = len(ears.heard["pose"])
@@ -241,7 +241,7 @@ def test_stop_fails_while_the_wheels_keep_turning(node: nep.Node) -> None:
     class Stubborn(ROBOT.body):  # type: ignore[name-defined, misc]
         def __init__(self, link: object) -> None:
             super().__init__(link)
-            self.wheels.still = lambda: False
+            self.wheels.is_still = lambda: False
 
     kind = replace(ROBOT, body=Stubborn)
     with nep.node("listener", "memory") as other, Driver(kind, "Turtle", node):

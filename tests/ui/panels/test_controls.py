@@ -79,7 +79,7 @@ def test_out_of_range_number_is_returned_by_the_form_unclamped_and_reported(qtbo
     QTest.keyClick(slider.field, Qt.Key.Key_Return)
     assert slider.field.text() == "12"
     form.show_problems(form.action.problems(form.input()))
-    shown = [text for text in (slider._sentence.text(), form._error_labels["d"].text()) if text]
+    shown = [text for text in (slider._error_label.text(), form._error_labels["d"].text()) if text]
     assert shown == ["The maximum is 1 m."]  # reported only once
     assert slider.field.property("wrong") == "true"
 
@@ -94,7 +94,7 @@ def test_number_field_returns_numbers_and_keeps_invalid_text(qtbot, theme, typed
     assert form.input() == ({} if given is None else {"x": given})
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert field.text() == (typed if given != 2.5 else field.text())
-    assert bool(field.sentence) is isinstance(given, str)
+    assert bool(field.problem) is isinstance(given, str)
 
 
 def test_integer_field_rejects_a_fraction_with_a_sentence(qtbot, theme) -> None:
@@ -258,10 +258,10 @@ def test_custom_colour_is_selected_from_the_strip_or_by_hex_code(qtbot, theme) -
     assert form.input() == {"c": "#00ff"}  # returned as typed
     assert form.action.check(form.input())
     QTest.keyClick(choice.field, Qt.Key.Key_Return)
-    assert "#33aaff" in choice._wrong.text()
+    assert "#33aaff" in choice._error_label.text()
     QTest.keyClicks(choice.field, "80")
     assert form.input() == {"c": "#00ff80"}
-    assert not choice._wrong.isVisible()
+    assert not choice._error_label.isVisible()
 
 
 # ---- images ----------------------------------------------------------------------------------------

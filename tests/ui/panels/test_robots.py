@@ -181,7 +181,7 @@ def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_remove
     qtbot.addWidget(panel)
     nao = panel.list.away["NAO"]
     assert nao.chip.text == "not running"
-    assert nao.where.startswith("seen ")
+    assert nao.location.startswith("seen ")
     menu = panel.list.menu_of(nao)
     assert [action.text() for action in menu.actions()] == ["Find the cause", "Forget NAO"]
     menu.actions()[1].trigger()

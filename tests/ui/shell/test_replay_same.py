@@ -161,11 +161,11 @@ class Studio:
             if topic not in newest:
                 continue
             inspector.show_topic(topic)
-            self.until(lambda seq=newest[topic].seq: inspector._shown and inspector._shown.seq == seq)
+            self.until(lambda seq=newest[topic].seq: inspector._shown_message and inspector._shown_message.seq == seq)
             inspector.mode.set_value("raw")
             self.window.tick()
-            inspector.bytes.show_bytes(inspector._shown.data)
-            held[f"{topic} in hex"] = (bytes(inspector._shown.data), inspector.bytes.text())
+            inspector.bytes.show_bytes(inspector._shown_message.data)
+            held[f"{topic} in hex"] = (bytes(inspector._shown_message.data), inspector.bytes.text())
             inspector.mode.set_value("tree")
             self.window.tick()
             held[f"{topic} as a tree"] = rows(inspector.model, QModelIndex())

@@ -31,7 +31,7 @@ class Run:
         self._left = list(left)
         self.is_asked = False
 
-    def left(self) -> list[Crash]:
+    def pop_crashes(self) -> list[Crash]:
         return [self._left.pop() for _each in list(self._left)]
 
     def expect_exit(self) -> None:
