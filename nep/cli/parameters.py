@@ -262,7 +262,7 @@ def _row(parameter: Mapping[str, object]) -> tuple[str, ...]:
 
 def _allowed_values(parameter: Mapping[str, object]) -> str:
     if parameter.get("read_only"):
-        return _("read only")
+        return _("read-only")
     choices = parameter.get("choices")
     if choices:
         return format_payload(choices, in_full=False)

@@ -37,7 +37,7 @@ def allowed_values_text(parameter: ReportedParameter) -> str:
     Return "" if every value is allowed.
     """
     if parameter.is_read_only:
-        return _("read only")
+        return _("read-only")
     if parameter.choices:
         texts = [shortened(format_value(each), 40) for each in parameter.choices[:MAX_DISPLAYED_CHOICES]]
         return (

@@ -36,7 +36,7 @@ class TopicList(QWidget):
         self._size_of: Callable[[RecordedTopic], float | None] = lambda _topic: None
         self.filter = FilterField(theme, _("Filter topics"))
         self.filter.textChanged.connect(self._show_rows)
-        self.all = Button(theme, _("All"), "check", size="small")
+        self.all = Button(theme, pgettext("topics", "All"), "check", size="small")
         self.none = Button(theme, _("None"), "minus", size="small")
         self.all.clicked.connect(lambda: self._set_matching_selected(is_selected=True))
         self.none.clicked.connect(lambda: self._set_matching_selected(is_selected=False))

@@ -143,7 +143,7 @@ class RecordSheet(Overlay):
         self.name = self._field(_("Name"), _("default: date and time"))
         self.note = self._field(_("Note"), _("subject"))
         options = [
-            ("all", _("All"), None),
+            ("all", pgettext("topics", "All"), None),
             ("chosen", _("Selected"), None),
             ("pattern", _("By pattern"), None),
         ]

@@ -193,7 +193,7 @@ def _seq_without_subscribers(bench: Bench) -> None:
 
 @rule(
     "stamp",
-    lazy("Stamps are nanoseconds since 1970 and never decrease."),
+    lazy("Time stamps are in nanoseconds since 1970 and never decrease."),
     "messages",
 )
 def _stamp(bench: Bench) -> None:
