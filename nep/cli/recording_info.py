@@ -59,7 +59,7 @@ def info(
     file: FileArgument,
     check_all: Annotated[
         bool,
-        typer.Option("--check", help=_("Check the whole file for damage, regardless of its format_size.")),
+        typer.Option("--check", help=_("Check the whole file for damage, regardless of its size.")),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -98,9 +98,7 @@ def ring(
     seconds: Annotated[
         float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("Length of the buffer."))
     ] = 60.0,
-    size_gb: Annotated[
-        float, typer.Option("--format_size", metavar="GB", help=_("Maximum format_size on disk."))
-    ] = 2.0,
+    size_gb: Annotated[float, typer.Option("--size", metavar="GB", help=_("Maximum size on disk."))] = 2.0,
     folder: Annotated[
         Path,
         typer.Option(

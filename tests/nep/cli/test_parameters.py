@@ -35,7 +35,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 def test_parameters_are_listed_read_and_set(node: nep.Node, run: TypeIn) -> None:
     told = run("list", "robot")
     assert told.returncode == 0
-    for word in ("speed", "0.5", "float", "0 ≤ … ≤ 2", "how fast, in m/s", '["walk","run"]', "read only"):
+    for word in ("speed", "0.5", "float", "0 ≤ … ≤ 2", "how fast, in m/s", '["walk","run"]', "read-only"):
         assert word in told.stdout
     assert [each["name"] for each in json.loads(run("list", "robot", "--json").stdout)] == [
         "speed",

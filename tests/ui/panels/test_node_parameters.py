@@ -107,7 +107,7 @@ def test_parameters_are_shown_with_their_allowed_values(world: World) -> None:
         ("speed", "0.5", "0 to 2"),
         ("gait", "walk", "walk or run"),
         ("lights", "true", ""),
-        ("serial", "7", "read only"),
+        ("serial", "7", "read-only"),
     ]
     assert world.cells()[4][1].endswith("x… (5000 characters)")
     assert len(world.cells()[4][1]) < 250
@@ -218,7 +218,7 @@ def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
         (ReportedParameter("a", 1, "int", minimum=0), "0 or more"),
         (ReportedParameter("a", 1, "float", maximum=0.5), "0.5 or less"),
         (ReportedParameter("a", 1, "int", choices=tuple(range(9))), "0, 1, 2, 3, 4, 5 …"),
-        (ReportedParameter("a", 1, "int", minimum=0, is_read_only=True), "read only"),
+        (ReportedParameter("a", 1, "int", minimum=0, is_read_only=True), "read-only"),
     ],
 )
 def test_allowed_values_of_a_parameter_are_described(parameter: ReportedParameter, words: str) -> None:

@@ -14,7 +14,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy, ngettext, pgettext
 from nep.recordings.reader import RecordedTopic
 
 TABLE_HEIGHT = 150
