@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol, runtime_checkable
 
 import PySide6
 from PySide6.QtCore import QEvent, QObject, QTimer, qVersion
@@ -23,6 +22,7 @@ from app.core.self_test.environment import PICTURE
 from app.core.session import Session
 from app.ui.application import Options, run, startup_problem
 from app.ui.self_drive import SelfDrive, Step
+from app.ui.shell.commands.program_pictures import SupportsPicture
 from app.ui.shell.main_window import MainWindow
 from nep.i18n import _
 
@@ -36,20 +36,6 @@ REPORTED_LEVELS, MAX_REPORTED_RECORDS = ("warn", "error"), 40
 """Levels of the log records in the report, and their maximum number."""
 MIN_COLOURS = 24
 """Minimum number of colours in a screenshot; an empty or incomplete window has fewer."""
-
-
-@runtime_checkable
-class SupportsPictures(Protocol):
-    """Interface of a panel that can render its blocks as an image."""
-
-    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
-        """Render all blocks.
-
-        Args:
-            kind: Image format, "png" or "svg".
-            white: True for a white background, False for a transparent one.
-            callback: Called with the image data; b"" if there is no page or there are no blocks.
-        """
 
 
 class FirstPaint(QObject):
@@ -193,9 +179,9 @@ class WindowSteps:
 
     def _has_blocks(self) -> bool:
         editor = self._window.editor()
-        if not self._is_drawing_requested and isinstance(editor, SupportsPictures):
+        if not self._is_drawing_requested and isinstance(editor, SupportsPicture):
             self._is_drawing_requested = True
-            editor.picture("svg", True, self._on_drawing)
+            editor.render_picture("svg", True, self._on_drawing)
         return bool(self._drawing)
 
     def _on_drawing(self, drawing: bytes) -> None:

@@ -24,7 +24,7 @@ class Editor:
         self.data = data
         self.asked: list[tuple[str, bool]] = []
 
-    def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
+    def render_picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         self.asked.append((kind, white))
         done(self.data)
 

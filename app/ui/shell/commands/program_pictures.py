@@ -42,7 +42,7 @@ def suggested_path(document: Document) -> Path:
 class SupportsPicture(Protocol):
     """Interface of a panel that can render an image of its contents."""
 
-    def picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
+    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks.
 
         Args:
@@ -108,7 +108,7 @@ class ImageCommands:
     def _render(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPicture):
-            editor.picture(kind, white, callback)
+            editor.render_picture(kind, white, callback)
 
     def _notify_no_blocks(self) -> None:
         self._shell.show_toast(_("This page has no blocks"))
