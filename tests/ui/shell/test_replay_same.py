@@ -161,7 +161,9 @@ class Studio:
             if topic not in newest:
                 continue
             inspector.show_topic(topic)
-            self.until(lambda seq=newest[topic].seq: inspector._shown_message and inspector._shown_message.seq == seq)
+            self.until(
+                lambda seq=newest[topic].seq: inspector._shown_message and inspector._shown_message.seq == seq
+            )
             inspector.mode.set_value("raw")
             self.window.tick()
             inspector.bytes.show_bytes(inspector._shown_message.data)

@@ -137,7 +137,9 @@ def test_second_window_does_not_replace_the_single_instance_server(qtbot, name: 
 @pytest.mark.skipif(os.name != "posix", reason="a named pipe goes with its process")
 def test_stale_socket_of_a_killed_studio_is_replaced(qtbot, name: str) -> None:
     code = "import sys; from app.ui.startup.single_instance import *; "
-    code += "m = SingleInstanceServer(sys.argv[1], print); print(m.is_listening, flush=True); sys.stdin.read()"
+    code += (
+        "m = SingleInstanceServer(sys.argv[1], print); print(m.is_listening, flush=True); sys.stdin.read()"
+    )
     environ = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
     process = subprocess.Popen(
         [sys.executable, "-c", code, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environ
