@@ -169,7 +169,7 @@ def test_unsupported_version_is_shown_only_if_the_program_is_unambiguous(scene):
     register(scene)
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
-    scene.pair.unserved["subscriber"] = "0.5.4.6"
+    scene.pair.unsupported_versions["subscriber"] = "0.5.4.6"
     scene.programs.update()
     (program,) = scene.programs.programs()
     assert program.generation == "0.5.4.6"
