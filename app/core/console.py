@@ -74,7 +74,7 @@ class Console:
 
         Args:
             messages: Log messages, oldest first.
-            dropped: Number of messages lost before ``messages``.
+            dropped: Number of messages dropped before ``messages`` because too many arrived at once.
         """
         if dropped:
             self.dropped_count += dropped

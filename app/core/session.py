@@ -322,7 +322,7 @@ class Session:
         with self.guarded(lazy("update the robots of the program")):
             self.runs.update_robots()
         with self.guarded(lazy("stop robots again")):
-            for name in self.fleet.take_settled():
+            for name in self.fleet.pop_settled_robots():
                 self.runs.stop_again(name)
         with self.guarded(lazy("monitor started programs")):
             self.launcher.start_requested_robots()

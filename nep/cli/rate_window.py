@@ -128,10 +128,10 @@ class LatchedFilter:
         self._publishers: set[int | None] = set()
 
     def predates_subscription(self, message: Message, now: float) -> bool:
-        """Return True if a message was published before the subscription started.
+        """Return True if a latched message was published before the subscription started.
 
         Until the publisher's clock has been compared with this computer's clock, the first message of
-        each latched publisher is treated as a replay.
+        each latched publisher is assumed to be older.
 
         Args:
             message: Received message.

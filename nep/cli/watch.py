@@ -18,8 +18,9 @@ from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
 from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_flight_recorder
 from nep.cli.screen import console, print_status, show_json, write
+from nep.cli.topic_wait import suggestion
 from nep.cli.values import escape_for_terminal
-from nep.errors import NepError, nearest
+from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -279,11 +280,8 @@ class _AlarmRunner:
             names = nodes if condition.is_about_node else topics
             if condition.name in names or condition.kind in {"appears", "comes"}:
                 continue
-            nearest_name = nearest(condition.name, names)
-            hint = "" if nearest_name is None else " " + _("did you mean '{near}'?").format(near=nearest_name)
-            print_status(
-                _("'{name}' doesn't exist yet; waiting.{meant}").format(name=condition.name, meant=hint)
-            )
+            template = _("'{name}' doesn't exist yet; {meant}waiting (Ctrl+C to stop)")
+            print_status(template.format(name=condition.name, meant=suggestion(condition.name, names)))
 
     # ---- actions
 

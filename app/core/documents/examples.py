@@ -79,19 +79,19 @@ def _translate_value(value: object, translate_text: TranslateText, label: Callab
         fields["TEXT"] = translate_text(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
         fields["NAME"] = label(str(fields["NAME"]))
-    for note in _nested_dicts(result.get("workspaceComments")):
+    for note in _dicts_in_list(result.get("workspaceComments")):
         note["text"] = translate_text(NOTE, str(note.get("text", "")))
-    for variable in _nested_dicts(result.get("variables")):
+    for variable in _dicts_in_list(result.get("variables")):
         variable["name"] = label(str(variable["name"]))
     state = result.get("extraState")
     if isinstance(state, dict):
-        for named_entry in (state, *_nested_dicts(state.get("inputs"))):
+        for named_entry in (state, *_dicts_in_list(state.get("inputs"))):
             if "name" in named_entry:
                 named_entry["name"] = label(str(named_entry["name"]))
     return result
 
 
-def _nested_dicts(value: object) -> list[dict[str, object]]:
+def _dicts_in_list(value: object) -> list[dict[str, object]]:
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 

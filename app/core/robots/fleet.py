@@ -309,9 +309,9 @@ class Fleet:
                 link.stop_problem = ""
                 self._update_motion(link)
 
-    def take_settled(self) -> tuple[str, ...]:
+    def pop_settled_robots(self) -> tuple[str, ...]:
         """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""
-        return self._messages.take_settled()
+        return self._messages.pop_settled_robots()
 
     # -- input from the session ------------------------------------------------------------------------------
 

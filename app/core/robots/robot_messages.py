@@ -75,7 +75,7 @@ class RobotMessages:
         """Discard the stored replies of a robot."""
         self._pending_messages.pop(name, None)
 
-    def take_settled(self) -> tuple[str, ...]:
+    def pop_settled_robots(self) -> tuple[str, ...]:
         """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""
         settled, self._settled = tuple(self._settled), {}
         return settled

@@ -32,7 +32,7 @@ class StepReport:
         description: Expected result, as a sentence.
         timeout_s: Time limit in seconds.
         start_ms: Start of the step.
-        duration_ms: Duration; None while the step is in progress.
+        end_ms: End of the step; None while it is in progress.
         is_ok: True if the step succeeded.
         details: Details of the result, or the reason for the failure.
     """
@@ -41,7 +41,7 @@ class StepReport:
     description: str
     timeout_s: float
     start_ms: int
-    duration_ms: int | None = None
+    end_ms: int | None = None
     is_ok: bool = False
     details: str = ""
 
@@ -50,7 +50,7 @@ class StepReport:
         return {
             "name": self.name,
             "ok": self.is_ok,
-            "ms": self.duration_ms,
+            "ms": self.end_ms,
             "began_ms": self.start_ms,
             "bound_s": self.timeout_s,
             "words": self.description,
@@ -103,7 +103,7 @@ class Report:
         """Step in progress, or None."""
         with self._lock:
             newest = self._steps[-1] if self._steps else None
-            return newest if newest is not None and newest.duration_ms is None else None
+            return newest if newest is not None and newest.end_ms is None else None
 
     def add_computer_info(self, **info: object) -> None:
         """Add information about this computer."""
@@ -139,7 +139,7 @@ class Report:
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.duration_ms, step.is_ok, step.details = self.now_ms(), True, details
+                step.end_ms, step.is_ok, step.details = self.now_ms(), True, details
                 self._write()
 
     def fail(self, reason: str) -> None:
@@ -147,7 +147,7 @@ class Report:
         with self._lock:
             step = self.current_step
             if step is not None:
-                step.duration_ms, step.details = self.now_ms(), reason
+                step.end_ms, step.details = self.now_ms(), reason
             self._failure = self._failure or reason
             self._write()
 

@@ -37,7 +37,7 @@ class ThemeValues(Protocol):
         """Return a length in px by its path in the tokens."""
 
     def scaled(self, pixels: float) -> float:
-        """Return a length in px multiplied by the text size."""
+        """Scale a length, given in px at 100 % text size, to the current text size."""
 
     def text_kinds(self) -> Mapping[str, TextKind]:
         """Return the kinds of text by name."""

@@ -303,7 +303,7 @@ class Theme(QObject):
     # -- fonts and icons --------------------------------------------------------------------------
 
     def scaled(self, pixels: float) -> float:
-        """Return a length in px multiplied by the text size."""
+        """Scale a length, given in px at 100 % text size, to the current text size."""
         return pixels * self._text_percent / 100
 
     def font(self, kind: str) -> QFont:

@@ -376,7 +376,7 @@ class _Reader:
                 )
 
     def _fail(self, key: str, message: str, index: int | None = None) -> NoReturn:
-        line = self._line(key, index)
+        line = self._line_number(key, index)
         if key:
             template = _("line {line} of '{path}', '{key}': {sentence}")
             raise _InvalidAlarmError(
@@ -386,7 +386,7 @@ class _Reader:
             _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=message)
         )
 
-    def _line(self, key: str, index: int | None) -> int:
+    def _line_number(self, key: str, index: int | None) -> int:
         if self._spans is None:
             self._spans = list(_alarm_spans(self._text))
         begin, end = 0, len(self._text)

@@ -112,7 +112,7 @@ def test_message_is_published_and_a_misspelt_topic_reported(master, type_in, fil
     with Talker(master.address, "/distance", {"range": 0.3}) as node, node.new_sub("/say", "json") as heard:
         done = type_in("watch", name, "-n", "1", "--master", master.address)
         assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
-    assert "'/distanse' doesn't exist yet; waiting. did you mean '/distance'?" in done.stderr
+    assert "'/distanse' doesn't exist yet; did you mean '/distance'?" in done.stderr
     assert "sent to /say" in done.stdout
 
 

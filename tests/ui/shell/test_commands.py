@@ -154,7 +154,7 @@ def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) 
     with pytest.raises(UnknownCommandError, match=r"help\.nobody"):
         window.context.run("help.nobody")
     with pytest.raises(UnknownCommandError):
-        window.commands.shortcuts.keys_of("help.nobody")
+        window.commands.shortcuts.shortcuts_of("help.nobody")
 
 
 def test_command_arguments_are_parsed_to_typed_values() -> None:

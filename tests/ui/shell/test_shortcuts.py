@@ -38,13 +38,13 @@ def keys(qapp: object, tmp_path: Path) -> Shortcuts:
 
 
 def test_default_shortcuts_are_unique(keys: Shortcuts) -> None:
-    given = [key for row in COMMANDS for key in keys.keys_of(row.id)]
+    given = [key for row in COMMANDS for key in keys.shortcuts_of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert all(key == QKeySequence(key).toString() for key in given)
 
 
 def test_ctrl_y_triggers_redo(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
-    assert keys.keys_of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
+    assert keys.shortcuts_of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
     assert [key.toString() for key in commands.actions["edit.redo"].shortcuts()] == ["Ctrl+Shift+Z", "Ctrl+Y"]
     assert keys.command_for("Ctrl+Y") == "edit.redo"
 
@@ -52,14 +52,14 @@ def test_ctrl_y_triggers_redo(window: MainWindow, commands: Commands, keys: Shor
 def test_macos_shortcuts_avoid_system_keys_and_option_characters(qapp: object, tmp_path: Path) -> None:
     """On macOS, Qt maps Ctrl to Cmd and Meta to Ctrl; Option types characters, Cmd+Tab switches programs."""
     keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS, platform="darwin")
-    given = [key for row in COMMANDS for key in keys.keys_of(row.id)]
+    given = [key for row in COMMANDS for key in keys.shortcuts_of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert not {"Ctrl+Tab", "Ctrl+Shift+Tab", "Ctrl+H", "Ctrl+M", "Ctrl+Space"} & set(given)
     assert not [key for key in given if key.startswith("Alt+")]
     arrows = ("Left", "Right", "Up", "Down", "Home", "End", "Backspace", "Delete")
     assert not [key for key in given if key.endswith(arrows)], "they move in the text of a field"
-    assert keys.keys_of("tab.next") == ("Meta+Tab", "Ctrl+Shift+]")
-    assert keys.keys_of("layout.behaviour") == ("Ctrl+Alt+1",)
+    assert keys.shortcuts_of("tab.next") == ("Meta+Tab", "Ctrl+Shift+]")
+    assert keys.shortcuts_of("layout.behaviour") == ("Ctrl+Alt+1",)
     assert not keys.is_customised("tab.next")
 
 
@@ -111,56 +111,56 @@ def test_text_navigation_keys_are_handled_by_the_text_field(
 def test_changed_shortcut_is_saved(keys: Shortcuts, tmp_path: Path) -> None:
     keys.assign("file.save", "Ctrl+Alt+S")
     again = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
-    assert again.keys_of("file.save") == ("Ctrl+Alt+S",)
+    assert again.shortcuts_of("file.save") == ("Ctrl+Alt+S",)
     assert again.is_customised("file.save")
     assert not again.is_customised("file.open")
 
 
 def test_reassigned_shortcut_is_removed_from_its_previous_command(keys: Shortcuts) -> None:
     keys.assign("file.open", "Ctrl+S")
-    assert keys.keys_of("file.save") == ()
+    assert keys.shortcuts_of("file.save") == ()
     assert keys.command_for("Ctrl+S") == "file.open"
 
 
 def test_two_commands_swap_their_shortcuts(keys: Shortcuts) -> None:
     keys.swap("file.open", "Ctrl+S")
-    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
+    assert (keys.shortcuts_of("file.open"), keys.shortcuts_of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
 
 
 def test_a_single_shortcut_or_all_shortcuts_can_be_reset(keys: Shortcuts, tmp_path: Path) -> None:
     keys.swap("file.open", "Ctrl+S")
     keys.reset("file.open")
-    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
+    assert (keys.shortcuts_of("file.open"), keys.shortcuts_of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
     keys.swap("file.open", "Ctrl+S")
     keys.assign("file.new", "Ctrl+S")  # "Open" has no shortcut now, "Save" has Ctrl+O
     keys.reset("file.open")
-    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ())
-    assert keys.keys_of("file.new") == ("Ctrl+S",)
+    assert (keys.shortcuts_of("file.open"), keys.shortcuts_of("file.save")) == (("Ctrl+O",), ())
+    assert keys.shortcuts_of("file.new") == ("Ctrl+S",)
     keys.reset_all()
-    assert keys.keys_of("file.save") == ("Ctrl+S",)
+    assert keys.shortcuts_of("file.save") == ("Ctrl+S",)
     assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}
 
 
 def test_stop_keeps_f12_and_may_have_a_second_shortcut(keys: Shortcuts) -> None:
     keys.assign("run.stop", "")
-    assert keys.keys_of("run.stop") == ("F12",)
+    assert keys.shortcuts_of("run.stop") == ("F12",)
     keys.assign("run.stop", "Ctrl+.")
-    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
+    assert keys.shortcuts_of("run.stop") == ("F12", "Ctrl+.")
     keys.swap("run.stop", "F5")
-    assert keys.keys_of("run.stop") == ("F12", "F5")
-    assert keys.keys_of("run.run") == ()
+    assert keys.shortcuts_of("run.stop") == ("F12", "F5")
+    assert keys.shortcuts_of("run.run") == ()
     keys.reset("run.stop")
-    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
+    assert keys.shortcuts_of("run.stop") == ("F12", "Ctrl+.")
 
 
 def test_default_second_shortcut_of_stop_yields_to_a_user_assignment(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.step": ["Ctrl+."]})
     keys = Shortcuts(settings, print, COMMANDS)
-    assert keys.keys_of("run.stop") == ("F12",)
+    assert keys.shortcuts_of("run.stop") == ("F12",)
     assert keys.command_for("Ctrl+.") == "run.step"
     keys.reset("run.step")
-    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
+    assert keys.shortcuts_of("run.stop") == ("F12", "Ctrl+.")
 
 
 def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
@@ -169,9 +169,9 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
     keys = Shortcuts(settings, lambda _sentence: None, COMMANDS)
-    assert keys.keys_of("run.run") == ()
-    assert keys.keys_of("run.stop") == ("F12",)
-    assert keys.keys_of("file.open") == ("Ctrl+O",)
+    assert keys.shortcuts_of("run.run") == ()
+    assert keys.shortcuts_of("run.stop") == ("F12",)
+    assert keys.shortcuts_of("file.open") == ("Ctrl+O",)
 
 
 @pytest.mark.parametrize(
@@ -264,11 +264,11 @@ def test_shortcut_conflict_names_the_other_command_and_can_swap(
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_S, CTRL)
     assert "“Save”" in sheet.hint.text()
-    assert commands.shortcuts.keys_of("file.open") == ("Ctrl+O",)
+    assert commands.shortcuts.shortcuts_of("file.open") == ("Ctrl+O",)
     assert sheet.swap.isVisible()
     QTest.mouseClick(sheet.swap, Qt.MouseButton.LeftButton)
-    assert commands.shortcuts.keys_of("file.open") == ("Ctrl+S",)
-    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+O",)
+    assert commands.shortcuts.shortcuts_of("file.open") == ("Ctrl+S",)
+    assert commands.shortcuts.shortcuts_of("file.save") == ("Ctrl+O",)
     assert not sheet.swap.isVisible()
 
 
@@ -277,7 +277,7 @@ def test_esc_cancels_recording_a_shortcut(sheet: ShortcutSheet, commands: Comman
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_Escape)
     assert sheet.isVisible()
-    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.shortcuts_of("file.save") == ("Ctrl+S",)
 
 
 def test_f12_stops_while_a_shortcut_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -287,7 +287,7 @@ def test_f12_stops_while_a_shortcut_is_recorded(sheet: ShortcutSheet, commands: 
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_F12)
     assert stops == ["stop"]
-    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.shortcuts_of("file.save") == ("Ctrl+S",)
 
 
 def test_recording_a_shortcut_does_not_trigger_its_current_command(
@@ -308,17 +308,17 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     sheet.rows.setFocus()
     sheet.field.setFocus()
     sheet._remove_shortcut()
-    assert keys.keys_of("file.save") == ()
+    assert keys.shortcuts_of("file.save") == ()
     assert sheet.reset.isEnabled()
     QTest.mouseClick(sheet.reset, Qt.MouseButton.LeftButton)
-    assert keys.keys_of("file.save") == ("Ctrl+S",)
+    assert keys.shortcuts_of("file.save") == ("Ctrl+S",)
     keys.assign("file.save", "F3")
     QTest.mouseClick(sheet.reset_all, Qt.MouseButton.LeftButton)
-    assert keys.keys_of("file.save") == ("Ctrl+S",)
+    assert keys.shortcuts_of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
     sheet._remove_shortcut()
     assert sheet.hint.text() == "F12 is now the only shortcut for Stop."
-    assert keys.keys_of("run.stop") == ("F12",)
+    assert keys.shortcuts_of("run.stop") == ("F12",)
     sheet._remove_shortcut()
     assert sheet.hint.text() == "F12 can't be removed: it always triggers Stop."
 
@@ -337,7 +337,7 @@ def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(
     assert sheet.rows.entry is not None
     assert sheet.rows.entry.name == "file.save_as"
     press(sheet, Qt.Key.Key_F7)
-    assert commands.shortcuts.keys_of("file.save_as") == ("F7",)
+    assert commands.shortcuts.shortcuts_of("file.save_as") == ("F7",)
 
 
 def test_ctrl_f_searches_blocks_only_in_the_behaviour_layout(

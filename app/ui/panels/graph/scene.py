@@ -210,7 +210,7 @@ class GraphScene:
     # -- figures ------------------------------------------------------------------------------------------
 
     def items_in(self, area: QRectF) -> list[NodeItem | LineItem]:
-        """Return the nodes and lines within an area."""
+        """Return the nodes and lines that intersect an area."""
         nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 

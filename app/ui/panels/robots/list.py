@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from app.core.robots.known_robots import KnownRobot
     from app.core.robots.robot_link import RobotLink
 
-TURTLE_KIND = "diffdrive"
+TURTLE_MODEL = "diffdrive"
 LIST_WIDTH = 300
 
 
@@ -208,7 +208,7 @@ class RobotList(QWidget):
                 self.away[robot.name] = item
             self.away[robot.name].show_disconnected(seen_text(robot.last_connected_s))
         self.turtle.setVisible(
-            not any(link.robot.model == TURTLE_KIND and link.is_connected for link in links)
+            not any(link.robot.model == TURTLE_MODEL and link.is_connected for link in links)
         )
 
     def _make_item(self, name: str, index: int) -> RobotItem:

@@ -83,7 +83,7 @@ class Actions:
         assign_command(button, name)
         button.clicked.connect(self[name].trigger)
 
-    def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
+    def set_shortcuts(self, keys_of: Callable[[str], Sequence[str]]) -> None:
         """Set the shortcuts of all commands.
 
         Args:

@@ -144,7 +144,7 @@ class Shortcuts(QObject):
         super().__init__()
         self._settings, self._report_error, self._platform = settings, report_error, platform
         self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
-        self._custom_keys = self._read()
+        self._custom_shortcuts = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
         saved: dict[str, object] = self._settings.get("shortcuts", {})
@@ -157,7 +157,7 @@ class Shortcuts(QObject):
                 shortcuts[name] = valid_keys
         return shortcuts
 
-    def default_keys(self, name: str) -> tuple[str, ...]:
+    def default_shortcuts(self, name: str) -> tuple[str, ...]:
         """Return the default shortcuts of a command.
 
         Raises:
@@ -168,16 +168,16 @@ class Shortcuts(QObject):
             raise UnknownCommandError(name)
         return tuple(normalize_key(key) for key in command.default_keys(self._platform))
 
-    def keys_of(self, name: str) -> tuple[str, ...]:
+    def shortcuts_of(self, name: str) -> tuple[str, ...]:
         """Return the current shortcuts of a command; menus show the first one.
 
         The first shortcut of Stop is always F12.
         """
-        keys = self._custom_keys.get(name, self.default_keys(name))
+        keys = self._custom_shortcuts.get(name, self.default_shortcuts(name))
         if name == STOP_COMMAND:
             assigned = {
                 key
-                for other, other_keys in self._custom_keys.items()
+                for other, other_keys in self._custom_shortcuts.items()
                 if other != STOP_COMMAND
                 for key in other_keys
             }
@@ -186,15 +186,15 @@ class Shortcuts(QObject):
 
     def first(self, name: str) -> str:
         """Return the first shortcut of a command, or "" if it has none."""
-        return next(iter(self.keys_of(name)), "")
+        return next(iter(self.shortcuts_of(name)), "")
 
     def is_customised(self, name: str) -> bool:
         """Return True if the shortcuts of a command differ from the defaults."""
-        return self.keys_of(name) != self.default_keys(name)
+        return self.shortcuts_of(name) != self.default_shortcuts(name)
 
     def command_for(self, key: str) -> str:
         """Return the name of the command to which a shortcut is assigned, or ""."""
-        return next((name for name in self.commands if normalize_key(key) in self.keys_of(name)), "")
+        return next((name for name in self.commands if normalize_key(key) in self.shortcuts_of(name)), "")
 
     def rejection_reason(self, name: str, pressed: QKeyCombination) -> str:
         """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
@@ -205,7 +205,7 @@ class Shortcuts(QObject):
         if not modifiers and pressed.key() not in FUNCTION_KEYS:
             return _(MODIFIER_REQUIRED_TEXT)
         for fixed in FIXED_KEYS:
-            is_own_default = key in self.default_keys(
+            is_own_default = key in self.default_shortcuts(
                 name
             )  # Ctrl+F is "find" both in the Inspector and in the blocks
             if (
@@ -229,8 +229,8 @@ class Shortcuts(QObject):
         """
         key, owner = normalize_key(key), self.command_for(key)
         if owner and owner != name:
-            self._custom_keys[owner] = tuple(each for each in self.keys_of(owner) if each != key)
-        self._custom_keys[name] = (key,) if key else ()
+            self._custom_shortcuts[owner] = tuple(each for each in self.shortcuts_of(owner) if each != key)
+        self._custom_shortcuts[name] = (key,) if key else ()
         self._save()
 
     def swap(self, name: str, key: str) -> None:
@@ -239,9 +239,9 @@ class Shortcuts(QObject):
         Both commands lose their other shortcuts. F12 stays assigned to Stop.
         """
         owner, before = self.command_for(key), self.first(name)
-        self._custom_keys[name] = (normalize_key(key),)
+        self._custom_shortcuts[name] = (normalize_key(key),)
         if owner and owner != name:
-            self._custom_keys[owner] = (before,) if before and before != STOP_KEY else ()
+            self._custom_shortcuts[owner] = (before,) if before and before != STOP_KEY else ()
         self._save()
 
     def reset(self, name: str) -> None:
@@ -250,26 +250,34 @@ class Shortcuts(QObject):
         Another command that loses its only shortcut gets its default back, unless that is assigned to a
         third command. After a swap, therefore, no command is left without a shortcut.
         """
-        self._custom_keys.pop(name, None)
-        for key in self.default_keys(name):
+        self._custom_shortcuts.pop(name, None)
+        for key in self.default_shortcuts(name):
             for other in [
-                each for each in self._custom_keys if each != name and key in self._custom_keys[each]
+                each
+                for each in self._custom_shortcuts
+                if each != name and key in self._custom_shortcuts[each]
             ]:
-                self._custom_keys[other] = tuple(each for each in self._custom_keys[other] if each != key)
-                if not self._custom_keys[other] and not any(map(self.command_for, self.default_keys(other))):
-                    del self._custom_keys[other]
+                self._custom_shortcuts[other] = tuple(
+                    each for each in self._custom_shortcuts[other] if each != key
+                )
+                if not self._custom_shortcuts[other] and not any(
+                    map(self.command_for, self.default_shortcuts(other))
+                ):
+                    del self._custom_shortcuts[other]
         self._save()
 
     def reset_all(self) -> None:
         """Restore the default shortcuts of all commands."""
-        self._custom_keys = {}
+        self._custom_shortcuts = {}
         self._save()
 
     def _save(self) -> None:
-        for name in [name for name in self._custom_keys if not self.is_customised(name)]:
-            del self._custom_keys[name]
+        for name in [name for name in self._custom_shortcuts if not self.is_customised(name)]:
+            del self._custom_shortcuts[name]
         try:
-            self._settings.set("shortcuts", {name: list(keys) for name, keys in self._custom_keys.items()})
+            self._settings.set(
+                "shortcuts", {name: list(keys) for name, keys in self._custom_shortcuts.items()}
+            )
         except SettingsError as error:
             self._report_error(str(error))
         self.changed.emit()
@@ -283,4 +291,4 @@ class Shortcuts(QObject):
                 # the tooltip is the only text of an icon button
                 if not text or isinstance(widget, IconButton):
                     text = widget.accessibleName()
-                widget.setToolTip(plain.tip(tip_with_key(text, ", ".join(self.keys_of(command)))))
+                widget.setToolTip(plain.tip(tip_with_key(text, ", ".join(self.shortcuts_of(command)))))

@@ -69,7 +69,7 @@ class Commands:
         self.actions.select("run.full_speed")
         self.actions["run.from_start"].setChecked(session.fleet.resets_at_start)
         self.stop_keys = StopKeys(
-            shell.surface, lambda: keys.keys_of(STOP_COMMAND), self.actions[STOP_COMMAND].trigger
+            shell.surface, lambda: keys.shortcuts_of(STOP_COMMAND), self.actions[STOP_COMMAND].trigger
         )
 
     def run(self, name: str) -> bool:

@@ -131,8 +131,10 @@ class ViewCommands:
         the key.
         """
         is_behaviour = self._shell.current_layout == "behaviour" and self._shell.bench is not None
-        keys_of = self.shortcuts.keys_of
-        self._actions.set_keys(lambda name: keys_of(name) if is_behaviour or name != "blocks.find" else ())
+        keys_of = self.shortcuts.shortcuts_of
+        self._actions.set_shortcuts(
+            lambda name: keys_of(name) if is_behaviour or name != "blocks.find" else ()
+        )
 
     def run_shortcut(self, key: str) -> bool:
         """Run the command to which a shortcut is assigned; return False if none is available."""

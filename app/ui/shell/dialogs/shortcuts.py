@@ -127,7 +127,7 @@ class ShortcutSheet(Overlay):
         for command in self._shortcuts.commands.values():
             if not command.in_shortcuts:
                 continue
-            keys = "\n".join(self._shortcuts.keys_of(command.id))
+            keys = "\n".join(self._shortcuts.shortcuts_of(command.id))
             note = _("custom") if self._shortcuts.is_customised(command.id) else ""
             group_name = command.menu or GROUP_LABELS.get(command.id.partition(".")[0], "View")
             group = groups.setdefault(_(group_name), [])
@@ -241,9 +241,9 @@ class ShortcutSheet(Overlay):
 
     def _remove_shortcut(self) -> None:
         entry = self.rows.entry
-        if entry is None or entry.kind != "command" or not self._shortcuts.keys_of(entry.name):
+        if entry is None or entry.kind != "command" or not self._shortcuts.shortcuts_of(entry.name):
             return
-        if entry.name == STOP_COMMAND and len(self._shortcuts.keys_of(STOP_COMMAND)) == 1:
+        if entry.name == STOP_COMMAND and len(self._shortcuts.shortcuts_of(STOP_COMMAND)) == 1:
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
         message = _("“{command}” no longer has a shortcut.").format(command=entry.text)

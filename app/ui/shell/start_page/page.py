@@ -398,7 +398,7 @@ class StartPage(QWidget):
             self.offer_first_steps(False)
 
     def focus_first(self) -> None:
-        """Set the focus to the primary button and scroll to the top."""
+        """Scroll to the top and focus the first open behaviour or, if there is none, the primary button."""
         self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
         first = self._learn if self._is_offering_first_steps else self._use_button

@@ -203,6 +203,8 @@ def _stamp(bench: Bench) -> None:
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
     now = time.time_ns()
     if any(abs(now - each) > _MAX_STAMP_ERROR_NS for each in stamps):
-        raise broken_rule_error(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
+        raise broken_rule_error(
+            _("the time stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now)
+        )
     if stamps != sorted(stamps):
-        raise broken_rule_error(_("the stamps are {seen}").format(seen=printable(stamps)))
+        raise broken_rule_error(_("the time stamps are {seen}").format(seen=printable(stamps)))
