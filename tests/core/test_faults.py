@@ -211,7 +211,7 @@ def test_event_handler_that_raises_does_not_block_other_events(
         "traffic.add",
         "traffic.count_lost",
         "fleet.add",
-        "fleet.take_settled",
+        "fleet.pop_settled_robots",
         "launcher.start_requested_robots",
         "launcher.check",
         "documents.set_topics",
