@@ -108,7 +108,10 @@ class BlocklyView(BlocklyHost):
 
     @property
     def workspace(self) -> Mapping[str, object]:
-        """Latest workspace of the shown tab, in Blockly's JSON format. Edits of the last 150 ms may be missing; see `flush`."""
+        """Latest workspace of the shown tab, in Blockly's JSON format.
+
+        Edits of the last 150 ms may be missing; see `flush`.
+        """
         return self._tabs.shown.program.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:

@@ -323,7 +323,7 @@ def test_texts_are_translated_and_fit(
     desk.window.resize(*size)
     desk.web.listen_on(WIFI.host)
     server = with_pages(desk)
-    server.refusals = (Rejection(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
+    server.rejections = (Rejection(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
     desk.sheet.permissions.robots.open_list()
     desk.sheet.permissions.origins.edit.setText("wrong")
     desk.sheet.permissions.origins.edit.completed.emit()
