@@ -213,7 +213,7 @@ def test_packages_are_installed_by_hash_and_the_project_without_dependencies(
 
 
 @pytest.mark.parametrize("missing", ["requirements/installer.txt", "uv"])
-def test_pip_is_used_if_uv_is_unavailable_or_offline(
+def test_pip_is_used_if_uv_cannot_be_installed_or_fails(
     folder: Path, missing: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     system = FakeSystem()

@@ -51,7 +51,9 @@ def test_fuzz_time_is_divided_and_slow_targets_get_a_double_share() -> None:
     assert sum(seconds_each({name: each.slower for name, each in TARGETS.items()}, 15).values()) < 16 * 60
 
 
-def test_all_fuzz_targets_run_without_findings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_fuzz_targets_run_by_default_and_zero_findings_are_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     system = Fuzzing(tmp_path)
     assert system.run("--", "--minutes", "3") == 0
     assert system.ran[-1][2:] == [str(tmp_path), "quick=60", "slow=120"]
@@ -77,7 +79,9 @@ def test_fuzz_target_that_exits_with_an_error_is_a_failure(tmp_path: Path) -> No
     assert Fuzzing(tmp_path, code=1).run() == 1
 
 
-def test_fuzzing_rejects_unknown_targets_other_systems_missing_packages_and_durations(tmp_path: Path) -> None:
+def test_fuzz_rejects_unknown_targets_other_systems_missing_packages_and_bad_durations(
+    tmp_path: Path,
+) -> None:
     with pytest.raises(Trouble, match="no target 'nothing'"):
         Fuzzing(tmp_path).run("nothing")
     with pytest.raises(Trouble, match="Linux only"):

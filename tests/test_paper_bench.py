@@ -169,7 +169,7 @@ def test_figures_document_matches_its_recorded_results(figures: ModuleType) -> N
     assert figures.report(numbers, "images") in text
 
 
-def test_cost_per_endpoint_grows_at_most_by_a_factor_of_1_2_from_10_to_50_endpoints(
+def test_fan_benchmark_fails_if_the_cost_per_endpoint_grows_by_more_than_a_factor_of_1_2(
     fan: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def taken(factor: float, again: float = 1.0) -> dict:

@@ -78,12 +78,12 @@ def test_interpreter_that_does_not_report_the_expected_version_is_ignored(said: 
         versions(system.computer(), [], tmp_path / "made", tmp_path)
 
 
-def test_python_implementations_except_cpython_are_ignored(tmp_path: Path) -> None:
+def test_pypy_interpreter_is_ignored(tmp_path: Path) -> None:
     system = Pythons({sys.executable: f"{HERE} pypy {sys.executable}\n"})
     assert find_interpreters(system.computer(), tmp_path) == {}
 
 
-def test_each_python_gets_two_environments_created_once_with_hashes(
+def test_environments_are_created_once_with_hashes_and_missing_pythons_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for expected in (2, 0):

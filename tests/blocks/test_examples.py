@@ -19,7 +19,7 @@ def read(path):
     return saved, parse(saved["robots"]["Pepper"])
 
 
-def test_start_page_examples_are_complete():
+def test_examples_have_the_expected_names_and_descriptions():
     named = [(read(path)[0]["name"], read(path)[0]["description"]) for path in EXAMPLES]
     assert named == [
         ("Greeting", "Waves when it sees a face"),

@@ -52,7 +52,7 @@ def test_choice_field_reads_saved_values_and_shows_their_labels():
     assert ChoiceField("ROBOT", (), source="robots:nao").read("NAO") == "NAO"
 
 
-def test_topic_colour_and_path_fields_are_validated():
+def test_topic_colour_and_path_are_read_and_invalid_topics_and_colours_are_rejected():
     assert TopicField("T").read("/a/b") == "/a/b"
     for wrong in ("", "a b", "{", "\n", "x" * 201):
         with pytest.raises(FieldError):

@@ -305,7 +305,7 @@ def test_foreign_program_at_master_address_is_named_and_master_is_found_later(tm
     assert len(log.read_text().splitlines()) == 2
 
 
-def test_foreign_program_at_publisher_address_is_a_problem_in_the_graph(
+def test_foreign_program_at_publisher_address_is_an_alert_in_the_graph(
     adapter: Adapter, master: Master, node: Node
 ) -> None:
     adapter.ask("subscriber", topic="t", type="json")
@@ -386,7 +386,7 @@ def test_messages_of_unreachable_new_publishers_are_counted_as_lost(adapter: Ada
             assert adapter.ask("counts", sub=sub)["received"] == "0"
 
 
-def test_rejected_payload_is_a_problem_in_the_graph_until_the_next_message(
+def test_rejected_payload_is_an_alert_in_the_graph_until_the_next_message(
     adapter: Adapter, node: Node
 ) -> None:
     def problems() -> list[str]:
@@ -491,7 +491,7 @@ def test_public_calls_behave_as_documented(master: Master) -> None:
 @pytest.mark.skipif(
     not (ROOT / "nep" / "programs" / "conformance").exists(), reason="nep wire check is not there yet"
 )
-def test_conformance_tester_finds_no_broken_rule() -> None:
+def test_client_passes_the_selected_conformance_rules() -> None:
     adapter = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
     chosen = [word for rule in RULES for word in ("--rule", rule)]  # all rules together take half a minute
     done = subprocess.run(

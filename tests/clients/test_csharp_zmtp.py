@@ -52,7 +52,7 @@ def bound(context: Context, kind: int) -> tuple[zmq.Socket[bytes], str]:
     return made, f"tcp://127.0.0.1:{port}"
 
 
-def test_dealer_exchanges_messages_of_any_size(context, stack: ExitStack) -> None:
+def test_dealer_exchanges_messages_from_1_byte_to_6_megabytes(context, stack: ExitStack) -> None:
     echo, endpoint = bound(context, zmq.DEALER)
     with echo:
         started(stack, "dealer", endpoint)
@@ -66,7 +66,7 @@ def test_dealer_exchanges_messages_of_any_size(context, stack: ExitStack) -> Non
             assert echo.recv_multipart() == parts
 
 
-def test_dealer_answers_heartbeats_and_reconnects(context, stack: ExitStack) -> None:
+def test_dealer_reports_a_lost_connection_and_reconnects(context, stack: ExitStack) -> None:
     first = context.socket(zmq.DEALER)
     first.heartbeat_ivl, first.heartbeat_timeout = 50, 5000
     port = first.bind_to_random_port("tcp://127.0.0.1")
@@ -136,7 +136,7 @@ def test_xpub_reports_each_subscription_and_serves_every_filter(context, stack: 
     assert xpub.end() == 0
 
 
-def test_xpub_bounds_the_queue_of_a_slow_reader_and_delivers_accepted_messages(
+def test_xpub_bounds_the_queue_of_a_slow_subscriber_and_delivers_accepted_messages(
     context, stack: ExitStack
 ) -> None:
     xpub = started(stack, "xpub", "127.0.0.1", "queue=8000000")
@@ -220,7 +220,7 @@ def test_malformed_peer_is_disconnected_and_counted_with_a_reason(
     assert lines[-1] == f"refused {code}=1"
 
 
-def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None:
+def test_connections_with_mutated_bytes_do_not_stop_the_xpub_socket(context, stack: ExitStack) -> None:
     xpub = started(stack, "xpub", "127.0.0.1", "handshake_ms=200")
     port = int(xpub.line().split()[1])
     chance = random.Random(27)
@@ -324,7 +324,7 @@ def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignSer
 
 
 @pytest.mark.parametrize(("own", "real"), [("dealer", zmq.DEALER), ("sub", zmq.XPUB)])
-def test_client_names_foreign_programs_and_later_connects_to_the_real_master(
+def test_client_names_foreign_programs_and_later_connects_to_the_real_peer(
     context: Context, stack: ExitStack, own: str, real: int
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
@@ -379,7 +379,7 @@ def test_silent_peer_is_disconnected_and_responsive_peer_stays_connected(context
         assert kept.ask("refused") == "refused "  # no other event was reported in between
 
 
-def test_mutated_publishers_do_not_stop_the_subscriber(context, stack: ExitStack) -> None:
+def test_publishers_with_mutated_bytes_do_not_stop_the_subscriber(context, stack: ExitStack) -> None:
     sub = started(stack, "sub", "handshake_ms=200")
     sub.say(f"subscribe {TOPIC.hex()}")
     chance = random.Random(27)

@@ -409,7 +409,7 @@ def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:
     return is_there
 
 
-def test_declared_types_match_those_of_python(tmp_path):
+def test_robot_declared_in_javascript_is_parsed_with_its_types_in_python(tmp_path):
     robot = parse(json.loads(run_script(ALL_TYPES, tmp_path).stdout))
     (go, _stop) = robot.actions
     assert [each.kind for each in go.parameters] == [
@@ -440,7 +440,7 @@ def test_robot_passes_driver_contract(tmp_path):
     assert "skipped" not in done.stdout
 
 
-def test_library_conforms_to_wire_protocol():
+def test_library_passes_every_conformance_rule_except_the_slow_ones():
     listed = nep_command("wire", "check", "--list", "--json")
     rules = [each["id"] for each in json.loads(listed) if each["id"] not in SLOW_RULES]
     chosen = [word for rule in rules for word in ("--rule", rule)]

@@ -50,7 +50,7 @@ def test_clocks_of_two_computers_are_compared_and_corrected(tmp_path: Path) -> N
             eventually(is_corrected)
 
 
-def test_computer_ids_match_those_of_python() -> None:
+def test_computer_id_matches_that_of_python() -> None:
     build_package()
     script = f"console.log(require({str(PACKAGE / 'dist' / 'system' / 'computer.js')!r}).computerId())"
     done = subprocess.run([str(node), "-e", script], capture_output=True, text=True, check=True)

@@ -23,7 +23,7 @@ from tests.robots.driver.test_rize_dialect import (
     test_rize_receives_its_command_back_with_the_result,
     test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_once,
     test_stop_is_reported_to_rize_and_rize_can_cancel,
-    test_unsupported_rize_command_is_answered_with_failure,
+    test_unsupported_or_invalid_rize_command_is_answered_with_failure,
 )
 
 __all__ = [
@@ -31,7 +31,7 @@ __all__ = [
     "test_rize_receives_its_command_back_with_the_result",
     "test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_once",
     "test_stop_is_reported_to_rize_and_rize_can_cancel",
-    "test_unsupported_rize_command_is_answered_with_failure",
+    "test_unsupported_or_invalid_rize_command_is_answered_with_failure",
 ]
 pytestmark = NEEDS_NODE
 TURTLE = """\

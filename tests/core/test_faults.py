@@ -291,7 +291,7 @@ def test_fault_alert_expires_if_the_fault_cannot_recur(session: Session) -> None
     assert not alerts.has("studio")
 
 
-def test_session_close_releases_every_component_even_if_some_raise(
+def test_session_close_continues_if_closing_some_components_raises(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ended: list[str] = []

@@ -87,7 +87,7 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
         watch.close()
 
 
-def test_descriptions_are_parsed_or_rejected_with_a_message():
+def test_hostile_robot_descriptions_are_parsed_or_rejected_with_a_reason():
     described = thing_description(LAMP.thing_model, "Lamp")
     sentences: list[str] = []
     seen: set[type] = set()

@@ -143,7 +143,7 @@ def test_alert_about_a_crashed_virtual_robot_offers_a_restart(session: Session) 
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
 
 
-def test_hung_virtual_robot_can_be_reconnected(session: Session) -> None:
+def test_hung_virtual_robot_can_be_restarted(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected)
     hung = session.launcher._robots["Pepper"][0]
@@ -164,7 +164,7 @@ def test_unwritable_journal_raises_an_alert_until_it_is_writable(session: Sessio
     tick_until(session, lambda: not session.alerts.has("journal"))
 
 
-def test_invalid_action_input_and_unknown_robot_are_rejected_before_sending(session: Session) -> None:
+def test_invalid_action_input_and_unknown_robot_are_rejected(session: Session) -> None:
     with nep.node("lamp") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
@@ -307,7 +307,7 @@ def _number(value: float) -> dict[str, object]:
     return {"type": "values_number", "id": f"n{value}", "fields": {"NUMBER": value}}
 
 
-def test_failed_network_job_is_reported_in_one_sentence(session: Session) -> None:
+def test_failed_network_job_is_reported_only_if_it_has_a_message_template(session: Session) -> None:
     session._on_event(JobFailed(MONITORING_FAILED_MESSAGE, "the master has gone"), 0.0)
     session._on_event(JobFailed("", "nobody asked"), 0.0)
     texts = [record.text for record in session.console.records]

@@ -68,7 +68,9 @@ def said(studio: Studio) -> str:
     return f"buttons {buttons}; the Console {lines}"
 
 
-def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Studio, address: str) -> None:
+def test_message_is_armed_and_published_by_hand_until_stop_and_a_service_is_called(
+    studio: Studio, address: str
+) -> None:
     fingers = Fingers(studio)
     studio.find("Use the virtual robot", enabled=True)
     studio.screen.key("2", held=["Alt"])

@@ -103,7 +103,7 @@ def path(tmp_path: Path) -> Path:
     return path
 
 
-def test_replay_publishes_selected_topics_and_moves_a_robot_only_after_confirmation(
+def test_replay_publishes_the_armed_topic_and_no_robot_command_without_confirmation(
     start: Callable[..., Studio], address: str, path: Path
 ) -> None:
     studio = start(str(path))

@@ -66,7 +66,7 @@ def test_pause_keeps_the_question_and_stop_removes_it(asking: Studio) -> None:
     assert not asking.all(kind="QuestionCard")
 
 
-def test_choice_is_selected_by_key_or_mouse_also_in_the_enlarged_room(
+def test_choice_is_selected_by_key_and_in_the_large_room_by_mouse(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())

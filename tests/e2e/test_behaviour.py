@@ -80,7 +80,9 @@ def test_example_from_the_start_page_runs_to_completion(studio: Studio) -> None:
     studio.says("Pepper stopped (")
 
 
-def test_crashed_robot_is_reported_missing_and_reconnects(with_robot: Callable[[dict], Studio]) -> None:
+def test_crashed_robot_is_reported_and_runs_its_blocks_again_after_a_restart(
+    with_robot: Callable[[dict], Studio],
+) -> None:
     studio = with_robot(started(forever(turn(30))))
     (robot,) = studio.children("app.robots.simulated")
     robot.kill()

@@ -19,7 +19,7 @@ def chosen_first(studio: Studio, words: str) -> None:
     )
 
 
-def test_command_palette_opened_from_the_page_finds_and_runs_commands(studio: Studio) -> None:
+def test_command_palette_opened_from_the_page_runs_a_command_and_changes_a_shortcut(studio: Studio) -> None:
     studio.click("New behaviour")
     studio.point(".blocklySvg", 300, 200)  # moves the keyboard focus into the page
     studio.screen.key("k", ["Ctrl"])
@@ -47,7 +47,7 @@ def test_command_palette_opened_from_the_page_finds_and_runs_commands(studio: St
     until(lambda: studio.find("Blocks")["rect"][2] == small[2], "the new key works inside the page")
 
 
-def test_stop_key_works_while_the_palette_is_open(studio: Studio) -> None:
+def test_stop_key_and_button_work_while_the_palette_is_open(studio: Studio) -> None:
     studio.click("Use the virtual robot")
     studio.says("Pepper ready", 40)
     studio.screen.key("k", ["Ctrl"])

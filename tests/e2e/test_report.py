@@ -99,7 +99,7 @@ def test_kill_by_the_system_is_reported_once_and_requested_exit_is_not(
 
 
 @pytest.mark.long
-def test_crashes_of_a_robot_and_the_editor_are_reported_at_the_next_start(
+def test_robot_and_editor_crashes_are_saved_and_next_start_reports_the_robot_crash(
     start: Callable[..., Studio],
 ) -> None:
     studio = start("--demo")

@@ -110,7 +110,7 @@ def picture(tried: Tried) -> np.ndarray:
     return cv2.imdecode(data, cv2.IMREAD_COLOR)
 
 
-def test_self_test_with_editor_covers_all_of_studio_and_leaves_no_process(both: tuple[Tried, Tried]) -> None:
+def test_self_test_with_editor_passes_every_step_and_leaves_no_process(both: tuple[Tried, Tried]) -> None:
     tried, _other = both
     went_well(tried, *ALWAYS[:5], "editor", *ALWAYS[5:], "processes")
     assert tried.report["first_paint_ms"] < tried.report["editor_ready_ms"] < tried.report["total_ms"]
@@ -118,7 +118,7 @@ def test_self_test_with_editor_covers_all_of_studio_and_leaves_no_process(both: 
     assert blue[200:700, 230:600].mean() > 0.1
 
 
-def test_self_test_without_editor_passes_while_another_runs(both: tuple[Tried, Tried]) -> None:
+def test_self_test_without_editor_passes_while_another_self_test_runs(both: tuple[Tried, Tried]) -> None:
     _other, tried = both
     went_well(tried, *ALWAYS, "processes")
     assert tried.report["editor_ready_ms"] is None
@@ -127,7 +127,9 @@ def test_self_test_without_editor_passes_while_another_runs(both: tuple[Tried, T
     assert picture(tried).shape == (900, 1440, 3)
 
 
-def test_failed_step_is_reported_at_once_with_its_reason(screen: Screen, tmp_path: Path) -> None:
+def test_failed_step_is_reported_before_its_time_limit_with_its_reason(
+    screen: Screen, tmp_path: Path
+) -> None:
     tried = Tried(screen, tmp_path / "out", "--no-web", begin=("-c", NO_ROBOT))
     with tried.program as program:
         assert program.wait(100) == 1, program.lines

@@ -99,7 +99,7 @@ def test_f12_during_the_drag_of_a_field_stops(turning: Studio) -> None:
 
 
 @pytest.mark.timeout(300)  # three runs
-def test_stop_works_while_blocks_are_dragged_or_a_block_menu_is_open(turning: Studio) -> None:
+def test_stop_works_while_blocks_are_dragged_or_a_block_field_is_edited(turning: Studio) -> None:
     """Stop works at once, and the drag or the menu is not cancelled by it."""
     before = sorted(turning.blocks())
     left, top, _, _ = turning.spot("[data-id='say Round and round'] > .blocklyPath")
@@ -189,7 +189,9 @@ def a_name_that_is_typed(studio: Studio) -> None:
     studio.screen.type("Half")
 
 
-def test_one_click_on_stop_works_while_any_menu_or_sheet_is_open(turning: Studio) -> None:
+def test_stop_key_and_one_click_on_stop_work_while_a_menu_sheet_or_name_field_is_open(
+    turning: Studio,
+) -> None:
     """X grabs the mouse for a popup, so the first click outside must not only close it."""
     answers: list[nep.Message] = []
     with nep.node("listener", master=turning.master) as node:
@@ -231,7 +233,7 @@ def test_stop_ends_a_hung_program(turning: Studio) -> None:
     assert not program.is_running()
 
 
-def test_killed_program_leaves_no_robot_moving(turning: Studio) -> None:
+def test_robot_stops_when_its_program_is_killed(turning: Studio) -> None:
     (program,) = turning.children("app.blocks.runtime.child")
     program.kill()
     stands_still(turning)

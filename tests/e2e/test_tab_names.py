@@ -16,7 +16,7 @@ from tests.e2e.waiting import until
 pytestmark = pytest.mark.timeout(170)
 
 
-def test_renaming_a_tab_renames_its_file_and_can_be_reverted(
+def test_renaming_a_tab_renames_its_file_rejects_an_existing_name_and_can_be_undone(
     start: Callable[..., Studio], tmp_path: Path
 ) -> None:
     old = write(tmp_path / "Greeting.nepb", started(say("One")))

@@ -19,7 +19,7 @@ ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTry
 
 
 @pytest.mark.parametrize("theme", ["dark"])  # test_fights.py uses the light theme
-def test_single_blocks_can_be_tried_before_a_program_exists(
+def test_blocks_can_be_tried_from_the_toolbox_and_from_a_selected_block_on(
     start: Callable[..., Studio], tmp_path: Path, theme: str
 ) -> None:
     path = write(tmp_path / "Tries.nepb", started(say("First", {**turn(180), "id": "turn"})))

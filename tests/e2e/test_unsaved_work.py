@@ -46,7 +46,9 @@ def sleeping(process: psutil.Process) -> bool:
     return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
 
 
-def test_unsaved_work_is_offered_after_kill_9(start: Callable[..., Studio], tmp_path: Path) -> None:
+def test_unsaved_work_is_offered_and_restored_after_kill_9(
+    start: Callable[..., Studio], tmp_path: Path
+) -> None:
     path = write(tmp_path / "Mine.nepb", started(say("Hello")))
     saved = path.read_bytes()
     studio = start(str(path))

@@ -28,7 +28,7 @@ def needs_node(test: Callable[[Path], None]) -> Callable[[Path], None]:
 
 
 @needs_node
-def test_installed_package_of_javascript_can_be_required_and_imported(tmp_path: Path) -> None:
+def test_installed_javascript_package_can_be_required_and_imported(tmp_path: Path) -> None:
     build_package()
     packed = pack_built_javascript(str(npm), PACKAGE, tmp_path)
     install = ("install", "--prefer-offline", "--ignore-scripts", "--no-audit", "--no-fund", "--silent")

@@ -47,7 +47,7 @@ def context(tmp_path: Path) -> Context:
     return made
 
 
-def test_debian_package_has_its_version_and_dependencies(context: Context) -> None:
+def test_debian_package_has_its_version_dependencies_and_files_owned_by_root(context: Context) -> None:
     made = packer.debian_package(context)
     fields = subprocess.run(["dpkg-deb", "--field", made], capture_output=True, text=True, check=True).stdout
     assert f"Version: {__version__}\n" in fields

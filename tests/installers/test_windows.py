@@ -78,7 +78,7 @@ class Written:
     named: dict[str, object]
 
 
-def test_version_resource_is_a_valid_expression_with_all_fields() -> None:
+def test_version_resource_is_a_valid_expression_with_version_and_product_name() -> None:
     def make(*args: object, **named: object) -> Written:
         return Written(args, named)
 

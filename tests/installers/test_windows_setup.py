@@ -193,7 +193,7 @@ def test_failed_update_keeps_the_old_version_intact(windows: Windows) -> None:
     assert windows.registry(UNINSTALL, "DisplayVersion") == "1.2.3"
 
 
-def test_interrupted_update_is_repaired_first(windows: Windows) -> None:
+def test_update_succeeds_after_an_interrupted_update(windows: Windows) -> None:
     (windows.folder / "old~").mkdir()
     (windows.folder / "new~").mkdir()
     for name in ("_internal", "nep.exe"):  # simulates a power failure during these moves

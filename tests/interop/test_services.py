@@ -31,7 +31,9 @@ def port() -> int:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_original_client_receives_replies(originals: Peers, port: int, version: str) -> None:
+def test_original_client_receives_replies_and_error_replies(
+    originals: Peers, port: int, version: str
+) -> None:
     client = originals.start(version, "client_at", str(port)).wait_ready()
     with nep.node("server") as node:
 
@@ -58,7 +60,7 @@ def test_original_client_receives_replies(originals: Peers, port: int, version: 
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_two_original_clients_receive_replies_concurrently(originals: Peers, port: int, version: str) -> None:
+def test_two_original_clients_receive_their_own_replies(originals: Peers, port: int, version: str) -> None:
     clients = [originals.start(version, "client_at", str(port)) for _ in range(2)]
     with nep.node("server") as node:
         node.new_server("/any", lambda request: request, node.direct("127.0.0.1", port), threads=2)
@@ -69,7 +71,9 @@ def test_two_original_clients_receive_replies_concurrently(originals: Peers, por
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_original_server_replies_in_call_order(originals: Peers, port: int, version: str) -> None:
+def test_original_server_replies_to_each_call_also_after_a_restart(
+    originals: Peers, port: int, version: str
+) -> None:
     with nep.node("client") as node:
         client = node.new_client("/any", node.direct("127.0.0.1", port), timeout_s=LONG_S)
         server = originals.start(version, "server_at", str(port)).wait_ready()
@@ -83,7 +87,9 @@ def test_original_server_replies_in_call_order(originals: Peers, port: int, vers
         assert client.call({"again": 1}) == {"echo": {"again": 1}}
 
 
-def test_services_of_originals_are_found_through_the_gateway(peers: Peers, master: Program) -> None:
+def test_gateway_finds_services_of_originals_and_raises_an_alert_for_an_original_client(
+    peers: Peers, master: Program
+) -> None:
     with nep.node("ours") as node:
         client = node.new_client("weather", timeout_s=LONG_S)
         server = peers.start("0.5.3.5", "server", "weather").wait_ready()

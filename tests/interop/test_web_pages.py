@@ -89,7 +89,9 @@ def test_client_subscribes_publishes_calls_and_serves_like_its_examples(
     assert page.printed == ""
 
 
-def test_roslib_decodes_every_compression(clients: Peers, server: WebServer, node: nep.Node) -> None:
+def test_roslib_decodes_cbor_and_png_messages_and_type_details(
+    clients: Peers, server: WebServer, node: nep.Node
+) -> None:
     scan = LaserScan(ranges=[1.0, 2.5], angle_min=-1.0)
     node.new_pub("/scan", LaserScan, latched=True).publish(scan)
     node.new_pub("/text", "string", latched=True).publish("\u65e5" * 300)

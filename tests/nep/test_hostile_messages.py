@@ -73,7 +73,7 @@ def test_echo_shows_every_hostile_message(master, type_in, words):
         assert len([json.loads(line) for line in done.stdout.splitlines()]) == len(PAYLOADS)
 
 
-def test_log_command_shows_every_hostile_record_and_the_next_valid_record(master, type_in, capfd):
+def test_log_command_shows_hostile_records_and_the_next_valid_record(master, type_in, capfd):
     honest = json.dumps({"level": "info", "text": "honest", "node": "honest"}).encode()
     payloads = (*hostile.payloads(RECORD), honest)
     with (
@@ -96,7 +96,7 @@ def test_log_command_shows_every_hostile_record_and_the_next_valid_record(master
     assert capfd.readouterr().out
 
 
-def test_alarms_survive_hostile_values():
+def test_alarm_is_raised_after_hostile_values():
     kinds = sorted(VALUE_KINDS)
     rules = [
         rule(kind, "/pose", path=path, limit=3.0 if kind in NUMBER_KINDS else "a", id=f"{kind} {path}")

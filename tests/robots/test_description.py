@@ -62,7 +62,7 @@ def test_topics_are_read_from_the_forms():
     assert (robot.action("say").topic, robot.action("say").reply_topic) == ("/x/do", "/x/did")
 
 
-def test_block_texts_match_the_design():
+def test_block_texts_units_and_categories_of_pepper_are_parsed():
     robot = parse(thing_description(model("pepper"), "Pepper"))
     texts = {action.name: action.text for action in robot.actions}
     assert texts["say"] == "%robot say %text"
@@ -78,7 +78,7 @@ def test_block_texts_match_the_design():
     assert {action.category for action in robot.actions} == {"Speech", "Movement", "Face and lights"}
 
 
-def test_every_icon_is_shipped_with_studio():
+def test_icons_of_every_shipped_thing_model_are_shipped_with_studio():
     text = resources.path("icons", "lucide.txt").read_text("utf-8")
     icons = {line.partition("\t")[0] for line in text.splitlines()}
     for path in MODELS:
@@ -345,7 +345,7 @@ def test_number_of_reported_problems_is_limited():
 
 
 @pytest.mark.parametrize("name", ["Arm\n", "Arm\u202e", "A\u200brm", "\x1b[2J"])
-def test_confusable_robot_name_is_rejected_with_an_escaped_message(name):
+def test_robot_name_with_control_characters_is_rejected_with_an_escaped_message(name):
     described = {**thing_description(model("pepper"), "Pepper"), "title": name}
     with pytest.raises(DescriptionError, match=r"title: '.*' can't be used in a name") as refused:
         parse(described)

@@ -104,7 +104,7 @@ def reached(window: MainWindow, forward: bool = True) -> list[QWidget]:
 
 
 @pytest.mark.parametrize("layout", ["behaviour", "developer"])
-def test_tab_reaches_every_control_and_returns_to_the_first(
+def test_tab_reaches_every_panel_and_the_bars_in_both_directions(
     qtbot, window: MainWindow, commands: Commands, layout: str
 ) -> None:
     window.show()
@@ -124,7 +124,7 @@ def test_tab_reaches_every_control_and_returns_to_the_first(
     assert set(reached(window, forward=False)) == set(seen)
 
 
-def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_f6_visits_panels_in_reading_order(qtbot, window: MainWindow, commands: Commands) -> None:
     window.show()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)

@@ -133,7 +133,7 @@ def test_robot_never_seen_before_is_named_in_problem():
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 
 
-def test_unknown_block_is_kept_and_skipped():
+def test_unknown_block_is_skipped_with_warning():
     saved = workspace(started(block("magic_wave_wand"), say("Hi")))
     assert sentences(saved) == [
         (

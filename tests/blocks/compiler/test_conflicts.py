@@ -100,7 +100,7 @@ def test_conflict_inside_called_function_is_found() -> None:
     assert "“turn” and “go home”" in problem.message
 
 
-def test_recursive_function_is_visited_once() -> None:
+def test_conflict_in_recursive_function_is_reported_once() -> None:
     moves = define("f", "dance", (), turn("in f"), call("f"))
     assert len(conflicts(moves, started(call("f")), started(home("h")))) == 1
 

@@ -76,7 +76,7 @@ def test_compile_time_is_linear_in_number_of_blocks(make: Callable[[int], Saved]
     assert many < 5 * few
 
 
-def test_duplicate_names_and_ids_keep_compile_time_linear() -> None:
+def test_naming_and_parsing_time_is_linear_for_duplicate_names_and_ids() -> None:
     def name(count: int) -> None:
         names = PythonNames(frozenset())
         assert len({names.new_name("when started", "script") for _ in range(count)}) == count
@@ -91,7 +91,7 @@ def test_duplicate_names_and_ids_keep_compile_time_linear() -> None:
         assert many < 5 * few
 
 
-def test_problems_of_many_missing_robots_keep_compile_time_linear() -> None:
+def test_time_to_list_problems_is_linear_in_number_of_missing_robots() -> None:
     here = robot()
 
     def work(count: int) -> int:

@@ -60,7 +60,7 @@ def test_robots_moved_by_a_command_or_world_topic_are_determined() -> None:
     assert (topics["/Pepper/command"], topics["/far"]) == (("Pepper",), ("Rover",))
 
 
-def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master) -> None:
+def test_publish_that_moves_a_robot_without_permission_is_rejected_at_run_time(master: Master) -> None:
     """The compiler can't check computed topics, so the program does, also for robots that joined later."""
     rover = WireRobot(master.address, "Rover")
     try:

@@ -57,7 +57,7 @@ def test_program_with_unset_list_runs_after_the_fix():
     assert play(fixed).lines == ["1"]
 
 
-def test_number_never_set_is_reported():
+def test_number_never_set_is_reported_and_fix_adds_a_start_script():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.message, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")

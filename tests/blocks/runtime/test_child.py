@@ -216,7 +216,7 @@ def test_robot_that_does_not_confirm_final_stop_is_named(running, pepper, master
     assert running.until("ended")["silent"] == ["Pepper"]
 
 
-def test_network_event_starts_its_script(running, pepper, master):
+def test_robot_event_starts_its_script(running, pepper, master):
     hat = block("robot_pepper_when_touched", ROBOT="Pepper", PLACE="head")
     running.start(
         workspace(stack(hat, write(text("ouch")), block("control_stop_program"))),
@@ -275,7 +275,7 @@ def values_of(said):
     return [(value["id"], value["text"]) for values in lines for value in values]
 
 
-def test_variable_values_are_reported_including_final_values(running, master):
+def test_final_variable_value_is_reported(running, master):
     saved = workspace(started(set_score(number(7)), set_score(number(8))), variables=("score",))
     running.start(saved, master=master.address)
     running.until("ended")

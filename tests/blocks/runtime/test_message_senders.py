@@ -146,7 +146,7 @@ def test_forged_stop_reply_from_foreign_node_is_ignored(
     assert outside == []
 
 
-def test_rejected_stop_is_reported_with_robot_message(network: Network, pepper: WireRobot) -> None:
+def test_failed_stop_is_reported_with_robot_message(network: Network, pepper: WireRobot) -> None:
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")  # type: ignore[method-assign]
     assert network.stop_robots(30.0) == ("Pepper",)

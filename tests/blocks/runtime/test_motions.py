@@ -63,7 +63,7 @@ def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
 
 
 @pytest.mark.parametrize("state", ["failed", "canceled"])
-def test_motion_that_never_started_is_not_resumed(bench, state) -> None:
+def test_failed_or_canceled_motion_is_not_resumed(bench, state) -> None:
     bench.do("drive", state, speed=0.2)
     assert bench.going.stop_all() == ()
 

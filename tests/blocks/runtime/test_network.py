@@ -72,7 +72,7 @@ def test_replies_from_other_robots_and_invalid_replies_are_ignored(network, pepp
     assert (call.state, call.error) == ("succeeded", "")
 
 
-def test_rejected_action_fails_and_cancel_is_sent(network, pepper):
+def test_failed_action_has_the_robot_error_and_cancel_request_is_sent(network, pepper):
     pepper.refuses = {"say": "no voice"}
     pepper.slow = {"turn"}
     refused = network.invoke("Pepper", "say", {"text": "Hi"})
@@ -89,7 +89,7 @@ def test_heartbeat_is_sent_automatically(network, pepper):
     assert {command["from"] for command in pepper.heard("alive")} == {"program-1"}
 
 
-def test_sensors_events_and_topics_are_received(network, pepper, node):
+def test_sensor_values_events_and_messages_are_received(network, pepper, node):
     events: list[object] = []
     network.on_event("Pepper", "touched", events.append)
     assert network.sensor("Pepper", "battery") is None

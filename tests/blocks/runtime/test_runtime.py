@@ -55,7 +55,7 @@ def test_block_waits_for_its_robot(running):
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
 
 
-def test_running_robot_action_is_described_until_done(running):
+def test_status_text_of_running_action_remains_when_another_script_ends(running):
     link = FakeLink()
     link.held = {"say"}
     words = block("values_join", A=text("Touch my "), B=text("head."))
@@ -70,7 +70,7 @@ def test_running_robot_action_is_described_until_done(running):
     assert run.runtime.status_text.text(["l"]) == "Pepper light eyes #37b6ff"
 
 
-def test_rejected_action_is_an_error_on_its_block_with_robot_message():
+def test_failed_action_is_reported_on_its_block_with_robot_message():
     link = FakeLink()
     link.answers = {"say": ("failed", {}, "the speaker is off")}
     run = play(workspace(started(say("Hi") | {"id": "x"}, write(text("never")))), link)

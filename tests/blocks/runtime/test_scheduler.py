@@ -74,7 +74,7 @@ def test_only_one_script_executes_at_a_time(stage):
     assert most == [1]
 
 
-def test_pause_suspends_each_script_before_its_next_block(stage):
+def test_pause_suspends_script_before_its_next_block_and_step_runs_one_block(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
     until(lambda: stage.scheduler.snapshot().is_paused)

@@ -39,7 +39,7 @@ def test_help_of_robot_block_comes_from_its_description() -> None:
     assert ["direction", "“left” or “right”"] in told["gaps"]  # type: ignore[operator]
 
 
-def test_slots_are_described_in_help() -> None:
+def test_slot_used_only_for_one_choice_is_described_in_help() -> None:
     told = help_of(CATALOGUE.blocks["lists_get"])
     assert told["title"] == "(where) (number) of (list)"
     assert told["gaps"][1] == [  # type: ignore[index]

@@ -53,7 +53,7 @@ def test_block_texts_match_the_design(block_type, expected):
     assert words(block_type) == expected
 
 
-def test_block_message_placeholders_match_arguments_and_icons_are_defined():
+def test_block_message_placeholders_match_arguments_and_action_block_has_its_icon():
     for definition in BLOCKS.values():
         for number in range(4):
             arguments = definition.get(f"args{number}", [])

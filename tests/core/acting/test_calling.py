@@ -62,7 +62,7 @@ def test_reply_is_recorded_with_duration_and_json(bench) -> None:
     assert bench.calls.in_flight is None
 
 
-def test_server_exception_is_recorded_as_rejection(bench) -> None:
+def test_server_exception_is_recorded_as_failed_call_with_its_text(bench) -> None:
     def refuse(_asked: object) -> object:
         raise ValueError("no face in sight")
 

@@ -54,7 +54,7 @@ def kinds(bench: Bench) -> list[str]:
     return [each.kind for each in bench.outbox.pop_results()]
 
 
-def test_message_is_sent_once_and_receivers_are_counted(bench) -> None:
+def test_sent_message_is_received_and_its_subscribers_are_counted(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
     bench.outbox.send(order())

@@ -55,7 +55,7 @@ def test_job_failure_is_raised_when_the_result_is_requested_and_next_job_runs(be
     until(lambda: beside.pop_result("a") == "well")
 
 
-def test_close_ends_thread_and_drops_pending_jobs(beside) -> None:
+def test_close_ends_thread_and_later_jobs_are_not_run(beside) -> None:
     beside.submit("a", lambda: "x")
     until(lambda: beside.pop_result("a") == "x")
     beside.close()

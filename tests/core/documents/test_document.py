@@ -222,7 +222,7 @@ def test_file_truncated_at_any_length_is_rejected(document: Document, tmp_path: 
             read(path)
 
 
-def test_oversized_file_is_rejected_without_reading(document: Document, tmp_path: Path) -> None:
+def test_oversized_file_is_rejected(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "huge.nepb"
     with path.open("wb") as file:
         file.truncate(MAX_BYTES + 1)
@@ -318,7 +318,7 @@ def test_failed_journal_write_is_retried_successfully(tmp_path: Path) -> None:
     assert json.loads(file.read_bytes())["workspace"] == STARTED
 
 
-def test_journal_error_is_cleared_after_save(tmp_path: Path) -> None:
+def test_journal_error_is_cleared_after_save_and_for_new_behaviour(tmp_path: Path) -> None:
     (tmp_path / "full").write_text("no folder")
     document = Document(lambda: Journal(tmp_path / "full"))
     document.apply_edit(STARTED)
@@ -441,7 +441,7 @@ def test_short_behaviour_is_compiled_at_once(document: Document) -> None:
     assert compiler._thread is None
 
 
-def test_long_file_opened_in_unmodified_tab_does_not_block_the_window(
+def test_long_file_opened_in_unmodified_tab_is_compiled_in_background(
     document: Document, tmp_path: Path
 ) -> None:
     other = Document(lambda: Journal(tmp_path / "other"))

@@ -63,7 +63,7 @@ def test_problem_with_a_single_block_names_the_block() -> None:
     assert line.problem.message == "Pepper isn't connected, so say will be skipped."
 
 
-def test_connected_robot_with_same_capabilities_is_suggested_first() -> None:
+def test_connected_robot_of_same_model_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
     assert [fix.label for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
     assert line.fixes[0].action == "robot.use:Pepper:Pepper 2"

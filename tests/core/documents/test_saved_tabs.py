@@ -84,7 +84,7 @@ def test_clean_exit_flag_applies_to_one_start_only(start, tmp_path: Path) -> Non
     assert Settings(tmp_path).get("tabs", {})["ended_well"] is False
 
 
-def test_tabs_of_second_window_are_not_restored(start, tmp_path: Path) -> None:
+def test_second_window_does_not_overwrite_saved_tabs(start, tmp_path: Path) -> None:
     start().work()
     second = start()
     second.documents.new()

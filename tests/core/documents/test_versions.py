@@ -54,7 +54,7 @@ def test_empty_or_missing_file_has_no_version(tmp_path: Path, folder: Path, cont
     assert not folder.exists()
 
 
-def test_save_is_rejected_when_previous_version_cannot_be_kept(tmp_path: Path, folder: Path) -> None:
+def test_save_fails_when_previous_version_cannot_be_kept(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     folder.write_bytes(b"in the way")
@@ -200,7 +200,9 @@ def test_versions_are_stored_in_data_folder_not_in_settings_folder(
     assert not (tmp_path / "config").exists()
 
 
-def test_data_folder_follows_system_conventions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_data_folder_follows_xdg_variables_and_nep_studio_home(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.delenv("NEP_STUDIO_HOME", raising=False)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))

@@ -144,7 +144,7 @@ def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_left_ungroupe
     "endpoint",
     ["", "tcp://127.0.0.1:4", "ipc:///tmp/x", "tcp://[::1", "rubbish", "tcp://0.0.0.0:1", "tcp://:1"],
 )
-def test_unreachable_endpoint_is_not_shown_as_address(endpoint: str) -> None:
+def test_local_wildcard_or_invalid_endpoint_is_not_shown_as_address(endpoint: str) -> None:
     graph = node_graph(facts(topics=(topic("/a", "1", "2", endpoint=endpoint),)), GraphOptions())
     assert {each.address for each in graph.groups} == {""}
 

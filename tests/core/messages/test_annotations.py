@@ -15,7 +15,7 @@ def points(kind: object, count: int = 4, **more: object) -> dict[str, object]:
     return {"points": [{**made, "outline_color": RED, **more}]}
 
 
-def test_circles_points_and_texts_are_drawn_at_their_positions() -> None:
+def test_circles_and_texts_are_drawn_at_their_positions() -> None:
     payload = {
         "circles": [
             {"position": {"x": 160, "y": 120}, "diameter": 64, "thickness": 2, "outline_color": RED,

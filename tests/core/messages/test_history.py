@@ -64,7 +64,7 @@ def test_latency_is_computed_once_on_arrival() -> None:
     assert first.latency_s == again.latency_s == sent.latency_s
 
 
-def test_missed_messages_are_counted_and_rewind_clears_history() -> None:
+def test_dropped_messages_are_counted_and_reset_clears_history() -> None:
     history = MessageHistory()
     history.process(Batch([message(1), message(2)], dropped=7), 0)
     assert (numbers(history), history.dropped_count) == ([1, 2], 7)
@@ -92,7 +92,7 @@ class Watching:
         self.log.append("closed")
 
 
-def test_shallow_history_requests_no_larger_queue_and_no_past_messages() -> None:
+def test_only_lossless_history_requests_a_larger_queue() -> None:
     log: list[str] = []
     feed = SeriesFeed(
         lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")

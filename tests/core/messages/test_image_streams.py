@@ -72,7 +72,7 @@ def test_identical_bytes_reuse_pixels_for_new_message(images: Images) -> None:
 @pytest.mark.parametrize("size", [(320, 240), (33, 25), (1, 1), (17, 400)])
 @pytest.mark.parametrize("fit", [None, (16, 12), (4, 3), (0, 0)])
 @pytest.mark.parametrize("kind", [".jpg", ".png"])
-def test_image_is_decoded_again_for_another_size(
+def test_decoded_image_is_reused_only_for_identical_bytes_at_the_same_size(
     size: tuple[int, int], fit: tuple[int, int] | None, kind: str
 ) -> None:
     frame = np.random.default_rng(1).integers(0, 255, (size[1], size[0], 3), np.uint8)

@@ -95,7 +95,7 @@ def test_query_result_with_objects_is_a_table() -> None:
     assert query_rows([]) == []
 
 
-def test_large_message_becomes_table_without_full_decoding() -> None:
+def test_lazily_read_large_message_becomes_a_table() -> None:
     large = read(Message("/big", b'{"a": [{"x": 1}, {"x": {"y": 2}}]}' + b" " * LARGE_BYTES, "json", "json"))
     assert lists_of_objects(large.value) == [("a",)]
     rows = rows_of(value_at(large.value, ("a",)))

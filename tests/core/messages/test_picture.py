@@ -174,7 +174,7 @@ def png_of_size(side: int) -> Message:
     return message(bytes(data))
 
 
-def test_oversized_image_is_rejected_without_allocating_memory() -> None:
+def test_oversized_image_is_rejected_at_full_and_reduced_size() -> None:
     picture, error = decode(png_of_size(20_000), 0.0)
     assert picture is None
     assert error is not None

@@ -104,7 +104,7 @@ MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
         "$.people[?count($..age) == 3]",
     ],
 )
-def test_exponential_query_stops_at_step_limit_with_partial_result(text) -> None:
+def test_expensive_query_stops_at_step_limit_with_explanation(text) -> None:
     answer = JsonQuery(text).evaluate(MANY, most_steps=5000)
     assert answer.cut == "Search stopped after 5000 values; these were found so far."
 

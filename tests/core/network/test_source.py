@@ -63,7 +63,7 @@ def test_missing_master_is_reported_once(events: list[object]) -> None:
     assert [type(event) for event in events] == [MasterLost]
 
 
-def test_missed_messages_are_counted_from_start_of_watch(
+def test_lost_messages_are_counted_from_start_of_watch(
     master: Master, events: list[object], sources: list[LiveSource]
 ) -> None:
     source = begin(master.address, events, sources)

@@ -51,7 +51,7 @@ def test_topics_added_after_the_first_graph_are_marked_new_until_seen() -> None:
     assert not topics["/b"].is_new
 
 
-def test_topic_stats_come_from_publishers_and_node_names_are_sorted() -> None:
+def test_topic_stats_and_publisher_nodes_come_from_the_graph() -> None:
     topics = Topics()
     topics.update(view(info("/a", rate_hz=30.0, lost=3, loss_ratio=0.1)), 0)
     topic = topics["/a"]

@@ -16,7 +16,7 @@ def batch(kept: int, dropped: int) -> Batch:
     return Batch([Message("/a", b"{}", "json", "json", seq=n) for n in range(kept)], dropped)
 
 
-def test_dropped_and_missed_messages_count_as_sent_but_not_shown() -> None:
+def test_dropped_and_lost_messages_count_as_sent_but_not_shown() -> None:
     topics = Topics()
     traffic = Traffic(topics)
     topics.add("/a", batch(2, 5), 1.0)

@@ -105,7 +105,7 @@ def test_new_token_disconnects_pages_and_the_old_one_can_be_restored(studio: Stu
     assert server.access.token == before
 
 
-def test_occupied_port_names_its_program_and_suggests_a_free_port(studio: Studio) -> None:
+def test_occupied_port_is_reported_and_a_free_port_is_suggested(studio: Studio) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         web = WebPages(master_address(), studio.events.put, addresses=tuple)
         web.port = taken.getsockname()[1]
@@ -154,7 +154,7 @@ def test_disconnected_page_stays_listed_for_a_while(studio: Studio) -> None:
     assert [each.page.id for each in studio.web.listed_pages] == [2]
 
 
-def test_page_is_slow_while_it_drops_messages() -> None:
+def test_topic_of_a_page_is_slow_while_messages_are_dropped() -> None:
     pages = PageList()
     for now, dropped in ((0.0, 0), (1.0, 3), (5.0, 3)):
         pages.update([page(1, PageTopic("/camera", False, sent_count=997, dropped_count=dropped))], now)

@@ -36,7 +36,7 @@ def message(size: int = 10) -> Message:
     return Message("/a", bytes(size), "bytes", "bytes")
 
 
-def test_topic_names_of_all_networks_are_distinct() -> None:
+def test_topic_keys_and_batches_are_split_by_network() -> None:
     assert split_key(key_of("ros2", "/camera")) == ("ros2", "/camera")
     assert split_key(key_of("", "/camera")) == ("", "/camera")
     assert split_key(key_of("ros", "/a b c")) == ("ros", "/a b c"), "strangers may name a topic anything"
@@ -224,7 +224,9 @@ def test_rate_is_measured_from_arrivals_where_network_reports_no_rate() -> None:
     assert (topics["/a"].measured_rates, topics.measure_rates(1.0, before)) == (None, {})
 
 
-def test_every_network_kind_is_a_back_end_with_install_advice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_network_kinds_are_found_by_name_and_missing_zenoh_has_install_advice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for kind in KINDS:
         assert find_kind(kind.name) is kind
         assert kind.checked(kind.default_address) == kind.checked("")
@@ -281,7 +283,7 @@ def test_graph_revision_increases_only_when_nodes_or_topics_change() -> None:
     assert revisions == [1, 1, 2, 2, 3, 4]
 
 
-def test_library_exception_is_reported_as_message() -> None:
+def test_exception_of_a_network_library_is_raised_as_nep_error() -> None:
     class Breaks:
         def graph(self, timeout_s: float) -> GraphView:
             raise OSError(5, "it broke")

@@ -85,7 +85,7 @@ def test_parameters_have_limits_and_updates_are_received(
     assert shown.changed == {"speed": 7.0, "later": 8.0}
 
 
-def test_parameter_is_set_and_rejection_has_message_of_node(
+def test_parameter_is_set_or_rejected_with_a_reason(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
     robot.parameters.on_change(lambda new: "1.3 shakes the head" if new.get("speed") == 1.3 else None)
@@ -131,7 +131,7 @@ def test_number_out_of_wire_range_is_rejected(
     assert robot.parameters["count"] == 2**62
 
 
-def test_node_that_ends_during_request_is_reported(
+def test_setting_a_parameter_of_an_unresponsive_or_disappeared_node_is_reported(
     session: Session, robot: nep.Node, shown: NodeParameters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.networks.parameters.REPLY_TIMEOUT_S", 0.3)
@@ -208,7 +208,7 @@ JSON = st.recursive(
 
 
 @given(state=JSON)
-def test_any_state_is_decoded_or_rejected_with_explanation(state: object) -> None:
+def test_any_parameter_payload_is_decoded_or_rejected(state: object) -> None:
     try:
         found = parse_parameters({"parameters": state} if isinstance(state, list) else state)
     except nep.NepError:

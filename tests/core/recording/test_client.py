@@ -66,7 +66,7 @@ def made() -> DrivenRecorder:
     return DrivenRecorder()
 
 
-def test_recorder_process_starts_only_when_needed(made):
+def test_recorder_process_is_not_started_without_a_recording_or_flight_recorder(made):
     made.client.stop()
     made.client.add_bookmark("x")
     made.client.check()
@@ -105,7 +105,7 @@ def test_recording_starts_reports_stats_and_ends(made):
     assert made.lines[0].is_closed
 
 
-def test_events_are_sent_only_while_recording(made):
+def test_events_are_sent_only_while_a_recording_or_the_flight_recorder_runs(made):
     client = made.client
     client.add_event("runs", {"id": "1"})
     assert not made.lines

@@ -52,7 +52,7 @@ def event(kind: str, name: str = "/camera", condition: str = "silent") -> AlarmE
     return AlarmEvent(kind, rule, 1.0, 4.0)
 
 
-def test_run_is_recorded_at_start_and_end_with_its_stop_time(told):
+def test_run_is_recorded_at_start_and_end_and_again_with_its_confirmed_stop(told):
     begun = replace(RUNNING, is_started=True, started_s=1.2)
     stopping = replace(begun, state="stopping", description="x")
     report = StopReport((RobotStop("Pepper", True, 41.0),), 41.2)

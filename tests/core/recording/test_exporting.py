@@ -23,7 +23,7 @@ def test_export_reports_its_files(tmp_path):
     assert len(made.path.read_text("utf-8").splitlines()) == 251
 
 
-def test_export_of_a_part_reports_progress(tmp_path):
+def test_export_of_a_part_contains_only_its_topics_and_times(tmp_path):
     messages = [json_message(seq, topic=f"/{'ab'[seq % 2]}") for seq in range(400)]
     record(tmp_path / "a.mcap", [messages])
     part = Part(START_NS + 100 * STEP_NS, START_NS + 300 * STEP_NS, ["/a"])

@@ -35,7 +35,7 @@ def folder(tmp_path):
     made.close()
 
 
-def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
+def test_each_mcap_file_is_listed_with_its_contents_and_read_only_once(folder, tmp_path, monkeypatch):
     assert look(folder) == FolderScan()
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(5)]])
     (tmp_path / "cut.MCAP").write_bytes((tmp_path / "a.mcap").read_bytes()[:-100])

@@ -158,7 +158,7 @@ def test_losses_and_density_are_read_in_background_thread(shown, whole):
     assert densities.newest.peak("/nowhere") == 0
 
 
-def test_user_can_seek_to_bookmarks_and_to_start_and_end(shown, whole):
+def test_user_can_skip_to_bookmark_and_end_and_rename_and_remove_the_bookmark(shown, whole):
     replay = shown.replay
     shown.seek(whole[20][0])
     made = replay.bookmark("here")
@@ -196,7 +196,7 @@ def test_loop_start_and_end_are_set_at_the_playhead(shown, whole):
 @pytest.mark.parametrize(
     ("asked", "given"), [(0.0, 0.1), (-1.0, 0.1), (1e9, 10.0), (float("nan"), 1.0), (2.5, 2.5)]
 )
-def test_replay_speed_is_clamped_to_its_range(shown, asked, given):
+def test_replay_speed_is_clamped_to_its_range_and_nan_becomes_normal_speed(shown, asked, given):
     shown.replay.set_speed(asked)
     shown.tick()
     assert shown.replay.player.speed == given

@@ -142,7 +142,7 @@ def test_loop_sends_only_the_messages_of_the_looped_part(played, whole):
     assert sent == (part * 4)[: len(sent)]
 
 
-def test_late_replay_sends_no_burst_and_follows_replay_speed(played):
+def test_late_replay_sends_no_burst_and_sending_follows_the_replay_speed(played):
     sender = played("/a", "/b")
     sender.do(Playback.play)
     sender.pass_time(0.1)
@@ -223,7 +223,7 @@ def test_replay_omits_messages_that_would_move_a_newly_connected_robot():
     assert (sent.count, sent.dropped_count) == (1, 1)
 
 
-def test_outbox_sends_only_allowed_messages_and_counts_skipped_messages():
+def test_outbox_sends_messages_of_its_topic_until_disarmed_and_counts_dropped_messages():
     node, jobs, arming = TestNode(), [], Arming()
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job))
     arming.arm()

@@ -269,7 +269,7 @@ def test_stats_follow_the_playhead(replay, whole):
     assert handed.stats["/rare"].rate_hz == 0.0
 
 
-def test_truncated_recording_is_played_without_modifying_it(tmp_path, path, whole):
+def test_truncated_recording_is_opened_without_modifying_it(tmp_path, path, whole):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-400])
     before = cut.read_bytes()

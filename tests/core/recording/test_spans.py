@@ -86,7 +86,7 @@ def test_graph_alert_spans_until_the_first_list_without_that_alert(found):
      run(name=3, result=[], words={})],
 )  # fmt: skip
 @pytest.mark.parametrize("role", ["runs", "alarms", "alerts"])
-def test_spans_stay_within_the_recording_for_any_input(found, role, value):
+def test_spans_of_invalid_entries_stay_within_the_recording(found, role, value):
     made = found((3, role, value))
     first, last = found.ends
     for span in (*made.runs, *made.alarms):

@@ -119,7 +119,9 @@ def test_crashed_robot_process_without_output_has_default_message(crashes, world
 
 
 @pytest.mark.parametrize("code", [1, -signal.SIGTERM])
-def test_robot_process_that_exits_with_output_is_not_a_crash(crashes, world: World, code: int) -> None:
+def test_robot_process_that_ends_with_code_1_or_sigterm_is_not_a_crash(
+    crashes, world: World, code: int
+) -> None:
     assert died(world, b"x" * 5000, code).detail == "x" * TAIL_CHARS
     assert crashes() == []
 

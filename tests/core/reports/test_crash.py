@@ -54,7 +54,7 @@ def test_crash_trace_follows_output_of_the_process() -> None:
     assert "deep_inside" in trace
 
 
-def test_last_fatal_line_describes_the_crash() -> None:
+def test_fatal_line_of_a_crash_ignores_exceptions_caught_by_windows() -> None:
     caught = "Windows fatal exception: code 0x800706ba\n\nThread 1\n"
     assert fatal_line("") == ""
     assert fatal_line(caught) == "", "the system's own, which it caught"
@@ -63,7 +63,7 @@ def test_last_fatal_line_describes_the_crash() -> None:
     assert fatal_line("Fatal Python error: Aborted\n\nThread 1\n") == "Fatal Python error: Aborted"
 
 
-def test_output_without_trace_is_not_split() -> None:
+def test_output_is_split_only_at_a_crash_trace() -> None:
     assert split_trace("one\ntwo\n") == ("one\ntwo\n", "")
     assert split_trace("a\nWindows fatal exception: access violation\n\nb") == (
         "a\n",

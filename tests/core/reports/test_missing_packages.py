@@ -53,7 +53,7 @@ def test_import_errors_not_caused_by_missing_packages_are_not_explained() -> Non
     assert import_problem(ImportError("cannot import name 'x'", name="PySide6")) == ""
 
 
-def test_checked_modules_belong_to_the_extra() -> None:
+def test_checked_modules_belong_to_requirements_of_nep_studio() -> None:
     wanted = " ".join(metadata.requires("nep-studio") or ()).lower()
     packages = metadata.packages_distributions()
     assert all(any(each.lower() in wanted for each in packages[name]) for name in EXTRA_MODULES)

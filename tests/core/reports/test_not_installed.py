@@ -103,7 +103,7 @@ def needed(path: Path) -> Iterator[str]:
                 yield file.read(256).split(b"\0")[0].decode()
 
 
-def test_all_system_libraries_of_qt_are_checked() -> None:
+def test_system_libraries_required_by_qt_are_known() -> None:
     spec = importlib.util.find_spec("PySide6")
     assert spec is not None
     assert spec.origin is not None

@@ -78,7 +78,7 @@ def test_report_contains_description_versions_settings_findings_logs_and_crash_r
     }  # fmt: skip
 
 
-def test_report_contains_no_secrets_or_personal_data(parts: ReportParts) -> None:
+def test_report_contains_no_network_keys_recent_files_or_home_folder(parts: ReportParts) -> None:
     whole = "".join(opened(create_report(parts, "")).values())
     for words in ("swordfish", "Private", str(Path.home())):
         assert words not in whole
@@ -104,7 +104,9 @@ def test_report_is_created_without_a_log(tmp_path: Path) -> None:
     assert "(empty)" in describe_contents(parts)[1]
 
 
-def test_user_is_shown_the_report_contents(pseudo: None, parts: ReportParts) -> None:
+def test_list_of_report_contents_includes_a_crash_report_and_is_translated(
+    pseudo: None, parts: ReportParts
+) -> None:
     before = describe_contents(parts)
     parts.crashes.add(Crash("studio", "how"))
     assert len(describe_contents(parts)) == len(before) + 1

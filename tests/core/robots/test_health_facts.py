@@ -192,7 +192,7 @@ def test_sensors_without_messages_are_not_counted_as_sending(case: Case) -> None
     assert case.says("Sensors") == ("off", "has sent nothing yet")
 
 
-def test_rize_robot_has_no_watchdog_or_heartbeat_fact(case: Case) -> None:
+def test_rize_robot_has_no_heartbeat_fact_and_its_stop_and_watchdog_facts_are_off(case: Case) -> None:
     case.link.robot = rize.robot("Nao")
     case.link.last_stop = None
     assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")

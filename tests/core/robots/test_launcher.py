@@ -55,7 +55,7 @@ def world() -> Iterator[World]:
     made.launcher.close()
 
 
-def test_missing_virtual_robot_is_started_at_once(world: World) -> None:
+def test_virtual_robot_that_is_not_running_is_started_at_once(world: World) -> None:
     world.launcher.start_virtual_robot("Turtle", "diffdrive")
     assert world.started == [["app.robots.turtle", "--name", "Turtle"]]
     world.processes[0].die(b"", 1)
@@ -111,7 +111,7 @@ def test_start_waits_for_first_graph_at_most_until_timeout(world: World) -> None
 
 
 @pytest.mark.parametrize("end", [Launcher.stop_virtual_robot, lambda some, _name: some.close()])
-def test_canceled_start_request_is_dropped(world: World, end: Callable[[Launcher, str], None]) -> None:
+def test_canceled_start_request_starts_no_robot(world: World, end: Callable[[Launcher, str], None]) -> None:
     world.there = True
     world.launcher.start_virtual_robot()
     end(world.launcher, "Pepper")

@@ -124,7 +124,7 @@ def test_neither_disconnection_nor_new_program_of_same_name_confirms_a_stop(
         other.close()
 
 
-def test_stop_is_resent_to_robot_lost_without_stop_until_the_user_confirms(
+def test_stop_includes_a_robot_lost_after_a_rejected_stop_until_the_user_confirms(
     session: Session, master: Master
 ) -> None:
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
@@ -307,7 +307,7 @@ def test_disconnected_virtual_robot_is_not_moving(session: Session, pepper: Wire
     assert link.state == "away"
 
 
-def test_action_that_continues_after_timeout_needs_no_stop(session: Session, pepper: WireRobot) -> None:
+def test_action_that_ends_after_its_timeout_causes_no_stop(session: Session, pepper: WireRobot) -> None:
     link = the_link(session, "Pepper")
     lives(pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
@@ -332,7 +332,7 @@ def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot)
     assert report.elapsed_ms >= (report.robots[0].elapsed_ms or 0) > 1000
 
 
-def test_stop_is_resent_to_robots_that_did_not_reply_to_the_program(
+def test_robot_that_did_not_reply_to_the_program_is_named_by_stop(
     session: Session, pepper: WireRobot
 ) -> None:
     the_link(session, "Pepper")
@@ -347,7 +347,7 @@ def test_stop_is_resent_to_robots_that_did_not_reply_to_the_program(
     runner.close()
 
 
-def test_stop_without_network_names_every_robot(session: Session, pepper: WireRobot) -> None:
+def test_stop_without_network_names_the_robot_it_was_not_sent_to(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     stopper, session.stopper = session.stopper, None
     session.runs.stop()

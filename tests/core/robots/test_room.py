@@ -70,7 +70,7 @@ def room_of(message: object) -> Room:
     return found.room()
 
 
-def test_room_is_joined_with_first_robot_and_publishes_saved_state(studio: Studio, tmp_path: Path) -> None:
+def test_room_is_joined_when_a_robot_appears_and_publishes_its_state(studio: Studio, tmp_path: Path) -> None:
     studio.room.update(GraphView(1, 1))
     assert studio.watched == []
     studio.room.move("ball", 0.5, 0.5, {})

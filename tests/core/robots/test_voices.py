@@ -205,7 +205,7 @@ def test_sound_duration_is_limited() -> None:
     assert sum(seconds for _hz, seconds in notes) <= MAX_NOTES_S
 
 
-def test_no_speech_without_a_speaker() -> None:
+def test_robot_state_is_not_watched_without_a_speaker() -> None:
     session = Session()
     session.join(parse(thing_description(PEPPER.thing_model, "Pepper")))
     voices: RobotVoices = session.voices

@@ -95,7 +95,7 @@ def test_error_in_stop_message_does_not_leave_run_stopping(
     assert (runs._run.state, session.fleet.moved.names) == ("unanswered", ("Arm",))
 
 
-def test_stop_is_sent_even_if_withdrawing_the_question_fails(
+def test_stop_starts_even_if_withdrawing_the_question_fails(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session.fleet.permission, "withdraw", failing)

@@ -17,7 +17,7 @@ def document(*connected: str) -> Document:
     return made
 
 
-def test_requested_behaviour_runs_completely() -> None:
+def test_requested_behaviour_has_the_program_of_its_document() -> None:
     wanted = RequestedRun(document("Pepper"))
     program = wanted.program()
     assert program is wanted.document.program()

@@ -124,7 +124,7 @@ def test_second_ctrl_c_does_not_interrupt_the_stop(pepper, saved, master, tmp_pa
     assert process.returncode == (FAILED if how == "a file of Studio" else 0)
 
 
-def test_robot_that_does_not_stop_is_named(pepper, saved):
+def test_robot_that_does_not_reply_to_stop_is_named(pepper, saved):
     pepper.silent = {"stop"}
     code, out = run(saved(workspace(started(say("Hi")))))
     assert code == FAILED
@@ -137,7 +137,7 @@ def test_missing_robot_is_reported(master, saved):
     assert "Pepper not found." in out
 
 
-def test_robot_without_description_in_the_file_is_awaited(master, saved):
+def test_missing_robot_without_a_description_in_the_file_is_reported(master, saved):
     path = saved(workspace(started(say("Hi"))))
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"robots": {}}))
@@ -158,7 +158,7 @@ def test_file_that_cannot_be_run_and_missing_master_are_reported_as_unusable(mas
     assert run(saved(workspace(started(write(number(1))))), master="127.0.0.1:1")[0] == OK  # needs no robot
 
 
-def test_rize_robot_is_controlled(master, tmp_path):
+def test_rize_robot_receives_its_action_and_cannot_confirm_stop(master, tmp_path):
     rosie = RizeRobot(master.address)
     try:
         hello = block("robot_rize_do_say", ROBOT="Rosie", TEXT=text("hello"))
@@ -353,7 +353,7 @@ class Lost(io.StringIO):
         (errno.ENOSPC, "the output can't be written: no space left on device; the behaviour was stopped.\n"),
     ],
 )
-def test_closed_output_stops_the_behaviour_and_its_robots(pepper, saved, capsys, number, said):
+def test_unwritable_output_stops_the_behaviour_and_its_robot(pepper, saved, capsys, number, said):
     path = saved(workspace(started(say("Hi"), write(text("one")), write(text("two")), say("never"))))
     assert run_file(path, out=Lost(number, 1)) == FAILED
     assert capsys.readouterr().err == said

@@ -130,7 +130,7 @@ def test_endless_line_is_discarded_and_later_lines_are_read(started, heard) -> N
     assert printed(heard) == ["10.0 MB of unexpected output were discarded"]
 
 
-def test_error_output_is_bounded(started, heard) -> None:
+def test_last_line_of_a_large_error_output_is_reported(started, heard) -> None:
     started(
         "import os\nfor _ in range(50):\n    os.write(2, b'e' * 1_000_000)\nraise SystemExit('last words')"
     )

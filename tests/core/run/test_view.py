@@ -71,7 +71,7 @@ def test_stopping_state_appears_after_100_ms_and_counts_replies() -> None:
     assert not view.can_run
 
 
-def test_repeated_stop_after_unconfirmed_stop_never_shows_ready() -> None:
+def test_repeated_stop_is_shown_as_stopping_at_once() -> None:
     run = RunState(
         "stopping", "Greeting", stop_pressed_s=10.0, robots_to_stop=("Pepper",), is_stop_repeated=True
     )

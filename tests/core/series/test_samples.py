@@ -152,7 +152,7 @@ def test_stats_of_a_range_match_its_samples(made, one, other) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(series(), st.sampled_from([3, 40, 333]), st.floats(0, 0.5), st.floats(0.5, 1))
-def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other) -> None:
+def test_drawn_line_includes_the_extremes_and_is_broken_at_gaps(made, columns, one, other) -> None:
     samples, rows = made
     length = rows[-1][0]
     begin, end = one * length, other * length
@@ -172,7 +172,7 @@ def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other)
         assert line.sample_count > MAX_SAMPLES_PER_PIXEL * columns
 
 
-def test_long_gap_is_not_drawn_at_any_zoom_level() -> None:
+def test_long_gap_is_not_drawn_when_samples_are_reduced() -> None:
     times = np.concatenate([np.arange(0, 50, 0.001), np.arange(70, 120, 0.001)])
     gaps = np.zeros(len(times), dtype=bool)
     gaps[50_000] = True
@@ -219,7 +219,7 @@ def test_memory_is_released_when_the_limit_is_lowered() -> None:
     assert samples.evicted_count + len(samples) == 400_001
 
 
-def test_drawn_points_are_stable_while_the_plot_scrolls() -> None:
+def test_most_drawn_points_stay_the_same_while_the_plot_scrolls() -> None:
     samples = Samples()
     times = np.arange(0, 100, 0.001)
     samples.extend(times, np.sin(times * 300), np.zeros(len(times), dtype=bool))

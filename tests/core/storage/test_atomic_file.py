@@ -113,7 +113,7 @@ def test_stale_temporary_files_are_deleted_but_not_those_in_use(tmp_path: Path) 
 # ---- reading files ---------------------------------------------------------------------------------
 
 
-def test_regular_file_is_read_completely(tmp_path: Path) -> None:
+def test_regular_file_is_read_up_to_the_size_limit(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"x" * 1000)
     assert read_regular_file(path, 1000) == b"x" * 1000

@@ -28,7 +28,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_bill_of_materials_lists_every_component(written: Path) -> None:
+def test_bill_of_materials_has_licences_and_a_complete_dependency_graph(written: Path) -> None:
     told = json.loads((written / "bill.json").read_text("utf-8"))
     assert told["bomFormat"] == "CycloneDX"
     assert told["metadata"]["component"]["version"] == __version__
@@ -141,7 +141,9 @@ def test_crate_licences_are_merged_into_one_file_with_authors_and_unique_texts(t
         ("Apache-2.0 WITH LLVM-exception OR Apache-2.0 OR MIT", ["Apache-2.0", "Apache-2.0", "MIT"]),
     ],
 )
-def test_one_licence_text_is_enough_for_alternatives(licence: str, needed: Sequence[str]) -> None:
+def test_licence_expression_yields_the_stored_texts_of_its_known_alternatives(
+    licence: str, needed: Sequence[str]
+) -> None:
     assert standard_texts(Part("a", "1", licence, (), "cargo")) == needed
 
 

@@ -27,7 +27,7 @@ def parts() -> list[Part]:
     return list(parts_of())
 
 
-def test_every_bundled_distribution_is_listed_once_with_its_licence(parts: list[Part]) -> None:
+def test_bundled_distributions_are_listed_once_with_their_version_and_licence(parts: list[Part]) -> None:
     names = [each.name for each in parts]
     assert len(names) == len(set(names))
     assert {"nep-studio", "pyzmq", "pyside6-essentials", "numpy", "pynng", "cffi", "jsonschema"} <= set(names)
@@ -36,7 +36,7 @@ def test_every_bundled_distribution_is_listed_once_with_its_licence(parts: list[
     assert [each.version for each in parts] == [metadata.version(each.name) for each in parts]
 
 
-def test_every_part_has_its_licence_text(parts: list[Part]) -> None:
+def test_every_part_outside_the_exception_list_has_its_licence_text(parts: list[Part]) -> None:
     assert {each.name for each in (*parts, *other_parts(RESOURCES)) if not each.texts} <= WITHOUT_TEXT
 
 

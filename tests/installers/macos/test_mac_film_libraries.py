@@ -38,7 +38,7 @@ def exported(path: Path) -> set[str]:
 
 
 @pytest.mark.skipif(not all(shutil.which(tool) for tool in NEEDED), reason="needs clang and LLVM's linker")
-def test_video_libraries_are_removed_and_image_libraries_kept(tmp_path: Path) -> None:
+def test_ffmpeg_is_replaced_by_a_stub_and_image_libraries_are_kept(tmp_path: Path) -> None:
     app = made_up_app(tmp_path)
     folder = app / CV2 / "__dot__dylibs"
     system = library(tmp_path / "libSystem.B.dylib", SYSTEM)
@@ -84,5 +84,5 @@ def test_video_libraries_in_an_unexpected_folder_raise(tmp_path: Path) -> None:
     ("name", "is_film"),
     [("libavcodec.61.19.101.dylib", True), ("libpostproc.58.dylib", True), ("libavif.16.3.0.dylib", False)],
 )
-def test_avif_libraries_are_not_treated_as_video_libraries(name: str, is_film: bool) -> None:
+def test_ffmpeg_libraries_are_recognised_by_their_names_and_avif_is_not(name: str, is_film: bool) -> None:
     assert (FFMPEG_LIBRARIES.match(name) is not None) == is_film

@@ -214,7 +214,9 @@ def test_incomplete_signing_identity_raises(environ: dict[str, str], said: str) 
         signing.identity_of(environ)
 
 
-def test_entitlements_are_written_as_codesign_reads_them(tmp_path: Path, tools: Path) -> None:
+def test_entitlement_files_contain_the_entitlements_of_studio_and_its_web_process(
+    tmp_path: Path, tools: Path
+) -> None:
     finished(tmp_path, signing.Identity(NAME))
     work = context(tmp_path).work
     for name, allowed in (("studio", STUDIO), ("web-process", WEB_PROCESS)):

@@ -10,7 +10,9 @@ from nep.messages.message import Message
 pytestmark = [pytest.mark.ports]
 
 
-def test_frames_are_translated_once_in_every_direction(gateway, original, native):
+def test_original_frames_are_forwarded_once_to_both_framings_and_to_native_subscribers(
+    gateway, original, native
+):
     a, b = original.ask("t", port=7000)["port"], original.ask("t", port=50000)["port"]
     with (
         original.subscriber(a + 1, b"t") as to_a,

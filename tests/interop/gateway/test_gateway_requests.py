@@ -134,7 +134,7 @@ def test_only_the_loopback_address_is_bound(gateway, original):
     assert {address.ip for address in listening} == {"127.0.0.1"}
 
 
-def test_gateway_ports_can_be_disabled(gateway_at):
+def test_gateway_with_disabled_ports_does_not_listen_on_port_7000(gateway_at):
     gateway_at(ports=Ports(0, 0, 0))
     with socket.socket() as probe:
         assert probe.connect_ex(("127.0.0.1", 7000)) != 0

@@ -207,7 +207,7 @@ def test_rate_alarm_triggers_only_after_the_rate_is_measured() -> None:
     assert events[0][1] < 8.0
 
 
-def test_loss_is_the_percentage_over_the_last_seconds_for_any_subscriber() -> None:
+def test_loss_alarm_triggers_at_a_lost_percentage_and_clears_after_its_time_window() -> None:
     scene = Scene(rule("loses", "/cmd", limit=1.0, for_s=10.0))
     events = []
     for second in range(20):

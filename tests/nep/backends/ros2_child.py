@@ -337,7 +337,7 @@ def test_sockets_are_bound_to_loopback_unless_configured(
     assert (heard <= {"127.0.0.1"}) is not is_open
 
 
-def test_missing_participant_index_is_reported() -> None:
+def test_lack_of_a_free_participant_index_is_reported() -> None:
     """Runs in a separate process, because Cyclone DDS leaks its sockets on this error."""
     code = """
     from nep.backends.ros2 import environment
@@ -454,7 +454,7 @@ def test_invalid_payload_field_is_named_in_log_error_and_alert(
     assert (pub.count, pub.refused) == (1, 1)
 
 
-def test_invalid_message_bytes_are_rejected_without_side_effects(make: Make) -> None:
+def test_invalid_message_bytes_are_rejected_and_the_next_message_is_received(make: Make) -> None:
     node = make("a")
     twist, pub = node.new_sub("t", "geometry_msgs/Twist"), node.new_pub("t", "geometry_msgs/Twist")
     bad = (b"", b"ab", b"\0\1\0\0", b"\0\1\0\0" + bytes(40), b"\0\3\0\0" + bytes(48))
@@ -567,7 +567,7 @@ def test_node_closed_while_other_threads_open_endpoints_raises_closed_error(make
         assert ended == [node] * 3
 
 
-def test_nodes_publishers_and_subscribers_close_in_any_order_and_twice(make: Make) -> None:
+def test_publishers_and_subscribers_can_be_closed_after_their_nodes_and_nodes_twice(make: Make) -> None:
     first, second = make("a"), make("b")
     pub, sub = first.new_pub("t"), second.new_sub("t")
     first.close()

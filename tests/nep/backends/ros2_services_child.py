@@ -119,7 +119,9 @@ def test_service_errors_are_reported_between_nep_programs(make: Make) -> None:
     assert (server.calls, server.errors) == (1, 1)
 
 
-def test_unknown_service_types_are_rejected(make: Make, tmp_path, monkeypatch) -> None:
+def test_invalid_service_types_and_names_are_rejected_and_custom_types_are_exchanged(
+    make: Make, tmp_path, monkeypatch
+) -> None:
     node = make("node")
     with pytest.raises(nep.NepError, match="'std_srvs/srv/SetBol'; did you mean 'std_srvs/srv/SetBool'"):
         node.new_server("/x", msg_type="std_srvs/SetBol")

@@ -32,7 +32,7 @@ pytestmark = [  # raised inside rospy
 ]
 
 for _name in (
-    "test_polling_listing_of_the_paper_works",
+    "test_listen_without_a_timeout_polls_as_in_the_listing_of_the_paper",
     "test_every_type_round_trips",
     "test_every_subscriber_receives_from_every_publisher",
     "test_next_message_reaches_a_new_subscriber",
@@ -58,9 +58,9 @@ for _name in (
 
 
 for _name in (
-    "test_async_receive_with_and_without_timeout",
+    "test_async_receive_ends_at_its_timeout_and_rejects_a_negative_one",
     "test_cancelled_receive_consumes_no_message",
-    "test_two_coroutines_share_a_subscriber",
+    "test_five_coroutines_share_a_subscriber",
     "test_close_wakes_waiting_coroutines",
     "test_close_in_the_loop_wakes_a_waiting_coroutine",
     "test_spin_runs_functions_and_coroutine_functions_one_at_a_time",
@@ -294,7 +294,7 @@ def test_messages_queued_by_rospy_are_sent_before_a_publisher_closes(make: Make)
         assert data == bytes([n]) * 8_000_000
 
 
-def test_close_wakes_waiting_readers_with_closed_error(make: Make) -> None:
+def test_close_wakes_a_waiting_subscriber_with_closed_error(make: Make) -> None:
     node = make("a")
     sub, pub = node.new_sub("topic"), node.new_pub("topic")
     ended: list[str] = []

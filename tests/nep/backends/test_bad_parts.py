@@ -319,7 +319,7 @@ def test_master_replies_to_every_request_and_keeps_serving(
 
 
 @pytest.mark.parametrize("size", [0, 1, 200, 255])
-def test_master_serves_nodes_with_any_routing_id(
+def test_master_serves_nodes_with_routing_ids_of_any_length(
     context: zmq.Context[zmq.Socket[bytes]], master: Master, size: int
 ) -> None:
     with context.socket(zmq.DEALER) as dealer:

@@ -237,7 +237,7 @@ def test_batched_messages_beyond_the_inbox_limit_are_dropped_and_counted(node: n
     assert len(few._transport.ready) <= 3
 
 
-def test_reader_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
+def test_subscriber_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=2)
     sub._transport.ready.extend(
         nep.Message("t", bytes([number]), "bytes", "bytes") for number in range(5)
@@ -258,7 +258,7 @@ def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
         batch.pending.append((b"x", stamp_ns))
 
 
-def test_batching_requires_a_permitting_publisher_and_supporting_readers() -> None:
+def test_batching_requires_a_permitting_publisher_and_supporting_subscribers() -> None:
     batch = PendingBatch(may_wait=True)
     batch.open_window(1000)
     assert batch.until_ns == 0  # no subscriber accepts batches yet

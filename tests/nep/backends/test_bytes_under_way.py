@@ -82,7 +82,7 @@ def is_all_counted(program: Program, count: int) -> bool:
     return sum(told(program)) == count
 
 
-def test_stopped_subscriber_does_not_grow_publisher_memory_and_counts_its_losses(
+def test_publisher_memory_stays_bounded_and_a_stopped_subscriber_counts_its_losses(
     publisher: nep.Publisher, master: Master
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as stopped:
@@ -95,7 +95,9 @@ def test_stopped_subscriber_does_not_grow_publisher_memory_and_counts_its_losses
         eventually(lambda: is_all_counted(stopped, 1080))
 
 
-def test_busy_sink_does_not_grow_the_memory_of_its_program(publisher: nep.Publisher, master: Master) -> None:
+def test_memory_of_a_program_with_a_busy_sink_grows_only_to_a_limit(
+    publisher: nep.Publisher, master: Master
+) -> None:
     with running(SUBSCRIBER, master.address, "busy") as busy:
         subscribed(busy)
         before = rss(busy.process.pid)
@@ -139,7 +141,7 @@ def test_stopped_subscriber_does_not_affect_other_subscribers(
             eventually(lambda each=each: is_all_counted(each, 81))  # type: ignore[misc]
 
 
-def test_burst_of_thirty_images_is_not_lost_with_a_late_reader(
+def test_thirty_huge_messages_are_not_lost_while_their_subscriber_is_stopped(
     publisher: nep.Publisher, master: Master
 ) -> None:
     with running(SUBSCRIBER, master.address, "idle") as late:

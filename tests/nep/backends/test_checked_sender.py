@@ -35,7 +35,7 @@ def forge(own: nep.Publisher, named: int, seq: int, payload: object, *, in_parts
 
 @pytest.mark.parametrize("in_parts", [False, True])
 @pytest.mark.parametrize("batch", [False, True])
-def test_forged_reply_is_dropped_and_replies_of_the_publisher_arrive(
+def test_forged_reply_is_rejected_and_replies_of_the_publisher_are_received(
     master: Master, *, in_parts: bool, batch: bool
 ) -> None:
     heard: list[object] = []

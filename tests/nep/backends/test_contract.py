@@ -67,7 +67,7 @@ def test_message_arrives_with_all_its_metadata(make: Make) -> None:
     assert message.size_bytes == len(b'{"message":"hello"}')
 
 
-def test_polling_listing_of_the_paper_works(make: Make) -> None:
+def test_listen_without_a_timeout_polls_as_in_the_listing_of_the_paper(make: Make) -> None:
     sub = make("b").new_sub("example", "json")
     pub = make("a").new_pub("example", "json")
     assert sub.listen() == (False, {})
@@ -532,7 +532,7 @@ def test_close_discards_unread_messages(make: Make) -> None:
     ] == []
 
 
-def test_close_wakes_a_reader_in_another_thread(make: Make) -> None:
+def test_close_wakes_a_waiting_subscriber_in_another_thread(make: Make) -> None:
     node = make("b")
     sub = node.new_sub("topic")
     ended: list[str] = []

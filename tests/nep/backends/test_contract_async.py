@@ -97,7 +97,7 @@ def test_many_subscribers_of_a_loop_share_one_thread(make: Make) -> None:
     assert max(seen) <= 1
 
 
-def test_async_receive_with_and_without_timeout(make: Make) -> None:
+def test_async_receive_ends_at_its_timeout_and_rejects_a_negative_one(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -140,7 +140,7 @@ def test_cancelled_receive_consumes_no_message(make: Make) -> None:
     assert run(main()) == [1, 2]
 
 
-def test_two_coroutines_share_a_subscriber(make: Make) -> None:
+def test_five_coroutines_share_a_subscriber(make: Make) -> None:
     sub = make("b").new_sub("topic")
     pub = make("a").new_pub("topic")
 
@@ -297,7 +297,7 @@ def test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spi
 
 
 @pytest.mark.parametrize("backend", ["memory", "zeromq"])
-def test_async_spin_answers_service_calls(master: Master, backend: str) -> None:
+def test_async_spin_replies_to_service_calls(master: Master, backend: str) -> None:
     with nep.node("server", backend) as node, nep.node("client", backend) as other:
         client = other.new_client("double", timeout_s=30.0)
 

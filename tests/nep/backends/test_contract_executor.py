@@ -131,7 +131,7 @@ def test_stopped_node_leaves_the_spin_and_the_others_continue(make: Nodes, backe
     assert ran == ["first"]
 
 
-def test_servers_answer_calls_during_a_spin_of_several_nodes(
+def test_servers_reply_to_calls_during_a_spin_of_several_nodes(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wait that isn't woken lasts an hour, so a missing wake fails the test."""
@@ -333,7 +333,7 @@ def test_two_threads_can_spin_the_same_nodes(make: Nodes) -> None:
     assert sorted(got) == list(range(500))  # type: ignore[type-var]
 
 
-def test_spin_without_free_file_descriptors_raises_too_many_files_error(
+def test_spin_and_async_receive_at_the_file_limit_raise_too_many_files_error(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nodes = [make("a", "zeromq"), make("b", "memory")]

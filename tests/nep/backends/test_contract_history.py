@@ -120,7 +120,7 @@ def test_each_publisher_of_a_topic_has_its_own_history(make: Make) -> None:
         assert [each for each in got if each[0] == n] == [[n, 3], [n, 4]]  # type: ignore[index]
 
 
-def test_history_keeps_images_and_large_messages(make: Make) -> None:
+def test_history_keeps_the_newest_images(make: Make) -> None:
     node = make("a")
     pictures = [np.full((90, 120, 3), n, np.uint8) for n in range(100)]
     pub = node.new_pub("camera", "image", history=80)
@@ -191,7 +191,7 @@ def test_original_wire_rejects_history() -> None:
             node.new_pub("topic", "json", direct, history=2)
 
 
-def test_history_ends_with_a_killed_program_and_its_successor_has_its_own(master: Master) -> None:
+def test_killed_and_restarted_publisher_repeats_no_history_to_an_early_subscriber(master: Master) -> None:
     code = """
     import sys, nep
     pub = nep.node("a").new_pub("t", history=3)

@@ -102,7 +102,7 @@ def test_callback_receives_the_message_with_its_own_topic(make: Make) -> None:
     assert sorted(got) == [("/a/b/words", "my/words", ["long"]), ("words", "string", "short")]
 
 
-def test_patterns_work_with_multi_node_spin_async_spin_and_sinks(make: Make) -> None:
+def test_patterns_receive_through_a_multi_node_spin_async_iteration_and_sinks(make: Make) -> None:
     node, other, out = make("b"), make("c"), make("a")
     got: list[object] = []
     sunk: list[tuple[str, object]] = []
@@ -187,7 +187,7 @@ def test_star_inside_a_level_or_with_wildcards_disabled_is_literal(make: Make) -
     assert plain.listen() == (False, {})
 
 
-def test_close_wakes_waiting_readers_and_unregisters_the_pattern(make: Make) -> None:
+def test_close_wakes_a_waiting_subscriber_and_unregisters_the_pattern(make: Make) -> None:
     node, other = make("b"), make("a")
     pub = other.new_pub("a/b")
     sub = node.new_sub("a/*")
@@ -298,7 +298,7 @@ def test_older_master_without_wildcards_is_reported(
         node.new_sub("r/x")
 
 
-def test_ended_topics_are_unsubscribed(master: Master) -> None:
+def test_topics_of_closed_publishers_are_unsubscribed(master: Master) -> None:
     with nep.node("b") as node, nep.node("a") as other:
         sub = node.new_sub("r/*")
         members = sub._transport._members  # type: ignore[attr-defined]

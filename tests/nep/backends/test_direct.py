@@ -37,7 +37,7 @@ def node() -> Iterator[nep.Node]:
 @pytest.mark.parametrize("wire", ["original", "native"])
 @pytest.mark.parametrize("mode", ["one2many", "many2one"])
 @pytest.mark.parametrize("subscriber_first", [True, False])
-def test_direct_connection_works_in_every_mode_and_start_order_without_a_master(
+def test_one_sided_direct_connection_delivers_in_each_start_order_without_a_master(
     node: nep.Node, port: int, wire: str, mode: str, subscriber_first: bool
 ) -> None:
     conf = node.direct("127.0.0.1", str(port), mode, wire=wire)  # type: ignore[arg-type]

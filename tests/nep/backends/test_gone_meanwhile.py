@@ -16,7 +16,7 @@ from tests.nep.programs import eventually
 
 
 @pytest.mark.usefixtures("patient")
-def test_publisher_that_closes_before_its_subscriber_connects_does_not_delay_subscribing(
+def test_publisher_that_closes_during_a_subscription_is_not_connected(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[FoundReply] = []

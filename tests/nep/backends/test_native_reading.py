@@ -142,7 +142,7 @@ def test_unread_messages_are_moved_to_the_inbox_by_the_node(node: nep.Node) -> N
     assert sum(sub.receive(30.0) is not None for _ in range(2999)) == 2999
 
 
-def test_close_does_not_wait_for_a_reader(node: nep.Node) -> None:
+def test_close_ends_an_iteration_over_a_subscriber(node: nep.Node) -> None:
     sub, pub = node.new_sub("ends", "bytes"), node.new_pub("ends", "bytes")
     ended = threading.Event()
 

@@ -128,7 +128,7 @@ def test_message_without_time_stamp_has_no_latency() -> None:
     assert message.latency_uncertainty_s is None
 
 
-def test_message_without_clock_comparison_has_latency_without_uncertainty() -> None:
+def test_message_without_clock_comparison_has_latency_of_unknown_uncertainty() -> None:
     message = Message("t", b"1", "json", "json", stamp_ns=time.time_ns() - 10**9)
     latency_s = message.latency_s
     assert latency_s is not None
@@ -137,7 +137,7 @@ def test_message_without_clock_comparison_has_latency_without_uncertainty() -> N
     assert message.latency_s == latency_s, "it is that of the first look"
 
 
-def test_messages_in_one_process_share_a_clock() -> None:
+def test_latency_within_a_process_has_zero_uncertainty() -> None:
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m"), node.new_pub("m")
         pub.publish({"x": 1})
@@ -146,7 +146,7 @@ def test_messages_in_one_process_share_a_clock() -> None:
         assert message.latency_uncertainty_s == 0.0
 
 
-def test_typed_messages_have_latency_without_uncertainty_within_a_process() -> None:
+def test_typed_messages_within_a_process_have_latency_with_zero_uncertainty() -> None:
     with nep.node("memory", transport="memory") as node:
         sub, pub = node.new_sub("m", Place), node.new_pub("m", Place)
         pub.publish(Place(1.0))
@@ -214,7 +214,7 @@ def test_latest_reported_clock_difference_is_used() -> None:
         ("", "", False),
     ],
 )
-def test_publisher_without_computer_id_is_located_by_its_address(
+def test_publisher_is_located_by_its_computer_id_or_else_by_its_address(
     endpoint: str, told: str | None, is_here: bool
 ) -> None:
     endpoints = (endpoint,) if endpoint else ()

@@ -147,7 +147,7 @@ for n in range(3):
 """
 
 
-def test_listing_4_of_the_paper_works_between_two_programs_that_exit_cleanly(ros: str) -> None:
+def test_listing_4_of_the_paper_receives_messages_of_listing_2_and_both_exit_cleanly(ros: str) -> None:
     with running(LISTING_4, **told(ros)) as hearer:
         assert hearer.line() == "ready"
         with running(LISTING_2, **told(ros)) as speaker:
@@ -190,7 +190,7 @@ node.close()
 )
 
 
-def test_raw_ros_images_are_decoded_in_every_layout(ros: str) -> None:
+def test_raw_ros_images_are_decoded_in_colour_grey_and_float_layouts(ros: str) -> None:
     pytest.importorskip("cv2")
     with running(PICTURES, **told(ros)) as program:
         for expected in (

@@ -115,7 +115,7 @@ def test_ros2_back_end_passes_the_contract_in_an_isolated_network(file: str, cho
 # ---- names and the environment
 
 
-def test_topic_and_service_names_round_trip_to_dds_names() -> None:
+def test_topic_service_and_type_names_are_translated_to_and_from_dds() -> None:
     assert dds_topic("chatter") == dds_topic("/chatter") == "rt/chatter"
     for node_id in ("0123456789abcdef", "f123456789abcde0"):
         place = f"/nep/parameters/{node_id}"  # ROS 2 doesn't allow a digit after a "/" in a name
@@ -413,7 +413,7 @@ def test_invalid_file_in_a_definition_folder_is_reported_when_its_type_is_used(
         types.checked("folder/Uses")
 
 
-def test_every_kind_of_field_round_trips(types: MessageTypes) -> None:
+def test_scalar_array_bounded_and_nested_fields_round_trip(types: MessageTypes) -> None:
     types.add("mine/Inner", "float32[2] f\nuint64 u\nbyte[] raw\nstring<=3[<=2] s\n")
     types.add("mine/Outer", "int8 first\nmine/Inner[2] two\nmine/Inner[] more\nbool[] flags\nbool[3] three\n")
     inner = {"f": [float("-inf"), 0.0], "u": 2**64 - 1, "raw": b"\x80\xff", "s": ["", "é"]}

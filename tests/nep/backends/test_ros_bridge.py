@@ -53,7 +53,9 @@ for line in sys.stdin:
 )
 
 
-def test_bridge_joins_ros_and_nep(tmp_path: Path, master: Master) -> None:
+def test_bridge_forwards_messages_between_ros_and_nep_in_both_directions(
+    tmp_path: Path, master: Master
+) -> None:
     skip_without_ros()
     with (
         ros_master(tmp_path) as ros,

@@ -145,12 +145,12 @@ def test_truncated_or_oversized_bytes_raise_decode_error() -> None:
 
 @given(st.binary(max_size=300))
 @settings(max_examples=300, deadline=None)
-def test_any_bytes_decode_to_a_dict_or_raise_decode_error(data: bytes) -> None:
+def test_any_bytes_are_decoded_or_raise_decode_error(data: bytes) -> None:
     with contextlib.suppress(nep.DecodeError):
         ALL.decode(data)
 
 
-def test_impossible_lengths_allocate_no_memory() -> None:
+def test_impossible_lengths_raise_decode_error() -> None:
     empty = parse("a/A", "B[] all\n" + "=" * 80 + "\nMSG: a/B\n")
     assert empty.decode(struct.pack("<I", 3)) == {"all": [{}, {}, {}]}
     with pytest.raises(nep.DecodeError, match=r"'all' .*more nested messages"):

@@ -263,7 +263,7 @@ for _each in range(2):
         ("999.1.2.3", "ROS_IP is '999.1.2.3'; set it to the IP address of this computer"),
     ],
 )
-def test_own_address_follows_the_ros_environment(ros: str, own: str, said: str) -> None:
+def test_invalid_ros_ip_is_reported_and_an_empty_one_is_ignored(ros: str, own: str, said: str) -> None:
     with running(OWN_ADDRESS, **{**told(ros), "ROS_IP": own}) as program:
         assert program.line() == program.line() == said
         assert program.end() == ("", "")

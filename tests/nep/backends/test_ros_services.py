@@ -215,7 +215,7 @@ def test_killed_server_is_reported_and_its_successor_is_found(ros: str) -> None:
             client.end()
 
 
-def test_nep_call_type_matches_its_srv_file() -> None:
+def test_nep_call_type_round_trips_calls_and_replies_and_rejects_invalid_ones() -> None:
     json, msgpack = CODECS["json"], CODECS["msgpack"]
     body = NEP_CALL.encode_call(json, b'{"a":1}', 1.5)
     assert body == struct.pack("<HII", 1, 1500, 7) + b'{"a":1}'

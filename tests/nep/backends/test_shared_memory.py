@@ -339,7 +339,7 @@ def test_small_payloads_are_copied_and_hold_no_slots(node: nep.Node) -> None:
     assert in_memory(message), "larger ones stay where they are until somebody wants them"
 
 
-def test_late_reader_receives_correct_payloads_and_losses_are_counted(node: nep.Node) -> None:
+def test_slow_reader_receives_correct_payloads_and_losses_are_counted(node: nep.Node) -> None:
     sub = node.new_sub("t", "bytes", max_messages=20)
     pub = node.new_pub("t", "bytes")
     begun = begin(pub)
@@ -356,7 +356,7 @@ def test_late_reader_receives_correct_payloads_and_losses_are_counted(node: nep.
     assert sub.received + (sub.lost or 0) == begun + 300
 
 
-def test_memory_of_a_killed_publisher_is_removed_by_the_next_program() -> None:
+def test_memory_files_of_a_killed_publisher_are_deleted_by_the_next_program() -> None:
     code = """
         import sys, time
         from nep.backends.zeromq.shared.memory import SharedWriter
@@ -454,7 +454,9 @@ def test_exiting_forked_child_does_not_release_memory_of_its_parent(master: Mast
         assert program.end() == ("", "")
 
 
-def test_missing_library_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_shared_memory_library_falls_back_to_the_socket(
+    node: nep.Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(shared_memory, "_MODULE_NAME", "no_such_library")
     monkeypatch.setattr(shared_memory, "_process", shared_memory._ProcessState())
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
@@ -485,7 +487,9 @@ def test_full_memory_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytes
     assert in_memory(message)
 
 
-def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_file_in_place_of_the_private_folder_raises_os_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
     (tmp_path / "nep-shared").write_text("a file")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(OSError, match="nep-shared"):

@@ -248,7 +248,7 @@ def test_invalid_liveliness_tokens_are_ignored(key: str) -> None:
     assert keys.parse_token(key) is None
 
 
-def test_invalid_puts_and_replies_are_rejected_and_counted(
+def test_invalid_puts_are_rejected_and_counted_and_invalid_replies_ignored(
     make: Make, port: int, caplog: pytest.LogCaptureFixture, place: str
 ) -> None:
     node = make("a")
@@ -285,7 +285,7 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
 # ---- addresses
 
 
-def test_zenoh_address_is_taken_from_argument_or_configuration_variable(
+def test_zenoh_address_is_taken_from_argument_or_variable_and_validated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv(CONFIG_VARIABLE, raising=False)
@@ -366,7 +366,9 @@ def test_rendezvous_files_of_ended_programs_are_deleted(place: str, tmp_path: Pa
     assert meeting.entries() == []
 
 
-def test_invalid_rendezvous_folder_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_file_in_place_of_the_rendezvous_folder_is_reported(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     (tmp_path / "nep-zenoh").touch()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with (
@@ -386,7 +388,7 @@ def router(port: int, more: str = "", protocol: str = "tcp") -> str:
     )
 
 
-def test_router_joins_programs_and_can_be_restarted(make: Make, port: int) -> None:
+def test_router_connects_programs_and_can_be_restarted(make: Make, port: int) -> None:
     where = f"tcp/127.0.0.1:{port}"
     with running(ROUTER, router(port)) as first:
         first.line()

@@ -157,7 +157,7 @@ def make(lab: Lab) -> Iterator[Make]:
         node.close()
 
 
-def test_messages_are_exchanged_with_certificates(make: Make) -> None:
+def test_messages_and_calls_are_exchanged_with_certificates(make: Make) -> None:
     sub = make("a").new_sub("secret")
     other = make("b")
     pub = other.new_pub("secret", latched=True)
@@ -171,7 +171,7 @@ def test_messages_are_exchanged_with_certificates(make: Make) -> None:
     assert {each.name for each in other.graph().nodes.values()} == {"a", "b", "c", "d"}
 
 
-def test_traffic_is_encrypted(lab: Lab) -> None:
+def test_connection_starts_with_a_tls_handshake(lab: Lab) -> None:
     """The first bytes that a node sends are a TLS handshake."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         listening.settimeout(LONG_S)
@@ -198,7 +198,9 @@ def test_traffic_is_encrypted(lab: Lab) -> None:
 @pytest.mark.parametrize(
     ("certificate", "authority"), [("", "authority"), ("stranger", "authority"), ("robot", "stranger")]
 )
-def test_untrusted_peer_is_rejected_with_a_message(lab: Lab, certificate: str, authority: str) -> None:
+def test_missing_or_untrusted_certificate_is_rejected_with_a_message(
+    lab: Lab, certificate: str, authority: str
+) -> None:
     """Covers no certificate, a self-signed one, and an untrusted certificate of the router."""
     with nep.node("a", "zenoh", master=lab.master(certificate, authority), wait_s=1.0) as node:
         for make in (lambda: node.new_pub("open"), lambda: node.new_client("open"), node.graph):
@@ -224,7 +226,7 @@ def test_missing_certificate_files_are_reported(lab: Lab) -> None:
         node.new_sub("open")
 
 
-def test_denied_topic_delivers_nothing_and_its_losses_are_known_at_the_end(make: Make) -> None:
+def test_denied_topic_delivers_nothing_and_losses_are_known_when_its_publisher_closes(make: Make) -> None:
     """As docs/zenoh.md explains, a router reports to no node that it denies something."""
     robot, guest = make("robot"), make("guest", "guest")
     secret, opened = guest.new_sub("secret"), guest.new_sub("open")

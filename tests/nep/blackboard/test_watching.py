@@ -66,7 +66,9 @@ def test_rize_perceptions_are_stored(make: Make) -> None:
     assert entry.robot == "Pepper"
 
 
-def test_undecodable_messages_are_skipped(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+def test_invalid_messages_are_rejected_and_counted_and_valid_parts_are_stored(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
     board = nep.Blackboard(make("watcher"))
     watch = board.watch("/x", key="h.{id}")
     pub = make("camera").new_pub("/x", "json")

@@ -38,7 +38,7 @@ def ask(robot, what):
     return robot.line()
 
 
-def test_bridge_joins_a_ros_2_robot():
+def test_bridge_forwards_topics_between_nep_and_a_ros_2_robot():
     with nets("zeromq") as (a,), running(ROBOT) as robot:
         assert robot.line() == "ready"
         topics = (
@@ -74,7 +74,7 @@ def test_bridge_joins_a_ros_2_robot():
                 assert sub.receive(60.0) is not None, what
 
 
-def test_bidirectional_topic_does_not_echo_and_json_is_sent_as_text():
+def test_bidirectional_json_topic_is_forwarded_without_echo():
     with nets("zeromq") as (a,), nep.node("other", "ros2") as other:
         told = BridgeConfiguration(
             "lab",

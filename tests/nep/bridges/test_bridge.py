@@ -81,7 +81,7 @@ def test_bidirectional_topic_does_not_echo_to_its_sender(pair):
     ("msg_type", "payload"),
     [("json", {"a": [1, None]}), ("string", "grüß"), ("bytes", b"\0\xff"), ("msgpack", {"b": b"x"})],
 )
-def test_shared_types_keep_bytes_and_type(pair, msg_type, payload):
+def test_standard_types_keep_payload_codec_and_type(pair, msg_type, payload):
     a, b = pair
     with bridged(a, b, topic("/t", direction="b->a")):
         sub = a.node("a").new_sub("/t", msg_type)

@@ -140,7 +140,7 @@ def test_plain_output_prints_a_line_per_change(file, nodes):
         assert figures == ["3", "3", "0", "0", "0", "0", "0", "0"]
 
 
-def test_command_line_form_joins_one_topic(nodes, master, place):
+def test_bridge_between_two_command_line_ends_forwards_one_topic(nodes, master, place):
     on_a, on_b = nodes
     words = (f"zmq@{master.address}:/chatter", f"Zenoh@{place}:")
     with running(COMMAND, "bridge", *words, "--direction", "b->a", "--rate", "100", "--json") as program:

@@ -60,7 +60,7 @@ def test_every_side_option_is_parsed():
     assert told.node_name("b") == "bridge-robots-to-zeromq"
 
 
-def test_every_topic_option_is_parsed():
+def test_names_direction_rate_and_types_of_a_topic_are_parsed():
     (told,) = read(
         f'{SIDES}[[topics]]\na = "/a/*"\nb = "b/*/x"\ndirection = "b->a"\nmax_rate_hz = 2\ntype = "json"\n'
         'b_type = "string"\n'
@@ -134,7 +134,7 @@ def test_invalid_configuration_is_rejected_with_line_and_key(text, said):
     assert "\n" not in found
 
 
-def test_qos_values_of_the_back_end_are_accepted(monkeypatch):
+def test_qos_values_of_the_back_end_are_accepted_and_unknown_ones_rejected(monkeypatch):
     from dataclasses import replace
 
     told = replace(memory.BACKEND, qos=("reliable", "sensor"))

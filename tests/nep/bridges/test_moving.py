@@ -59,7 +59,7 @@ def test_bridge_forwards_to_an_allowed_robot_and_patterns_match_no_other_robot()
             assert other.received == 0
 
 
-def test_command_rejects_topics_that_move_a_robot_before_connecting(type_in, tmp_path):
+def test_command_rejects_topics_that_move_a_robot_unless_allowed(type_in, tmp_path):
     with nets("nanomsg", "zeromq") as (a, b):
 
         def bridge(target: str, *words: str, msg_type: str = "json"):

@@ -58,7 +58,7 @@ def when(program, is_met):
     return next(each for each in reports(program) if is_met(each))
 
 
-def test_command_line_bridge_joins_a_robot_without_duplicates(ros: str, master: Master) -> None:
+def test_command_line_bridge_connects_a_ros_robot_without_duplicates(ros: str, master: Master) -> None:
     words = (f"zeromq@{master.address}:/chat", f"ros@{ros}:")
     with running(ROBOT, **told(ros)) as robot, nep.node("person", master=master.address) as person:
         assert robot.line() == "ready"

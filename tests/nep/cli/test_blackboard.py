@@ -93,7 +93,7 @@ def test_name_and_lifetime_options_are_applied(master: Master, run: TypeIn) -> N
         assert json.loads(run("show", "--name", "home", "--json").stdout) == []
 
 
-def test_invalid_arguments_are_reported_in_one_sentence(master: Master, run: TypeIn) -> None:
+def test_invalid_arguments_and_unavailable_blackboards_are_reported(master: Master, run: TypeIn) -> None:
     nobody = run("show", "--name", "nobody", "--timeout", "0.2")
     assert (nobody.returncode, nobody.stdout) == (1, "")
     assert "no blackboard 'nobody' is running; start one with 'nep blackboard'" in nobody.stderr

@@ -283,7 +283,7 @@ def test_closed_output_pipe_ends_echo_with_exit_code_1_without_traceback(running
         assert "Traceback" not in echo.process.stderr.read()
 
 
-def test_master_runs_until_ctrl_c_and_a_second_one_is_rejected(address, start):
+def test_master_runs_until_ctrl_c_and_a_second_one_fails(address, start):
     port = address.rpartition(":")[2]
     first = start("master", "--port", port, "--no-gateway")
     assert address in first.wait_says("master at")

@@ -54,7 +54,7 @@ def test_topics_are_completed(robot, shell):
     assert complete(shell, "nep topic echo /o") == ["/odd", "/odom"]
 
 
-def test_zsh_completion_works(robot):
+def test_topics_are_completed_in_zsh(robot):
     assert complete("zsh", "nep topic hz /o") == ["/odd", "/odom"]
 
 
@@ -77,7 +77,7 @@ def test_node_names_and_log_levels_are_completed(robot):
     assert complete("bash", "nep log --level w") == ["warning"]
 
 
-def test_completion_without_a_master_is_empty_and_returns_at_once(monkeypatch):
+def test_completion_without_a_reachable_master_is_empty(monkeypatch):
     monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")
     assert complete("bash", "nep topic echo /o") == []
     line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))

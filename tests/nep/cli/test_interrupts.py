@@ -157,7 +157,7 @@ def test_lazy_exports_match_those_seen_by_type_checkers():
     assert nep.master is nep.Master
 
 
-def test_import_nep_provides_all_public_names():
+def test_public_names_and_the_errors_module_are_imported_lazily():
     done = python(
         "import nep\n"
         "assert 'errors' not in vars(nep)\n"
@@ -180,7 +180,7 @@ def test_public_names_are_available_during_interpreter_shutdown():
     assert (done.stdout, done.stderr) == (b"ClosedError\n", b"")
 
 
-def test_missing_package_is_named():
+def test_missing_package_raises_module_not_found_error():
     done = python("import sys; sys.modules['zmq'] = None\nimport nep\nnep.node")
     assert b"ModuleNotFoundError: " in done.stderr
 

@@ -49,7 +49,7 @@ def test_parameters_are_listed_read_and_set(node: nep.Node, run: TypeIn) -> None
     assert run("get", node.id, "mode", "--json").stdout.strip() == '"run"'
 
 
-def test_rejected_changes_are_reported_in_one_sentence(node: nep.Node, run: TypeIn) -> None:
+def test_rejected_changes_and_unknown_names_are_reported(node: nep.Node, run: TypeIn) -> None:
     refused = run("set", "robot", "speed", "9")
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "the parameter 'speed' can't be 9: the maximum is 2" in refused.stderr

@@ -31,7 +31,7 @@ def test_intervals_are_measured_with_the_publisher_clock():
     assert found.std_s == pytest.approx(0.0471, abs=1e-3)
 
 
-def test_intervals_without_stamps_use_arrival_times_and_ignore_order():
+def test_rate_uses_arrival_times_without_time_stamps_and_ignores_their_order():
     window = RateWindow(10.0)
     for arrived in (1.0, 2.0, 3.0):
         window.add(arrived, None, 10)
@@ -145,7 +145,7 @@ def test_topic_that_appears_later_is_measured(master, capsys, monkeypatch):
     assert "'/odom' has no publisher yet; waiting" in shown.err
 
 
-def test_delay_covers_recent_messages():
+def test_delay_covers_only_messages_in_the_window():
     window = LatencyWindow(10.0)
     assert window.delay(0.0) is None
     window.add_latency(0.0, 99.0, 1)

@@ -76,7 +76,7 @@ def test_long_table_is_aligned_like_a_short_one(capsys):
     assert "lines" in capsys.readouterr().out
 
 
-def test_topics_are_never_wrapped_on_a_narrow_terminal(monkeypatch, capsys):
+def test_long_topic_is_not_wrapped_on_a_narrow_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
     columns = [
@@ -147,7 +147,7 @@ WIDE = [("/日本語カメラ", "1"), ("/e\u0301te\u0301", "2"), ("/😀😀", "
 
 
 @pytest.mark.parametrize("rows", [WIDE, WIDE * 60], ids=["short", "long"])
-def test_columns_are_aligned_for_every_script(rows, capsys):
+def test_columns_with_wide_and_combining_characters_are_aligned(rows, capsys):
     show_table(
         [TextColumn("topic"), TextColumn("rate"), TextColumn("lost", "right")], [(*row, "9") for row in rows]
     )
@@ -169,7 +169,7 @@ def test_wide_characters_are_not_truncated_if_they_fit(capsys, monkeypatch):
     assert "/" + "日本" * 5 in capsys.readouterr().out
 
 
-def test_bandwidth_of_a_topic_without_subscribers_is_not_zero():
+def test_bandwidth_without_subscribers_is_unknown_unless_the_rate_is_zero():
     subscriber = SubscriberInfo(1, "n", 0, 0)
     assert "B/s" not in format_bandwidth(TopicInfo("/t", "json", "json", rate_hz=50.0, bandwidth_Bps=0.0))
     heard = TopicInfo("/t", "json", "json", (), (subscriber,), rate_hz=50.0, bandwidth_Bps=0.0)

@@ -184,7 +184,7 @@ def test_master_with_a_blocked_terminal_keeps_serving_and_exits(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("ends", [False, True])
-def test_output_is_kept_if_no_writer_thread_can_be_started(
+def test_output_waits_until_a_writer_thread_can_be_started_unless_closed(
     monkeypatch: pytest.MonkeyPatch, ends: bool
 ) -> None:
     """From Python 3.12 on, no thread can be started while the interpreter shuts down."""

@@ -38,7 +38,7 @@ def test_pattern_of_many_stars_is_matched_quickly():
 @pytest.mark.parametrize(
     ("word", "is_one"), [("/a/*", True), ("a?", True), ("/a", False), ('["*"]', False), ("a[3].*", False)]
 )
-def test_field_paths_are_not_patterns(word, is_one):
+def test_topic_patterns_are_distinguished_from_topics_and_field_paths(word, is_one):
     assert is_pattern(word) is is_one
 
 

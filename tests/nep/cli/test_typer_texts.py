@@ -38,7 +38,7 @@ def test_unknown_typer_text_stays_in_english() -> None:
 
 
 @pytest.mark.parametrize("line", ["--help", "topic --help", "topic echo --help"])
-def test_entire_help_is_translated_to_spanish(line: str) -> None:
+def test_typer_texts_in_the_help_are_translated_to_spanish(line: str) -> None:
     """Runs as a process because typer creates some of its texts when it is imported."""
     environ = {**os.environ, "NEP_LANG": "es", "COLUMNS": "200", "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(

@@ -84,7 +84,9 @@ def test_alarms_are_printed_as_json_and_actions_only_studio_supports_are_reporte
     assert "need Studio and are skipped: stop all robots" in plain.stderr
 
 
-def test_alarm_saves_the_last_seconds_through_any_available_flight_recorder(master, type_in, file) -> None:
+def test_alarm_saves_the_last_seconds_through_a_flight_recorder_if_one_is_running(
+    master, type_in, file
+) -> None:
     asked = []
 
     def keep(request: object) -> object:
@@ -160,7 +162,7 @@ def test_alarm_does_not_move_a_robot_that_connected_later(master, type_in, file)
     assert told == [[]]
 
 
-def test_watch_command_waits_for_a_lost_master(type_in, file, monkeypatch) -> None:
+def test_watch_command_waits_for_a_master_that_starts_later(type_in, file, monkeypatch) -> None:
     with Master("127.0.0.1:0") as first:
         address = first.address
     name = file({"when": {"node": "lidar", "is": "comes"}}, {"when": BELOW})

@@ -239,7 +239,7 @@ def test_kill_channel_is_reported_as_information_only():
     assert found(ports=(PortFact(12345, "", True, OTHER),))["port:12345"].severity == "info"
 
 
-def test_installed_original_package_is_an_error_with_a_command():
+def test_original_package_its_leftover_files_and_shadowing_files_are_reported():
     one = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))["package:nep"]
     assert one.severity == "error"
     assert "nep 0.5.4.8" in one.sentence
@@ -318,7 +318,7 @@ def test_alerts_of_the_master_are_findings_except_those_the_doctor_checks_itself
     assert "port:7000" not in made  # the doctor checks the port itself
 
 
-def test_folders_clocks_and_loopback_problems_are_reported():
+def test_folder_clock_and_loopback_problems_are_reported():
     assert found(folders=(FolderFact("/state", "Settings", "permission denied"),))[
         "folder:/state"
     ].sentence == ("Settings can't be saved in /state: permission denied.")
@@ -345,7 +345,7 @@ def test_report_is_plain_text_with_fixes():
     assert to_plain(made)[0]["id"] == "master:none"
 
 
-def test_every_finding_is_a_complete_sentence():
+def test_findings_are_complete_sentences():
     for each in (*findings(HEALTHY), *found(view=None, master_port=None, shadow="/x").values()):
         assert each.sentence.endswith(".")
         assert each.sentence[0].isupper() or each.sentence[0] in "“/"

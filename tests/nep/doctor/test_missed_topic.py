@@ -141,7 +141,7 @@ def test_incompatible_versions_are_reported():
     assert "camera_driver (lab)" in wire.fix
 
 
-def test_received_messages_are_reported_as_readable_or_unreadable():
+def test_readable_unreadable_and_blocked_messages_are_reported():
     assert [each.severity for each in found(received=1, **publisher(last_message_s=NOW)).values()] == ["ok"]
     bad = found(received=1, decode_problem="it is not valid JSON", **publisher(last_message_s=NOW))[
         "topic:unreadable"

@@ -320,7 +320,7 @@ def test_all_host_forms_are_valid_endpoints(endpoint: str) -> None:
 
 
 @pytest.mark.parametrize("endpoint", ["ipc:///tmp/x", "inproc://x", "udp://127.0.0.1:9", "tcp://a b:9", "x"])
-def test_invalid_endpoint_is_rejected_also_without_a_key(master: Master, endpoint: str) -> None:
+def test_invalid_endpoint_of_a_node_without_a_key_is_rejected(master: Master, endpoint: str) -> None:
     own = NodeRecord("5" * 16, "Mallory", "host", 1)
 
     def record(where: str) -> PublisherRecord:
@@ -343,7 +343,9 @@ def test_rejected_message_type_is_reported_with_the_reason(master: Master, word:
         assert said in refused.reason
 
 
-def test_invalid_registrations_are_rejected_counted_and_named(master: Master, victims: Victims) -> None:
+def test_invalid_registrations_are_rejected_with_a_reason_and_counted(
+    master: Master, victims: Victims
+) -> None:
     with attacker_at(master) as attacker:
         nonsense: list[Request] = [
             *(
@@ -392,7 +394,7 @@ def test_number_of_publishers_and_subscribers_per_node_is_limited(master: Master
         assert isinstance(attacker.ask(AddPublisher(node(), publisher(id=20_000))), AddedReply)
 
 
-def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> None:
+def test_key_of_a_node_is_in_no_reply_graph_or_repr(master: Master, victims: Victims) -> None:
     with attacker_at(master) as attacker:
         answers = [
             attacker.ask(QueryGraph()),

@@ -101,7 +101,7 @@ def test_node_with_two_subscribers_is_notified_once(graph: Graph) -> None:
     assert [each.to for each in outgoing] == ["s", "asker"]
 
 
-def test_new_subscriber_receives_the_publishers_and_each_publisher_is_probed(graph: Graph) -> None:
+def test_new_subscriber_receives_native_publishers_whose_nodes_are_probed(graph: Graph) -> None:
     ask(graph, AddPublisher(node("p"), publisher(1)))
     ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
     probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
@@ -230,7 +230,7 @@ def test_restarted_master_accepts_known_nodes_before_new_nodes() -> None:
     assert graph.learning_end is None
 
 
-def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
+def test_unresponsive_node_raises_an_alert_until_it_renews(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     ask(graph, ReportMissing("p", 2, (1, 99)))

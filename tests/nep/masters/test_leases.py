@@ -48,7 +48,7 @@ def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -
 
 
 @pytest.mark.parametrize(("nodes", "managed"), [(1, 0), (100, 0), (10, 1000)])
-def test_nodes_of_ordinary_graphs_renew_every_second(nodes: int, managed: int) -> None:
+def test_up_to_100_nodes_renew_every_second_however_many_are_managed(nodes: int, managed: int) -> None:
     times = told(nodes, managed)
     for before, after in pairwise(times):
         assert [b - a for a, b in zip(before, after, strict=True)] == pytest.approx([1.0] * nodes)

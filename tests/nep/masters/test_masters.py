@@ -85,7 +85,7 @@ def test_malformed_requests_receive_an_error_and_the_master_survives(master: Mas
     assert ORIGINAL.id in master.view().nodes
 
 
-def test_negative_call_number_cannot_intercept_internal_replies(master: Master) -> None:
+def test_invalid_call_number_is_decoded_as_0(master: Master) -> None:
     asked = encoding.decode_request(pack({"do": "ping", "call": -1}))
     assert asked == encoding.ReceivedRequest(0, Ping())
     assert encoding.decode_request(pack({"do": "ping", "call": True})).call == 0
@@ -109,7 +109,7 @@ def test_second_master_on_an_address_raises_address_in_use_error(master: Master)
         Master(master.address).start()
 
 
-def test_is_running_is_false_without_a_master() -> None:
+def test_is_running_is_true_only_while_the_master_runs() -> None:
     with Master("127.0.0.1:0") as master:
         address = master.address
         assert is_running(address)
@@ -160,7 +160,7 @@ def test_original_nodes_can_be_registered_in_process(master: Master) -> None:
     assert master.view().nodes == {}
 
 
-def test_closed_master_rejects_requests(master: Master) -> None:
+def test_request_to_a_closed_master_raises_closed_error(master: Master) -> None:
     master.close()
     master.close()
     with pytest.raises(nep.ClosedError):

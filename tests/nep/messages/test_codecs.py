@@ -48,7 +48,7 @@ def back(name: str, payload: object) -> object:
 
 
 @pytest.mark.parametrize("name", sorted(PAYLOADS))
-def test_payload_round_trip(name: str) -> None:
+def test_payloads_round_trip(name: str) -> None:
     @given(PAYLOADS[name])
     def check(payload: object) -> None:
         assert back(name, payload) == payload
@@ -63,7 +63,7 @@ def test_arbitrary_bytes_decode_or_raise_decode_error(name: str, data: bytes) ->
         codec(name).decode(memoryview(data), {})
 
 
-def test_codecs_are_found_by_name_and_number() -> None:
+def test_codecs_are_found_by_name_number_and_message_type() -> None:
     assert [codec_by_number(number) for number in range(1, 6)] == list(CODECS.values())
     assert codec_by_number(99) is None
     assert codec_for("robot/description").name == codec_for("dictionary").name == "json"
@@ -72,7 +72,7 @@ def test_codecs_are_found_by_name_and_number() -> None:
         codec("jason")
 
 
-def test_json_encodes_numpy_number_keys_and_dataclasses() -> None:
+def test_json_encodes_numpy_values_number_keys_and_dataclasses() -> None:
     @dataclasses.dataclass
     class Pose:
         x: float

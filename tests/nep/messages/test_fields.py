@@ -81,7 +81,7 @@ def rows(out):
     return list(csv.reader(io.StringIO(out, newline="")))
 
 
-def test_csv_table_has_header_timestamps_and_quoted_cells():
+def test_csv_table_has_header_time_stamps_and_quoted_cells():
     out = io.StringIO(newline="")
     table = CsvMessageWriter(FieldExtractor(["pose.x", "joints[2].name", "a", "."]), out)
     table(message({"pose": {"x": 1.5}, "joints": [0, 0, {"name": 'say "hi",\nbye'}], "a": False}))

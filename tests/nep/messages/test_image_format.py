@@ -59,7 +59,7 @@ def test_lower_jpeg_quality_uses_fewer_bytes() -> None:
 
 
 @pytest.mark.parametrize("kind", ["auto", "jpeg", "png", "raw"])
-def test_wide_image_is_scaled_down_with_its_aspect_ratio(kind: str) -> None:
+def test_image_is_scaled_down_to_its_maximum_width_with_its_aspect_ratio_but_not_up(kind: str) -> None:
     assert back(ImageFormat(kind, width=40), COLOUR).shape == (30, 40, 3)
     assert back(ImageFormat(kind, width=80), COLOUR).shape == COLOUR.shape
     assert back(ImageFormat(kind, width=1000), COLOUR).shape == COLOUR.shape
@@ -135,7 +135,7 @@ def test_publisher_applies_its_image_format_but_not_to_encoded_files(node: nep.N
         np.testing.assert_array_equal(sub.listen(timeout_s=30.0)[1], DEPTH)
 
 
-def test_image_that_does_not_fit_the_format_is_rejected_and_logged(
+def test_image_unsupported_by_its_format_is_rejected_and_logged(
     node: nep.Node, caplog: pytest.LogCaptureFixture
 ) -> None:
     node.new_sub("camera", "image")
@@ -152,7 +152,7 @@ def test_image_that_does_not_fit_the_format_is_rejected_and_logged(
         ("image", "jpeg", "'image' must be a 'nep.ImageFormat', not 'str'"),
     ],
 )
-def test_image_format_is_rejected_for_other_message_types(
+def test_image_argument_must_be_an_image_format_and_requires_the_message_type_image(
     node: nep.Node, msg_type: str, image: Any, sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):

@@ -71,7 +71,7 @@ def test_nan_is_accepted_if_allowed() -> None:
 
 
 @pytest.mark.parametrize("text", ['{"a', "[1", '"x', "-1.", "0x", "NaN", " true ", "-Infinity"])
-def test_incomplete_json_is_recognized_as_json(text) -> None:
+def test_text_that_begins_like_json_is_recognized_as_json(text) -> None:
     assert looks_like_json(text)
 
 

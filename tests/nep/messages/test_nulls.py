@@ -34,7 +34,7 @@ class Pose:
         ({7: (None, math.nan)}, "7[1]"),
     ],
 )
-def test_nan_is_logged_with_its_field_path(payload, where, caplog):
+def test_nan_or_infinity_is_logged_with_its_field_path(payload, where, caplog):
     teller = JsonEncoder("/odom")
     assert b"null" in teller.encode(payload).data
     assert teller.count == 1

@@ -38,7 +38,7 @@ _ROS = {
 
 
 @pytest.mark.parametrize("name", sorted(_ROS))
-def test_robot_type_fields_match_ros_definitions(name: str) -> None:
+def test_fields_and_constants_of_robot_types_match_ros_definitions(name: str) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     of_ros = store.types[name.replace("/", "/msg/")]
@@ -94,7 +94,7 @@ def _filled(declared: type) -> Any:
 
 
 @pytest.mark.parametrize("name", sorted(_ROS))
-def test_robot_types_round_trip_with_defaults(name: str) -> None:
+def test_robot_types_with_default_and_given_values_round_trip_as_json(name: str) -> None:
     assert through(_ROS[name]()) == _ROS[name]()
     assert through(_filled(_ROS[name])) == _filled(_ROS[name])
     assert read(_ROS[name], b"{}") == _ROS[name]()

@@ -223,7 +223,7 @@ def test_numpy_numbers_and_arrays_in_typed_messages_are_encoded() -> None:
     assert sent(Vector3(np.float32(0.5), np.array(2.0), np.int8(1))) == {"x": 0.5, "y": 2.0, "z": 1.0}
 
 
-def test_decoded_lists_are_not_shared_between_readers() -> None:
+def test_payloads_decoded_from_one_message_do_not_share_lists() -> None:
     message = Message("t", b'{"position":[1.0]}', "json", "json")
     reader = TypedReader(message_type(nep.sensor.JointState))
     first, second = reader.convert(message).payload, reader.convert(message).payload
@@ -232,7 +232,7 @@ def test_decoded_lists_are_not_shared_between_readers() -> None:
     assert message.payload == {"position": [1.0]}
 
 
-def test_null_is_decoded_as_nan_in_float_fields() -> None:
+def test_nan_in_float_fields_is_sent_as_null_and_null_is_decoded_as_nan() -> None:
     assert math.isnan(read(Vector3, {"x": None}).x)
     assert sent(Vector3(math.nan, math.inf)) == {"x": None, "y": None, "z": 0.0}
     assert read_bytes(Vector3, b'{"x": NaN, "y": -Infinity}').y == -math.inf
@@ -243,7 +243,7 @@ def test_null_is_decoded_as_none_in_optional_float_fields() -> None:
     assert read(Reading, {}).value == 1.0
 
 
-def test_datetime_formats_of_other_languages_are_decoded() -> None:
+def test_iso_8601_texts_and_msgpack_timestamps_are_decoded_as_datetimes() -> None:
     @dataclass
     class Seen:
         at: datetime
@@ -448,7 +448,7 @@ class NothingAtAll(TypedDict):
     pass
 
 
-def test_derived_empty_and_private_dataclasses_round_trip() -> None:
+def test_derived_and_empty_dataclasses_round_trip_without_private_fields() -> None:
     assert read(Odd, sent(Odd(class_=3, _private=1))) == Odd(class_=3)
     assert message_type(Derived).name == "test/Base"
     assert json.loads(bytes(typed_codec(message_type(Base), JSON).encode(Derived(1)).data)) == {"a": 1}

@@ -247,7 +247,7 @@ def test_invalid_endpoint_does_not_block_other_publishers(
 
 
 @pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:1", "tcp://my-host.local:65535", "ipc://@nep-41234"])
-def test_endpoint_formats_of_all_back_ends_are_valid(endpoint: str) -> None:
+def test_tcp_and_ipc_endpoints_are_valid(endpoint: str) -> None:
     assert is_endpoint(endpoint)
 
 

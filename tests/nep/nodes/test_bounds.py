@@ -218,7 +218,7 @@ def test_alerts_about_original_nodes_are_escaped_and_bounded() -> None:
     assert told[-1] == 0
 
 
-def test_registration_without_connection_is_evicted_first() -> None:
+def test_oldest_unconnected_registration_is_evicted_first() -> None:
     known = PortMap(None)
     line = TopicLine("t", "bare", "json", "many2many")
     processes = SimpleNamespace(started=lambda _pid: None, is_connected=lambda *_a, **_k: None)

@@ -32,7 +32,7 @@ def test_spin_idles_after_its_callbacks_are_closed(node: nep.Node) -> None:
     assert share < 0.2  # was 1.0 before the fix
 
 
-def test_callback_can_close_any_subscriber_including_its_own(node: nep.Node) -> None:
+def test_callback_can_close_its_own_and_another_subscriber(node: nep.Node) -> None:
     got: list[object] = []
 
     def callback(payload: object) -> None:

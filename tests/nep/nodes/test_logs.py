@@ -57,7 +57,7 @@ def handler(kept):
     made.close()
 
 
-def test_last_errors_are_published_to_late_subscribers_up_to_a_limit():
+def test_last_errors_are_published_as_one_list_with_a_limited_length_and_truncated_texts():
     records, errors = Kept(), Kept([MasterUnreachable("127.0.0.1:1", 2.0)])
     handler = LogHandler("robot", records.open, open_errors=errors.open)
     handler.logger.info("fine")

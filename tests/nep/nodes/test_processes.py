@@ -238,7 +238,7 @@ def test_interpreter_exit_delivers_queued_large_messages(node: nep.Node) -> None
     assert "p" not in {each.name for each in node.graph().nodes.values()}
 
 
-def test_interpreter_exits_immediately_with_empty_queue(master: Master) -> None:
+def test_interpreter_exit_with_an_empty_queue_does_not_wait_for_the_flush_timeout(master: Master) -> None:
     code = """
     import nep, time
     import nep.nodes.node as nodes

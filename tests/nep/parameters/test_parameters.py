@@ -178,7 +178,7 @@ def test_whole_float_converts_to_int_and_int_to_float(make: Make) -> None:
     assert [(each.value, type(each.value)) for each in parameters.list()] == [(2, int), (3.0, float)]
 
 
-def test_parameter_value_is_copied(make: Make) -> None:
+def test_default_of_a_parameter_is_copied(make: Make) -> None:
     parameters = make("robot").parameters
     given = [1, {"a": [2]}]
     parameters.declare("x", given)
@@ -218,7 +218,7 @@ def test_number_of_parameters_is_limited(make: Make) -> None:
         parameters.declare("x", 1)
 
 
-def test_parameters_of_a_node_are_found_by_name_or_id(master: Master) -> None:
+def test_parameters_are_found_by_node_id_and_ambiguous_or_unknown_names_are_rejected(master: Master) -> None:
     with nep.node("a") as one, nep.node("a") as two, nep.node("b"), nep.node("tool") as tool:
         with pytest.raises(nep.NepError, match="no node is named 'a'; no node has parameters"):
             tool.parameters_of("a")
@@ -242,7 +242,7 @@ def test_declare_without_a_master_raises_and_declares_no_parameter() -> None:
         assert node.parameters.list() == ()
 
 
-def test_parameters_stay_local_after_the_node_is_closed(master: Master) -> None:
+def test_parameters_of_a_closed_node_can_be_set_but_not_declared(master: Master) -> None:
     node = nep.node("a")
     node.parameters.declare("x", 1)
     node.close()

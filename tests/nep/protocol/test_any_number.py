@@ -79,7 +79,7 @@ def of(hint: Any, ints: st.SearchStrategy[int] = INTS) -> st.SearchStrategy[Any]
 
 
 @pytest.mark.parametrize("kind", ASKED, ids=lambda kind: kind.__name__)
-def test_every_request_round_trips(kind: type[Request]) -> None:
+def test_every_request_with_arbitrary_values_is_decoded_as_its_own_type(kind: type[Request]) -> None:
     @MANY
     @given(of(kind))
     def check(request: Request) -> None:
@@ -91,7 +91,7 @@ def test_every_request_round_trips(kind: type[Request]) -> None:
 
 
 @pytest.mark.parametrize("kind", ANSWERS, ids=lambda kind: kind.__name__)
-def test_every_reply_round_trips(kind: type[Any]) -> None:
+def test_every_reply_with_arbitrary_values_is_decoded_as_its_own_type(kind: type[Any]) -> None:
     @MANY
     @given(of(kind))
     def check(answer: Any) -> None:

@@ -37,7 +37,7 @@ def node(smallest: ModuleType, master: Master) -> Iterator[Any]:
     made.close()
 
 
-def test_publisher_without_hello_reaches_a_subscriber(
+def test_publisher_of_the_smallest_client_reaches_a_subscriber(
     smallest: ModuleType, node: Any, master: Master
 ) -> None:
     with nep.node("ours") as ours:
@@ -54,7 +54,9 @@ def test_publisher_without_hello_reaches_a_subscriber(
         assert subscriber.refused == 0
 
 
-def test_subscriber_without_hello_receives_messages(smallest: ModuleType, node: Any, master: Master) -> None:
+def test_subscriber_of_the_smallest_client_receives_messages(
+    smallest: ModuleType, node: Any, master: Master
+) -> None:
     subscriber = smallest.Subscriber(node, "example")
     with nep.node("ours") as ours:
         publisher = ours.new_pub("example", "json")

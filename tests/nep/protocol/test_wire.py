@@ -66,7 +66,9 @@ def test_arbitrary_parts_raise_only_wire_errors(parts: list[bytes]) -> None:
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector["name"])
-def test_wire_vectors_are_decoded_and_encoded(vector: dict[str, object]) -> None:
+def test_wire_vectors_are_decoded_and_encoded_or_rejected_with_their_error_code(
+    vector: dict[str, object],
+) -> None:
     parts = [bytes.fromhex(part) for part in vector["parts"]]  # type: ignore[attr-defined]
     if "error" in vector:
         with pytest.raises(WireError) as refused:

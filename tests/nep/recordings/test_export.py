@@ -140,7 +140,7 @@ def test_exported_video_has_the_duration_of_the_recording(tmp_path):
     )
 
 
-def test_video_is_exported_as_avi_without_ffmpeg(tmp_path):
+def test_video_is_exported_without_ffmpeg(tmp_path):
     """Runs as a process because OpenCV reads its environment only once."""
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 31)]])
     program = f"""

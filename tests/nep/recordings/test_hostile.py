@@ -57,7 +57,9 @@ def paths(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc tells the most memory of a process")
-def test_commands_use_bounded_memory_and_time_for_any_file(paths: list[Path], tmp_path: Path) -> None:
+def test_commands_use_bounded_memory_and_time_for_each_hostile_file(
+    paths: list[Path], tmp_path: Path
+) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _ALL_COMMANDS, str(tmp_path), *map(str, paths)],
         capture_output=True,
@@ -125,7 +127,7 @@ def test_read_budget_limits_bytes_and_seconds(tmp_path: Path) -> None:
         FileReader(path, budget=ReadBudget(path, 100_000, 1.0, lambda: next(clock)))
 
 
-def test_overlapping_chunks_are_read_without_holding_all_messages(paths: list[Path]) -> None:
+def test_all_messages_of_overlapping_chunks_are_read(paths: list[Path]) -> None:
     (path,) = (each for each in paths if each.stem == "all chunks at all times")
     with FileReader(path) as reader:
         assert sum(1 for _each in reader.read_raw(None, None, {1})) == 20_000

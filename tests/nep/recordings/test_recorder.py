@@ -287,7 +287,7 @@ def test_recording_that_ends_unexpectedly_is_reported_and_another_recording_can_
     assert [(each["op"], each["path"]) for each in seen("problem")] == [("keep", str(tmp_path / "b.mcap"))]
 
 
-def test_command_line_that_is_too_long_is_discarded(monkeypatch):
+def test_too_long_input_line_is_discarded(monkeypatch):
     monkeypatch.setattr(child, "_MAX_LINE_BYTES", 10)
     lines = child._read_lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
     assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']

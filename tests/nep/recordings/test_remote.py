@@ -83,7 +83,7 @@ def test_unreadable_file_raises_and_other_files_stay_readable(
         assert next(whole.read())
 
 
-def test_crashed_reader_process_raises_and_the_next_open_starts_a_new_process(path: Path) -> None:
+def test_open_with_a_crashing_or_missing_reader_process_raises_recording_error(path: Path) -> None:
     with ReaderProcess(DIES) as reader:
         for _again in range(2):
             with pytest.raises(RecordingError, match=r"a\.mcap': .*process"):
@@ -92,7 +92,7 @@ def test_crashed_reader_process_raises_and_the_next_open_starts_a_new_process(pa
         reader.open(path)
 
 
-def test_unresponsive_reader_process_is_terminated(path: Path) -> None:
+def test_open_with_an_unresponsive_reader_process_raises_after_the_timeout(path: Path) -> None:
     reader = ReaderProcess(NEVER_ANSWERS, timeout_s=0.05)
     with reader, pytest.raises(RecordingTooLargeError, match="too long"):
         reader.open(path)

@@ -32,7 +32,7 @@ def read(path):
         return [kept(each.message) for each in recording.read()]
 
 
-def test_repair_of_a_truncated_recording_recovers_all_complete_messages(path, tmp_path):
+def test_repair_of_a_truncated_recording_recovers_the_messages_of_complete_chunks(path, tmp_path):
     data, whole = path.read_bytes(), [kept(each) for each in ALL]
     with Recording(path) as recording:
         chunks = recording.file.chunks()
@@ -78,7 +78,7 @@ def test_repair_of_an_undamaged_recording_loses_no_message(path, tmp_path):
 
 
 @pytest.mark.parametrize("has_end", [True, False])
-def test_repair_drops_only_the_damaged_chunk_and_counts_its_messages(path, tmp_path, has_end):
+def test_repair_discards_only_the_damaged_chunk_and_counts_its_messages(path, tmp_path, has_end):
     with Recording(path) as recording:
         chunks = recording.file.chunks()
     data = bytearray(path.read_bytes())

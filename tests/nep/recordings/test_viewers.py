@@ -171,7 +171,9 @@ def kept_by_a_ring(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("made", [fresh, cut, exported, kept_by_a_ring])
-def test_viewer_reads_all_supported_encodings(made: Made, tmp_path: Path) -> None:
+def test_viewer_reads_all_topics_except_msgpack_and_raw_images_that_follow_jpegs(
+    made: Made, tmp_path: Path
+) -> None:
     shown = [(topic, each) for topic, each in look(made(tmp_path)) if not topic.startswith("/nep/")]
     assert {topic for topic, each in shown if each is UnreadableError} <= {"/packed", "/camera"}
     assert ("/typed", {"x": 1.0}) in shown

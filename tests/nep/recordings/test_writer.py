@@ -142,7 +142,7 @@ def last_seen(writer: RecordingWriter, seq: int) -> bool:
     return received == {2: 2, 5: 3, 6: 4}[seq]
 
 
-def test_receive_times_follow_stamps_of_known_clocks_and_never_decrease(tmp_path):
+def test_receive_times_follow_time_stamps_of_known_clocks_and_never_decrease(tmp_path):
     path, now = tmp_path / "a.mcap", [START_NS]
     kinds = {
         "own": message_kind("/own", "json", "json", clock=OWN_CLOCK),

@@ -44,7 +44,7 @@ def test_rize_command_topic_moves_each_robot() -> None:
     assert MovingTopics().robots_moved_by("robot_action") == ("robot_action",)
 
 
-def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
+def test_wildcard_in_a_description_protects_only_topics_that_match() -> None:
     moving = MovingTopics([RobotControls("Rover", frozenset({"/Rover/*/go"}))])
     assert moving.robots_moved_by("/Rover/left/go") == ("Rover",)
     assert moving.robots_moved_by("/Rover/go") == ()
@@ -58,7 +58,9 @@ def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
         ({"title": 7, "rb:topics": {"command": "/c", "world": 7}, "actions": [1]}, {"/c"}),
     ],
 )
-def test_partly_invalid_description_yields_its_valid_topics(description: object, topics: set[str]) -> None:
+def test_valid_topics_that_move_the_robot_are_read_from_its_description(
+    description: object, topics: set[str]
+) -> None:
     found = parse_controls(description, "R")
     assert found == RobotControls("R", frozenset(topics))
 

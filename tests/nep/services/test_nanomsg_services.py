@@ -127,7 +127,9 @@ def test_malformed_call_is_counted(node: nep.Node, port: int, said: bytes) -> No
 
 
 @pytest.mark.parametrize("wire", [pytest.param("original", marks=pytest.mark.long), "native"])
-def test_server_death_during_a_call_is_reported_immediately(node: nep.Node, port: int, wire: str) -> None:
+def test_call_fails_when_its_server_dies_and_the_next_call_reaches_the_restarted_server(
+    node: nep.Node, port: int, wire: str
+) -> None:
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire=wire), timeout_s=LONG_S)
     with running(SERVER, str(port), wire) as program:
         program.line()
@@ -186,7 +188,7 @@ def test_threads_of_timed_out_calls_are_bounded(node: nep.Node, port: int) -> No
     eventually(lambda: not client._transport._threads)
 
 
-def test_nanomsg_services_reject_a_port_in_use_other_codecs_and_closed_nodes(
+def test_nanomsg_services_reject_ports_in_use_non_json_codecs_and_closed_nodes(
     node: nep.Node, port: int
 ) -> None:
     at = node.direct("127.0.0.1", port)

@@ -178,7 +178,7 @@ def test_respondent_replies_in_the_spinning_thread(node: nep.Node, port: int) ->
     assert respondent.is_closed
 
 
-def test_nanomsg_surveys_reject_a_port_in_use_other_codecs_plain_tcp_and_closed_nodes(
+def test_nanomsg_surveys_reject_ports_in_use_non_json_codecs_plain_tcp_and_closed_nodes(
     node: nep.Node, port: int
 ) -> None:
     at = node.direct("127.0.0.1", port)

@@ -40,7 +40,7 @@ def client(master: Master):
         yield node.new_client("/x", timeout_s=LONG_S)
 
 
-def test_server_death_during_a_call_is_reported_immediately(client) -> None:
+def test_call_fails_when_its_server_dies_and_the_next_call_reaches_the_restarted_server(client) -> None:
     with running(SERVER) as program:
         assert program.line() == "ready"
         future = client.call_async("hang", timeout_s=None)

@@ -284,7 +284,7 @@ RESPONDENT = """
 """
 
 
-def test_killed_respondent_does_not_delay_the_survey(master: Master) -> None:
+def test_survey_without_a_timeout_ends_when_its_respondent_is_killed(master: Master) -> None:
     with nep.node("here") as node, running(RESPONDENT) as program:
         assert program.line() == "ready"
         node.new_respondent("/who", lambda _question: "here", threads=1)

@@ -167,7 +167,9 @@ def test_undecodable_request_is_rejected(node: nep.Node, port: int) -> None:
         assert "can't decode" in told["reason"]
 
 
-def test_killed_server_is_reported_immediately(node: nep.Node, port: int) -> None:
+def test_call_fails_when_its_server_is_killed_and_the_next_call_reaches_a_new_server(
+    node: nep.Node, port: int
+) -> None:
     client = node.new_client("/x", node.direct("127.0.0.1", port, wire="tcp"), timeout_s=None)
     with running(SERVER, str(port)) as program:
         assert program.line() == "ready"
@@ -250,7 +252,7 @@ def _is_answered(port: int) -> bool:
             return False
 
 
-def test_unread_replies_are_bounded(
+def test_client_with_too_many_unread_replies_is_logged_and_does_not_block_other_clients(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("nep.backends.zeromq.services.tcp_server._MAX_UNREAD_BYTES", 10_000_000)

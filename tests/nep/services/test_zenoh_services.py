@@ -95,7 +95,9 @@ def stranger(routed: str) -> Iterator[Any]:
 # ---- server crashes
 
 
-def test_server_death_during_a_call_is_reported_immediately(make: Make, place: str) -> None:
+def test_call_fails_when_its_server_dies_and_the_next_call_reaches_the_restarted_server(
+    make: Make, place: str
+) -> None:
     client = make("client").new_client("/x", timeout_s=LONG_S)
     with running(SERVER, place) as program:
         program.line()
@@ -253,7 +255,7 @@ def test_wildcard_subscription_receives_no_service_calls(make: Make) -> None:
     assert set(node.graph().topics) == {"/x"}
 
 
-def test_direct_servers_are_rejected(make: Make) -> None:
+def test_direct_servers_and_clients_are_rejected(make: Make) -> None:
     node = make("node")
     for made in (node.new_server, node.new_client):
         with pytest.raises(nep.NepError, match=r"'zenoh' .*direct connections"):

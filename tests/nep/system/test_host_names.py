@@ -46,7 +46,7 @@ class Book:
         ("127.0.0.1:5", "127.0.0.1:5"),
     ],
 )
-def test_numeric_addresses_are_not_resolved(address: str, known: str) -> None:
+def test_numeric_localhost_and_wildcard_addresses_need_no_name_lookup(address: str, known: str) -> None:
     book = Book()
     name = MasterNameResolver(address, lambda _known: None, book.look_up)
     name.resolve(1.0)
@@ -112,7 +112,7 @@ def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext
             link.close()
 
 
-def test_unknown_host_of_a_direct_connection_raises_immediately() -> None:
+def test_unknown_host_of_a_direct_connection_raises_an_error_that_suggests_an_ip_address() -> None:
     with nep.node("n", master="127.0.0.1:1") as node:
         wrong = node.direct("no..computer", 9123, "many2one")
         with pytest.raises(nep.NepError, match=r"computer 'no\.\.computer'; .*IP address"):

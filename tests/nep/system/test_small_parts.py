@@ -279,7 +279,7 @@ def test_invalid_master_address_is_rejected(address: str) -> None:
         addresses.master_address(address)
 
 
-def test_did_you_mean_suggests_a_similar_name() -> None:
+def test_did_you_mean_suggests_a_similar_name_or_lists_the_known_names() -> None:
     assert did_you_mean("jsn", ["json", "string"]) == "did you mean 'json'?"
     assert did_you_mean("xyz", ["json", "string"]) == "known names: 'json', 'string'"
 
@@ -456,7 +456,7 @@ def test_number_of_subscribers_that_get_an_echo_is_bounded() -> None:
     assert len(subscriptions.legacy_filters) == 1
 
 
-def test_sink_batch_size_is_bounded() -> None:
+def test_inbox_batch_ends_when_its_size_limit_is_reached() -> None:
     inbox = Inbox("all", max_bytes=1000)
     for number in range(10):
         inbox.put(message(number, 100))

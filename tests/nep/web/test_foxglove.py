@@ -118,7 +118,7 @@ def publish(connection: ClientConnection, id_: int, message: object) -> None:
     connection.send(struct.pack("<BI", 1, id_) + json.dumps(message).encode())
 
 
-def test_client_publishes_in_supported_encodings(foxglove: WebServer, node: nep.Node) -> None:
+def test_client_publishes_string_msgpack_json_and_typed_messages(foxglove: WebServer, node: nep.Node) -> None:
     text, binary, twist = node.new_sub("/text", "string"), node.new_sub("/any"), node.new_sub("/cmd", Twist)
     node.new_pub("/text", "string")
     node.new_pub("/packed", "msgpack")
@@ -145,7 +145,7 @@ def test_client_publishes_in_supported_encodings(foxglove: WebServer, node: nep.
         eventually(lambda: not node.graph().topics["/any"].publishers)
 
 
-def test_client_moves_a_robot_only_while_allowed(foxglove: WebServer, node: nep.Node) -> None:
+def test_client_moves_a_robot_only_after_it_is_allowed(foxglove: WebServer, node: nep.Node) -> None:
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
     orders = node.new_sub("/orders")
     node.new_pub("/Rover/description", "robot/description", latched=True).publish(description)

@@ -105,7 +105,7 @@ def part(id_: str, data: str, number: int, total: int) -> op.Fragment:
     return op.Fragment(id_, data, number, total)
 
 
-def test_fragments_are_joined_in_any_order() -> None:
+def test_fragments_received_out_of_order_or_twice_are_joined() -> None:
     pieces = split_text("abcdefgh", 3)
     buffer = FragmentBuffer()
     order = (2, 0, 0, 1)

@@ -83,7 +83,7 @@ def test_token_is_required_for_pages_and_absent_from_rejections(path: str) -> No
     assert (status, TOKEN in body) == (HTTPStatus.OK, path == "/starter.html")
 
 
-def test_content_security_policy_allows_only_inline_scripts_and_no_external_resources() -> None:
+def test_content_security_policy_allows_only_hashed_inline_code_and_no_external_resources() -> None:
     found = respond(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
     policy = found.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy
@@ -146,7 +146,7 @@ def test_page_opened_without_the_token_is_listed_as_rejected(master: Master) -> 
         b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 1_000 + b"\r\n",
     ],
 )
-def test_malformed_request_is_answered_without_a_traceback(
+def test_malformed_request_is_rejected_without_a_traceback(
     server: WebServer, data: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     with socket.create_connection(("127.0.0.1", server.port), 30) as raw:

@@ -100,7 +100,7 @@ def test_page_calls_and_serves_services(node: nep.Node, page: Peer, open_page: O
         waiting.result(30)
 
 
-def test_rosapi_lists_topics_nodes_and_services(node: nep.Node, page: Peer) -> None:
+def test_rosapi_reports_the_graph_and_reads_and_sets_parameters(node: nep.Node, page: Peer) -> None:
     node.parameters.declare("speed", 1.5)
     node.new_server("/add", lambda given: given, threads=1)
     node.new_pub("/twist", Twist)

@@ -225,7 +225,7 @@ def bench(shared: Bench) -> Iterator[Bench]:
 # ---- description -----------------------------------------------------------------------------------
 
 
-def test_description_is_valid_and_declares_every_action(bench, request) -> None:
+def test_description_is_valid_and_every_declared_action_has_a_function(bench, request) -> None:
     option = request.config.getoption
     ours = not option("--driver") and not option(
         "--driver-command"
@@ -247,7 +247,7 @@ def test_description_is_valid_and_declares_every_action(bench, request) -> None:
 # ---- stop ------------------------------------------------------------------------------------------
 
 
-def test_stop_while_idle_is_answered(bench) -> None:
+def test_stop_while_idle_succeeds(bench) -> None:
     assert bench.stop()["state"] == "succeeded"
     assert bench.stop()["state"] == "succeeded"
 
@@ -267,7 +267,7 @@ def test_stop_ends_running_and_queued_actions(bench) -> None:
     assert set(ended) <= FINAL
 
 
-def test_concurrent_stops_are_all_answered(bench) -> None:
+def test_concurrent_stops_all_succeed(bench) -> None:
     bench.begun()
     ids = [bench.new_id() for _ in range(5)]
     for wanted in ids:
@@ -300,7 +300,7 @@ def test_stop_with_only_the_name_of_a_program_does_not_block_its_later_commands(
 # ---- actions ---------------------------------------------------------------------------------------
 
 
-def test_each_action_is_answered_exactly_once_and_can_be_canceled(shared) -> None:
+def test_each_action_has_exactly_one_final_reply_and_cancellable_ones_can_be_canceled(shared) -> None:
     canceled = []
     for action in shared.actions():
         # A new robot for each action: one that has turned away no longer sees a face.
@@ -429,7 +429,7 @@ def test_messages_that_are_not_commands_are_ignored(bench, message) -> None:
     assert [a["id"] for a in bench.ears.heard["answer"][before:]] == [wanted]
 
 
-def test_robot_stops_after_every_hostile_message(bench) -> None:
+def test_robot_stops_and_accepts_an_action_after_hostile_messages(bench) -> None:
     command = {"id": "h", "op": "invoke", "action": bench.any_action().name, "from": "p", "input": {}}
     small = [payload for payload in hostile.payloads(command) if len(payload) <= MAX_HOSTILE_BYTES]
     for number, payload in enumerate(small):

@@ -43,7 +43,7 @@ def test_action_is_accepted_runs_and_succeeds(turtle):
     assert isinstance(body.done[0][1], float)
 
 
-def test_action_with_invalid_input_is_rejected_without_calling_its_function(turtle):
+def test_invalid_commands_are_rejected_without_calling_a_function(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "move", distance=3)
     assert ears.final("1")["error"] == "move: distance must be between -2 and 2 m"
@@ -101,7 +101,7 @@ def test_action_that_exceeds_its_timeout_fails(turtle):
     assert ears.final("1")["error"] == "move took longer than 5 s"
 
 
-def test_function_that_ignores_its_timeout_is_answered_as_failed(turtle):
+def test_action_that_ignores_its_timeout_fails_and_keeps_its_resource_until_it_ends(turtle):
     body, ears, clock = turtle
     ears.invoke("1", "ignore")
     eventually(lambda: "running" in ears.states("1"))
@@ -413,7 +413,7 @@ def test_forged_heartbeat_does_not_prevent_the_watchdog_stop_after_an_action():
     assert dog.check_expired(1.0, [])
 
 
-def test_only_the_caller_can_cancel_and_every_program_can_stop(turtle, node):
+def test_another_program_cannot_cancel_an_action_but_can_stop_the_robot(turtle, node):
     body, ears, _ = turtle
     attacker = node.new_pub("/Turtle/command", "robot/command")
     ears.invoke("1", "move", program="p")
@@ -430,7 +430,7 @@ def test_only_the_caller_can_cancel_and_every_program_can_stop(turtle, node):
     assert not body.moving
 
 
-def test_flood_of_commands_is_bounded_and_a_stop_is_still_executed(node, clock):
+def test_command_backlog_is_bounded_and_a_stop_is_still_executed(node, clock):
     gate = threading.Event()
     with nep.node("listener", "memory") as other, Driver(TURTLE, "Turtle", node, clock=clock) as driver:
         ears = Ears(other, "Turtle")
@@ -460,7 +460,7 @@ def test_watchdog_ignores_programs_without_running_actions_and_stopped_programs(
     assert body.stops == 1
 
 
-def test_close_stops_the_robot_and_answers_all_actions(node, clock):
+def test_driver_close_stops_the_robot_and_cancels_the_running_action_with_the_reason(node, clock):
     with nep.node("listener", "memory") as other:
         ears = Ears(other, "Turtle")
         driver = Driver(TURTLE, "Turtle", node, clock=clock)

@@ -31,7 +31,7 @@ def stops(ears: Ears, wanted: str) -> bool:
     return ears.final(wanted, "stop")["state"] == "succeeded"
 
 
-def test_robot_stops_after_every_hostile_message(turtle, node):
+def test_robot_stops_and_runs_an_action_after_hostile_messages(turtle, node):
     """Issue 26: one message of 2 kB with 1000 levels ended the thread that executes stops."""
     body, ears, _clock = turtle
     threads = set(threading.enumerate())
@@ -89,7 +89,7 @@ def test_command_of_more_than_64_kb_is_rejected_with_a_message(turtle, caplog):
     assert body.done == []
 
 
-def test_unknown_input_names_are_checked_in_bounded_time():
+def test_unknown_input_names_beyond_a_limit_are_reported_as_a_number():
     """Issue 26: the search for a similar name for each of 200 000 names took 3.5 s."""
     parameters = (Parameter("text", "text", "text"),)
     given = {"text": "hi"} | {f"text{number}": 1 for number in range(20_000)}

@@ -186,7 +186,7 @@ def test_several_primitives_with_numbers_as_text_and_named_inputs_are_answered_o
         [SAY, {"primitive": "fly"}],
     ],
 )
-def test_unsupported_rize_command_is_answered_with_failure(speaker, primitives):
+def test_unsupported_or_invalid_rize_command_is_answered_with_failure(speaker, primitives):
     speaker.let()
     command = speaker.command(speaker.beyond if primitives == "beyond" else primitives)
     assert speaker.answered() == [{**command, "state": "failure"}]

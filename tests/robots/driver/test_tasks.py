@@ -105,7 +105,7 @@ def test_number_of_running_tasks_without_resources_is_limited(world: World) -> N
     eventually(lambda: world.states("later") == ["accepted", "running"])
 
 
-def test_stop_is_answered_after_all_tasks_ended(world: World) -> None:
+def test_stop_is_answered_only_after_the_running_task_has_ended(world: World) -> None:
     world.ask("kick", ("legs",), cancellable=False, obeys=False)
     eventually(ran(world, "kick"))
     stopped: list[TaskReply] = []

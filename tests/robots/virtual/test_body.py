@@ -88,7 +88,7 @@ def test_head_stays_within_its_speed_and_angle_limits():
     assert body.head_yaw.angle == 119.0
 
 
-def test_speech_duration_depends_on_the_text_length():
+def test_speech_of_fifty_characters_takes_three_seconds_and_a_new_speech_replaces_it():
     body = Body()
     speech = body.speak("x" * 50)
     assert body.speech == "x" * 50
@@ -146,7 +146,7 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     assert list(body.touched) == ["head"]
 
 
-def test_speech_progress_is_published():
+def test_drawing_state_contains_the_speech_progress():
     body = Body()
     speech = body.speak("x" * 100)
     body.step(speech.duration_s / 2)
@@ -185,7 +185,7 @@ def test_reset_restores_pose_touches_and_room():
     assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
 
 
-def test_drawing_state_has_the_fields_that_studio_renders():
+def test_drawing_state_has_position_speech_touches_and_objects():
     body = Body()
     body.touch("head", down=True)
     body.speak("Hi")

@@ -176,7 +176,9 @@ def place(ears: Ears, name: str) -> tuple[float, float]:
     return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
 
 
-def test_object_moved_by_the_user_moves_for_all_robots_including_later_robots(robots: Robots) -> None:
+def test_objects_moved_added_or_removed_by_the_user_change_for_present_and_later_robots(
+    robots: Robots,
+) -> None:
     pepper = robots.start(PEPPER, "Pepper")
     here = RoomMap()
     here.move("ball", 0.3, -1.5)

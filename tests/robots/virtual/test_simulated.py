@@ -106,7 +106,7 @@ def test_every_long_action_can_be_canceled_and_stopped(pepper, action, given):
 
 
 @pytest.mark.parametrize("action", [name for name in QUICK if name not in {"stand", "stop", "wave"}])
-def test_every_action_rejects_invalid_input(pepper, action):
+def test_list_as_the_first_parameter_of_an_action_is_rejected(pepper, action):
     parameter = pepper.driver.robot.action(action).parameters[0]
     pepper.invoke("1", action, **{parameter.name: [1, 2]})
     answer = pepper.final("1")
@@ -115,7 +115,7 @@ def test_every_action_rejects_invalid_input(pepper, action):
     assert pepper.states("1") == ["failed"]
 
 
-def test_stop_is_answered_while_moving(pepper):
+def test_stop_ends_a_walk_and_a_turn(pepper):
     pepper.world(move="Aiko", x=0.0, y=2.0)
     for number, (action, given) in enumerate(
         [("walk", {"distance": 1, "speed": 0.35}), ("turn", {"angle": 360})]
@@ -176,7 +176,7 @@ def test_short_tap_is_visible_in_the_touch_sensor(pepper):
     eventually(lambda: told[-1] == {"value": False})
 
 
-def test_user_can_trigger_every_event_of_the_description(pepper):
+def test_user_can_trigger_events_of_the_description_and_invalid_ones_are_ignored(pepper):
     for leaf in ("touched", "released", "heard", "bumped", "face_seen"):
         pepper.listen(leaf)
     pepper.world(happen="bumped", side="back")
@@ -223,7 +223,7 @@ def test_robot_turns_its_head_to_the_ball(pepper):
     assert y + height / 2 == pytest.approx(120, abs=12)
 
 
-def test_camera_images_are_published_while_subscribed(node, pepper):
+def test_subscriber_receives_a_jpeg_camera_image(node, pepper):
     with nep.node("watcher", "memory") as watcher:
         camera = watcher.new_sub("/Pepper/camera", "image")
         picture = camera.receive(30.0)

@@ -184,7 +184,9 @@ def test_removing_one_or_all_backpack_stacks_can_be_undone(qtbot, view, them, wi
     them.wait_for(f"{STACKS}.length", 2)
 
 
-def test_backpack_menus_add_open_and_remove_stacks(qtbot, view, them, window) -> None:
+def test_block_menu_adds_to_the_backpack_and_the_menu_of_its_stacks_offers_removal(
+    qtbot, view, them, window
+) -> None:
     them.click(BLOCK.format("one"))
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     row = "[...document.querySelectorAll('.blocklyMenuItem')].find(e => e.textContent.includes({}))"

@@ -205,7 +205,7 @@ def test_deletion_can_be_undone_after_later_edits(qtbot, view, them, told):
     assert all(top["x"] > 300 for top in them.tops() if top["id"] == "one")
 
 
-def test_bin_keeps_the_last_fifty_deletions_of_its_behaviour(qtbot, view, them):
+def test_bin_holds_at_most_fifty_deletions_and_each_behaviour_has_its_own_bin(qtbot, view, them):
     many = [START | {"id": f"s{n}", "x": 60 * (n % 10), "y": 90 * (n // 10)} for n in range(53)]
     view.show_tab("many", workspace(*many))
     them.wait_for("!!document.querySelector('[data-id=s52]')")

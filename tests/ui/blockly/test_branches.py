@@ -110,7 +110,7 @@ def test_minus_button_removes_a_branch_and_detaches_its_blocks(qtbot, view, pers
     assert {top["id"] for top in them.tops()[1:]} == {"last"}
 
 
-def test_context_menu_adds_branches_with_the_keyboard_only(qtbot, view, person):
+def test_context_menu_adds_branches_by_arrow_keys_and_by_click(qtbot, view, person):
     them: Person = person(state=choice())
     rows = open_menu(them, "if")
     assert {"Add “else if”", "Add “else”"} <= set(rows)

@@ -14,7 +14,7 @@ def test_bridge_sends_json_to_the_page(qtbot):
     assert json.loads(payload) == {"a": "“no”"}
 
 
-def test_bridge_provides_the_initial_state_to_the_page():
+def test_bridge_provides_the_initial_settings_to_the_page():
     bridge = BlocklyBridge(lambda: {"language": "de"})
     assert json.loads(bridge.initial_settings()) == {"language": "de"}
 

@@ -96,7 +96,7 @@ def test_bundle_loads_no_external_resources():
     assert "url(http" not in resources.path("blockly", "style.css").read_text()
 
 
-def test_bundle_contains_every_category_icon_and_licence():
+def test_bundle_contains_every_category_icon_and_the_apache_and_isc_licences():
     bundle = resources.path("blockly", "editor.js").read_text()
     tokens = json.loads(resources.path("theme", "tokens.json").read_text())
     for category in tokens["block"].values():

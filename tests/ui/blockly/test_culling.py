@@ -67,7 +67,7 @@ def test_culling_preserves_the_stacking_order(person):
     them.wait_for(order, ["under", "here", "over"])
 
 
-def test_far_script_is_rendered_after_a_redo_joins_another_script(person):
+def test_far_script_is_rendered_after_redo_joins_it_to_a_visible_script(person):
     below = script("below", 40, 1400)
     them = person(script("here", 40, 40), below)
     them.wait_for(drawn("here", "below"), ["here"])

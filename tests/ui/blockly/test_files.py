@@ -22,7 +22,7 @@ def test_loaded_program_is_saved_unchanged(person):
     assert person(state=PICTURE).newest() == PICTURE
 
 
-def test_loading_emits_no_change(qtbot, view, person):
+def test_loading_live_values_and_highlights_emit_no_change(qtbot, view, person):
     with qtbot.assertNotEmitted(view.changed, wait=400):
         them = person(state=PICTURE)
         view.load(workspace(START))
@@ -31,7 +31,7 @@ def test_loading_emits_no_change(qtbot, view, person):
     assert them.newest() == workspace(START)
 
 
-def test_stack_of_700_blocks_round_trips(person):
+def test_every_block_of_a_stack_of_700_is_saved(person):
     block: dict = {"type": "control_wait", "id": "b0"}
     for number in range(1, 700):
         block = {"type": "control_wait", "id": f"b{number}", "next": {"block": block}}

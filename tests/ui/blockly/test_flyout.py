@@ -66,7 +66,7 @@ def test_find_bar_does_not_cover_the_open_flyout(opened):
     assert them.box(".nepFind")["left"] >= them.box(".nepFlyoutHead.nepCategory")["right"]
 
 
-def test_flyout_closes_after_each_use_on_a_narrow_page(qtbot, opened):
+def test_flyout_closes_after_use_on_a_narrow_page(qtbot, opened):
     them = opened(NARROW)
     assert them.ask(SHOWN) == "none"
     them.open_category("Movement")
@@ -126,7 +126,7 @@ def test_canvas_keeps_its_position_when_the_category_changes(opened):
         assert them.box("[data-id=start] > .blocklyPath") == before
 
 
-def test_flyout_blocks_keep_their_size_at_any_zoom_and_are_dragged_under_the_mouse(opened):
+def test_flyout_blocks_keep_their_size_when_zoomed_out_and_are_dragged_under_the_mouse(opened):
     them = opened(WIDE)
     them.open_category("Movement")
     before = them.box(f"{TURN} > .blocklyPath")

@@ -219,7 +219,7 @@ def test_f1_explains_the_focused_block_and_otherwise_reaches_the_window(qtbot, v
     view.setParent(None)  # the test owns the view, not the window
 
 
-def test_context_menu_help_explains_blocks_on_canvas_and_in_the_toolbox(view, them):
+def test_context_menu_help_explains_a_block_on_the_canvas(view, them):
     box = them.box("[data-id=w] > .blocklyPath")
     at = (round(box["left"] + 14), round(box["top"] + 20))
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(*at))

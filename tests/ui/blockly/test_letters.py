@@ -98,7 +98,7 @@ def test_block_is_moved_and_dropped_with_the_keyboard(qtbot, them):
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)
 
 
-def test_block_commands_have_ctrl_shortcuts(qtbot, them):
+def test_ctrl_shortcuts_detach_a_block_and_enter_and_leave_the_toolbox(qtbot, them):
     on_a_block(them)
     them.press(Qt.Key_X, Qt.ControlModifier | Qt.ShiftModifier)
     qtbot.waitUntil(lambda: len(them.tops()) == 2, timeout=WAIT_MS)

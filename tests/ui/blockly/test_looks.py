@@ -45,7 +45,7 @@ def test_flat_theme_tokens_are_supported(view, person):
     them.wait_for("document.documentElement.classList.contains('reduced')")
 
 
-def test_running_blocks_are_outlined(view, person):
+def test_running_and_stopped_blocks_are_outlined(view, person):
     them = person(state=PICTURE)
     view.highlight(["say_touch", "battery"])
     them.wait_for(outlined("running") + ".sort()", ["battery", "say_touch"])
@@ -184,7 +184,7 @@ def test_zoom_in_zoom_out_and_zoom_to_fit_change_the_scale(qtbot, view, person):
     them.wait_for("!!document.querySelector('[data-id=battery].blocklySelected')")
 
 
-def test_toolbox_matches_the_design(person):
+def test_toolbox_has_the_expected_labels_width_row_height_and_tile_colour(person):
     them = person()
     labels = them.ask(
         "[...document.querySelectorAll('.nepHeading, .blocklyToolboxCategoryLabel')].map(e => e.textContent)"

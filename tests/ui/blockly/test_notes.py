@@ -147,7 +147,7 @@ def test_note_stays_readable_when_zoomed_out(view, them):
     them.wait_for(f"{note}.getBoundingClientRect().width < 120 && {seen}({note}) > 8.5")
 
 
-def test_canvas_note_is_saved_and_removed_with_its_menu(qtbot, them):
+def test_canvas_note_is_added_by_menu_saved_and_removed_by_the_delete_key(qtbot, them):
     QTest.mouseClick(them.target, Qt.RightButton, pos=QPoint(700, 300))
     them.wait_for("!!document.querySelector('.blocklyContextMenu')")
     rows = them.ask(ROWS)

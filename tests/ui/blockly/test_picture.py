@@ -70,7 +70,7 @@ def test_exported_svg_is_self_contained(qtbot, view, them):
     assert "data:font/otf" in svg or "data:application" in svg
 
 
-def test_exported_image_omits_the_selection(qtbot, view, them):
+def test_exported_image_omits_the_selection_and_the_highlight_of_running_blocks(qtbot, view, them):
     before = taken(qtbot, view, "svg")
     them.click("[data-id=a] > .blocklyPath")
     them.wait_for("document.querySelector('.blocklySelected')?.dataset.id", "a")

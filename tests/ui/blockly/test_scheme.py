@@ -11,7 +11,7 @@ from app.ui.blockly.scheme import read_content, register_scheme
 register_scheme()
 
 
-def test_scheme_is_secure_and_registered_once():
+def test_registered_scheme_is_secure_and_denies_local_access():
     register_scheme()
     scheme = QWebEngineUrlScheme.schemeByName(QByteArray(b"app"))
     assert scheme.name() == b"app"

@@ -83,7 +83,7 @@ def way(one: dict, other: dict) -> tuple[float, float]:
     return other["x"] - one["x"], other["y"] - one["y"]
 
 
-def test_rubber_band_selects_notes_and_delete_removes_all_in_one_step(qtbot, them, can_undo):
+def test_rubber_band_selects_notes_and_delete_removes_the_selection_in_one_step(qtbot, them, can_undo):
     before = them.newest()
     frame_right(them)
     looked_at(them, "chosen-notes")

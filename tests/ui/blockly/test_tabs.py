@@ -32,7 +32,7 @@ def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     assert tabs.shown.program.blocks == A
 
 
-def test_edits_of_a_closed_or_replaced_program_are_ignored() -> None:
+def test_edits_of_a_closed_tab_or_a_replaced_workspace_are_ignored() -> None:
     tabs = Tabs()
     tabs.show("a", WorkspaceJson.from_blocks(A))
     before = tabs.shown.generation
@@ -183,9 +183,7 @@ def test_keyboard_focus_follows_the_shown_tab(qtbot, view, two) -> None:
 
 
 @pytest.mark.parametrize("full", [False, True], ids=["room", "full"])
-def test_script_added_by_an_external_change_is_placed_in_free_visible_space(
-    qtbot, person, view, full
-) -> None:
+def test_script_added_by_an_external_change_is_placed_in_the_visible_area(qtbot, person, view, full) -> None:
     wide = {"type": "control_wait", "x": 40, "y": 40}
     filled = [
         {**wide, "id": f"w{x}.{y}", "x": x, "y": y} for x in range(0, 1300, 100) for y in range(0, 900, 60)

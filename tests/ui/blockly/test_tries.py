@@ -74,7 +74,7 @@ def test_trying_an_event_block_runs_its_script(qtbot, view, person, asked):
     qtbot.waitUntil(lambda: asked == [{"id": "start", "kind": "hat"}], timeout=WAIT_MS)
 
 
-def test_value_is_shown_at_its_block_until_the_next_key_or_mouse_press(qtbot, view, person):
+def test_value_is_shown_next_to_its_block_until_the_next_key_press(qtbot, view, person):
     them = person(state=PICTURE)
     view.show_value("wave", "84 %")
     them.wait_for(ANSWER, "84 %")

@@ -74,9 +74,7 @@ def test_dragged_variable_card_stays_inside_the_page_and_its_position_is_saved(q
     qtbot.waitUntil(lambda: them.box(".nepWatch") == box, timeout=WAIT_MS)
 
 
-def test_variable_dropdown_offers_a_new_variable_and_opens_the_dialogs_of_the_window(
-    qtbot, view, them
-) -> None:
+def test_variable_dropdown_requests_the_new_and_rename_dialogs_of_the_window(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_requested.connect(asked.append)
     them.click("[data-id=get] .blocklyDropdownField")
@@ -122,7 +120,7 @@ def test_rename_and_delete_of_a_variable_are_one_undo_step_each(qtbot, view, the
     )
 
 
-def test_block_menu_shows_the_value_of_its_variable(qtbot, view, them) -> None:
+def test_block_menu_offers_to_show_the_value_of_its_variable(qtbot, view, them) -> None:
     asked: list[str] = []
     view.command_requested.connect(asked.append)
     them.click("[data-id=set] > .blocklyPath", 10, 8)

@@ -133,7 +133,7 @@ def test_block_whose_definition_changes_keeps_its_position_and_undo_stack(qtbot,
     assert next(top for top in them.tops() if top["id"] == "w") == wait
 
 
-def test_blocks_of_new_robots_are_offered_and_unknown_blocks_are_kept(view, person):
+def test_blocks_of_new_robots_are_offered_and_a_block_of_an_unknown_robot_is_kept(view, person):
     say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "fields": {"ROBOT": "Old one"}}
     them = person(say)
     view.set_definitions(with_rover())

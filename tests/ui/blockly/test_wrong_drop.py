@@ -111,7 +111,7 @@ def test_drop_on_empty_canvas_shows_no_message(qtbot, them):
 
 
 @pytest.mark.parametrize("zooms", [-4, 0, 3])
-def test_snap_distance_on_screen_is_the_same_at_every_zoom(qtbot, view, them, zooms):
+def test_block_snaps_from_the_same_screen_distance_at_every_zoom(qtbot, view, them, zooms):
     for _ in range(abs(zooms)):
         (view.zoom_in if zooms > 0 else view.zoom_out)()
     view.show_block("turn")

@@ -127,7 +127,7 @@ def test_messages_of_a_watched_topic_reach_every_sink(world: World) -> None:
     world.source.unwatch("/a")  # a second unwatch has no effect
 
 
-def test_missed_messages_are_counted_for_watched_topics_only(world: World) -> None:
+def test_lost_counts_contain_only_watched_topics(world: World) -> None:
     world.begin()
     assert world.source.lost_counts() == {}
     world.source.watch("/a")

@@ -398,7 +398,7 @@ def test_step_starts_a_program_at_its_first_block(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
 
 
-def test_finished_program_is_reported_and_another_program_can_run(run: Run) -> None:
+def test_finished_program_is_reported_and_can_run_again(run: Run) -> None:
     runs = run.session.runs
     run.session.document.apply_edit(workspace(started(write(text("Hi")))))
     for _ in range(2):

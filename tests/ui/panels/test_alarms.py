@@ -82,7 +82,7 @@ def type_in(panel: AlarmsPanel, text: str, key: Qt.Key = Qt.Key.Key_Return) -> N
     QTest.keyClick(field, key)
 
 
-def test_empty_panel_explains_how_to_create_an_alarm(panel, window) -> None:
+def test_alarm_added_in_the_empty_panel_watches_the_entered_topic(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
     panel.add_alarm()
     assert panel.pages.currentIndex() == 1
@@ -115,7 +115,7 @@ def test_parts_of_an_alarm_sentence_are_edited_by_keyboard(panel) -> None:
     assert said(panel) == "When robots.Pepper.battery of /blackboard is above 20 for 90 s , show a banner"
 
 
-def test_values_of_a_topic_are_suggested(panel, window) -> None:
+def test_field_paths_of_a_topic_are_suggested(panel, window) -> None:
     panel.alarms.set_rule(replace(BELOW, condition=replace(BELOW.condition, path="")))
     panel.refresh()
     press(slot(panel, "value"))

@@ -22,7 +22,7 @@ def panel(qtbot, window) -> AlertsPanel:
     return made
 
 
-def test_each_alert_is_shown_with_its_next_step(panel, window) -> None:
+def test_alert_is_shown_with_its_severity_and_next_step(panel, window) -> None:
     assert panel.rows[0].accessibleName().startswith("error: /faces sends text that is not JSON")
     press(panel.rows[0].button)
     assert window.commands == ["inspect:/faces"]

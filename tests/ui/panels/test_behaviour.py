@@ -223,7 +223,7 @@ def test_python_view_shows_and_copies_the_newest_program(panel, window) -> None:
     assert panel.program.toPlainText() == "pass\n"
 
 
-def test_undo_and_redo_are_enabled_when_available(panel, window) -> None:
+def test_undo_button_is_enabled_when_available_and_undoes_in_the_editor(panel, window) -> None:
     title = panel.title_widget()
     title.show()
     undo, redo = button(title, "Undo"), button(title, "Redo")
@@ -433,7 +433,7 @@ def test_block_dropped_on_a_tab_opened_during_the_drag_is_moved_to_that_tab(pane
         assert editor(panel).count("move_dragged_blocks") == times
 
 
-def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviour(panel, window) -> None:
+def test_plus_button_is_highlighted_under_a_dragged_block_and_requests_a_new_behaviour(panel, window) -> None:
     title = panel.title_widget()
     title.resize(900, 34)
     title.show()

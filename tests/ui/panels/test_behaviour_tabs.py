@@ -104,7 +104,7 @@ def test_closed_tab_is_removed_and_the_other_tabs_move_left(tabs) -> None:
     assert tabs.tabs["c"].x() < before
 
 
-def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_tab_visible(tabs) -> None:
+def test_narrow_tab_bar_scrolls_to_the_current_tab_and_keeps_a_minimum_tab_width(tabs) -> None:
     many = [TabState(str(number), f"A rather long name {number}") for number in range(12)]
     tabs.show_tabs(many, "11")
     room = tabs.add.x()
@@ -116,7 +116,7 @@ def test_narrow_tab_bar_shortens_all_tabs_and_keeps_the_current_tab_visible(tabs
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-def test_hidden_tabs_are_listed_in_a_menu(tabs) -> None:
+def test_menu_lists_all_tabs_when_some_are_hidden(tabs) -> None:
     tabs.show_tabs([TabState("0", "One"), TabState("1", "Two")], "1")
     assert tabs.list.isHidden(), "all are in sight"
     many = [TabState(str(number), f"A rather long name {number}") for number in range(12)]

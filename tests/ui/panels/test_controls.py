@@ -104,7 +104,7 @@ def test_integer_field_rejects_a_fraction_with_a_sentence(qtbot, theme) -> None:
     assert form.action.check(form.input()) == ("do: count must be a whole number",)
 
 
-def test_arrow_keys_step_a_number_without_limits(qtbot, theme) -> None:
+def test_arrow_and_page_keys_step_a_number_not_below_its_minimum(qtbot, theme) -> None:
     form = form_of(qtbot, theme, Parameter("n", "count", "integer", minimum=0, default=2))
     field = child(form, QLineEdit)
     for key in (Qt.Key.Key_Up, Qt.Key.Key_Up, Qt.Key.Key_PageUp, Qt.Key.Key_Down):
@@ -397,7 +397,7 @@ def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     assert choice.field.text() == "newest image of /Pepper/camera"
 
 
-def test_try_button_sends_the_newest_image_of_the_selected_topic(qtbot, theme) -> None:
+def test_form_returns_the_newest_image_of_the_selected_topic(qtbot, theme) -> None:
     cameras = Cameras()
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=cameras)
     choice = child(form, PictureChoice)

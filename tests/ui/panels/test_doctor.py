@@ -154,7 +154,7 @@ def test_report_is_copied_as_text(panel, window) -> None:
     assert window.toasts == ["Copied the report"]
 
 
-def test_button_is_disabled_and_last_findings_are_kept_during_a_check(panel, window) -> None:
+def test_check_button_is_disabled_and_findings_are_kept_during_a_check(panel, window) -> None:
     window.session.doctor.is_running = True
     panel.refresh()
     assert not panel.again.isEnabled()
@@ -314,7 +314,7 @@ def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
     assert panel.terminal.text() == "In a terminal: nep doctor"
 
 
-def test_doctor_is_opened_from_every_empty_panel_with_its_topic(qtbot, qapp) -> None:
+def test_empty_panels_open_the_doctor_with_their_topic_if_they_have_one(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.master = MasterState("connected", "127.0.0.1:7780")
     for name in ("inspector", "image", "console", "services"):
@@ -364,7 +364,7 @@ def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
     made.dispose()
 
 
-def test_doctor_shows_a_check_in_progress_before_the_first_result(qtbot, qapp) -> None:
+def test_doctor_shows_an_empty_state_before_the_first_result(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.doctor.start = lambda: None
     panel = window.make(PANEL)

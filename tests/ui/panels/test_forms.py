@@ -58,7 +58,7 @@ def test_each_parameter_kind_has_its_control_and_value(qtbot, theme, parameter, 
     assert form.action.check(form.input()) == ()
 
 
-def test_numbers_without_limits_and_images_have_text_fields(qtbot, theme) -> None:
+def test_empty_fields_are_omitted_and_entered_numbers_and_images_are_returned(qtbot, theme) -> None:
     form = ActionForm(
         theme,
         action(
@@ -162,7 +162,7 @@ def test_ampersand_in_a_parameter_name_is_shown_literally(qtbot, theme) -> None:
     assert name.text() == "R&&D"  # in a label with a buddy, a single & would underline the D
 
 
-def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) -> None:
+def test_problems_are_matched_to_rows_in_a_translated_form(qtbot, theme, pseudo) -> None:
     made = action(Parameter("p", "p", "number", required=True), Parameter("q", "q", "number"))
     form = ActionForm(theme, made)
     qtbot.addWidget(form)
@@ -172,6 +172,6 @@ def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) ->
     assert form.problem.isHidden()
 
 
-def test_duration_is_formatted_briefly_in_every_language(pseudo) -> None:
+def test_duration_in_the_input_summary_is_translated(pseudo) -> None:
     waits = action(Parameter("s", translate("robot", "seconds"), "number", unit="s"))
     assert input_summary(waits, {"s": 2.0}) == _("for {duration}").format(duration="2 s")

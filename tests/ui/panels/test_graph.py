@@ -339,7 +339,7 @@ def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPane
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])
-def test_invalid_rates_and_counts_do_not_break_the_graph(
+def test_extreme_and_invalid_rates_and_counts_do_not_break_the_graph(
     panel: GraphPanel, window: Window, rate: float
 ) -> None:
     more = graph()
@@ -456,7 +456,7 @@ def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     assert coming.graph == panel._requested_graph
 
 
-def test_groups_are_toggled_by_click_and_keyboard_shortcuts(panel: GraphPanel, qtbot) -> None:
+def test_click_toggles_a_group_and_keys_change_grouping_and_services(panel: GraphPanel, qtbot) -> None:
     scene = panel.canvas.scene
     assert scene is not None
     head = next(item.rect for item in scene.groups if item.name == "This computer")

@@ -96,7 +96,7 @@ def test_panel_follows_the_selected_robot_and_names_the_robot_if_several_are_con
     assert asked.session.looked_at == []
 
 
-def test_health_rows_are_rebuilt_when_the_text_size_changes(panel) -> None:
+def test_health_rows_are_rebuilt_when_the_theme_changes(panel) -> None:
     old = panel.rows[0]
     panel.theme_changed()
     panel.refresh()
@@ -144,7 +144,7 @@ def test_health_panel_opened_in_the_smallest_window_stays_open_in_a_wider_window
         assert docks["health"].geometry().bottom() <= bench.height()
 
 
-def test_closed_health_panel_stays_closed_after_restart(
+def test_closed_health_panel_stays_closed_after_the_layout_is_restored(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.show()

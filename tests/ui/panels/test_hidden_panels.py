@@ -191,7 +191,7 @@ def test_hidden_layout_and_its_floating_panels_watch_no_topics(qtbot, case: Case
     assert OTHER in case.source.wanted
 
 
-def test_minimised_window_watches_no_topics_and_slows_its_timer(qtbot, case: Case) -> None:
+def test_panels_of_a_minimised_window_watch_no_topics_and_its_timer_slows_down(qtbot, case: Case) -> None:
     case.window.show_layout("behaviour")
     camera = case.dock("camera")
     settle(qtbot, case, camera)
@@ -304,7 +304,7 @@ def test_failed_panel_watches_no_topics_until_retried(qtbot, case: Case) -> None
     assert CAMERA in case.source.wanted
 
 
-def test_hiding_all_panels_ends_every_watch(case: Case) -> None:
+def test_hiding_all_panels_ends_every_watch_except_robot_replies(case: Case) -> None:
     assert isinstance(case.window, QMainWindow)
     for layout in ("behaviour", "developer"):
         case.window.show_layout(layout)

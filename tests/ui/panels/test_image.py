@@ -117,7 +117,7 @@ def test_each_image_is_counted_as_shown_once(view) -> None:
     assert len(stream.painted) == 2
 
 
-def test_stale_image_is_grey_and_shows_its_age(view) -> None:
+def test_stale_image_is_drawn_differently_and_shows_its_age(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
     view.show_image(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
@@ -269,7 +269,7 @@ def test_image_panel_without_images_shows_an_empty_state_with_the_reason(qtbot, 
     assert panel.empty._text.text() == "'/cam' does not send pictures."
 
 
-def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None:
+def test_camera_panel_shows_a_robot_and_keeps_its_last_image_after_disconnection(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.images.camera = lambda _topic: picture(32, 24)
     panel = window.make(CAMERA)
@@ -389,7 +389,7 @@ def test_image_is_decoded_at_display_size_and_in_full_under_the_mouse(view) -> N
     assert stream.requested_size is None
 
 
-def test_image_sequence_is_recorded_and_exported_from_a_recording_as_files(qtbot, qapp, tmp_path) -> None:
+def test_sequence_command_records_the_topic_or_exports_the_open_recording(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     (action,) = [each for each in panel.more_actions() if each.text() == "Record a sequence"]
@@ -415,7 +415,7 @@ def test_pixel_value_is_formatted_as_colour_or_number() -> None:
     assert pixel_text(1, 2, None) == "(1, 2)"
 
 
-def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> None:
+def test_zoom_rotation_flip_and_freeze_have_shortcuts_while_the_image_has_focus(qtbot, qapp) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     view, place = panel.view, panel.view.placement
@@ -471,7 +471,7 @@ def test_image_is_saved_as_received_and_the_toast_opens_its_folder(qtbot, qapp, 
     assert np.array_equal(read, picture().bgra[:, :, :3])
 
 
-def test_image_that_cannot_be_saved_raises_an_alert_with_the_reason(qtbot, qapp, tmp_path) -> None:
+def test_image_that_cannot_be_saved_raises_an_alert(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
     (tmp_path / "file").write_text("in the way")

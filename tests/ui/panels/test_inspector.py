@@ -180,7 +180,7 @@ def test_fast_messages_are_shown_at_ten_hertz_and_the_last_message_always(panel,
     assert panel.foot.info.text().split("   ")[:2] == message_info(panel._shown_message).split("   ")[:2]
 
 
-def test_new_topic_and_resumed_panel_show_the_current_message_immediately(panel, window) -> None:
+def test_resumed_panel_shows_the_current_message_immediately(panel, window) -> None:
     panel.clock = lambda: 5.0
     for topic, number, size in (("/blackboard", 1, "8 B"), ("/odom", 22, "9 B")):
         panel.show_topic(topic)
@@ -592,7 +592,7 @@ def test_alarm_is_created_from_a_value_with_any_key_names(panel, window) -> None
         assert (command, topic, parse_path(path)) == ("alarm.value", "/blackboard", steps)
 
 
-def test_value_is_plotted_by_menu_shortcut_footer_and_drag_and_drop(panel, window, monkeypatch) -> None:
+def test_value_is_plotted_by_action_or_footer_button_and_can_be_dragged(panel, window, monkeypatch) -> None:
     plotted: list[tuple[str, str]] = []
     dragged: list[tuple[str, str]] = []
     monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))

@@ -26,7 +26,7 @@ def test_differences_follow_json_semantics(before: object, after: object, wanted
     assert differs(before, after) is wanted
 
 
-def test_large_texts_are_compared_as_text() -> None:
+def test_lazy_json_objects_are_compared_by_content() -> None:
     def lazy(value: object) -> object:
         return JsonIndex(memoryview(json.dumps(value).encode())).root
 

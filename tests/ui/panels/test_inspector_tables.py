@@ -205,7 +205,7 @@ def shown_stamp(panel: InspectorPanel) -> object:
     return value["stamp"]
 
 
-def test_history_steps_back_through_messages_and_compares_with_any_message(panel, window) -> None:
+def test_history_steps_back_through_messages_and_compares_with_a_pinned_message(panel, window) -> None:
     for number in range(5):
         send(window, panel, seen(number, stamp=number))
     panel.history.refresh(at_once=True)
@@ -241,7 +241,7 @@ def test_earlier_message_is_compared_with_its_predecessor(panel, window) -> None
     assert panel.strip.text_label.text() == "Previous message: no difference"
 
 
-def test_history_is_kept_per_topic_and_a_hidden_panel_records_no_messages(panel, window) -> None:
+def test_history_contains_only_the_shown_topic_and_no_messages_while_suspended(panel, window) -> None:
     send(window, panel, seen(1, stamp=1))
     send(window, panel, seen(2, stamp=2))
     panel.suspend()

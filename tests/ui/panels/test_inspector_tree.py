@@ -147,7 +147,7 @@ def test_chevron_and_keyboard_expand_and_collapse(qtbot, model) -> None:
     assert not view.isExpanded(robots)
 
 
-def test_field_paths_resolve_to_their_values(model) -> None:
+def test_steps_resolve_to_tree_items_with_their_field_paths(model) -> None:
     assert model.node(at(model, "list", 1)).path == "list[1]"
     assert model.node(at(model, "robots", "Pepper", "pose", "x")).path == "robots.Pepper.pose.x"
     assert not model.index_of_path(("robots", "nobody")).isValid()

@@ -235,7 +235,7 @@ def test_inspector_shows_why_a_topic_cannot_be_decoded(qtbot, window: Window, lo
     panel.dispose()
 
 
-def test_images_of_another_network_are_shown_in_the_image_panel(qtbot, window: Window, look: Look) -> None:
+def test_image_panel_subscribes_to_a_topic_of_another_network(qtbot, window: Window, look: Look) -> None:
     panel = window.make(IMAGE)
     qtbot.addWidget(panel)
     ros = look("ros")

@@ -190,7 +190,7 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 
-def test_node_without_parameters_suggests_next_steps(world: World) -> None:
+def test_node_without_parameters_explains_how_they_are_declared(world: World) -> None:
     world.choose("bare")
     assert not world.part.isVisibleTo(world.panel)
     assert (

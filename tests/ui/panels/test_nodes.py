@@ -124,7 +124,7 @@ def test_node_without_topics_can_be_expanded(panel, window) -> None:
     assert panel.model.data(panel.model.index(place, 0), CELL_ROLE).icon == "chevron-down"
 
 
-def test_new_nodes_are_bold_until_expanded_except_studio(panel, window) -> None:
+def test_new_nodes_are_bold_until_expanded_unless_started_by_studio(panel, window) -> None:
     nodes = window.session.nodes
     more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
     window.session.launcher.restart_virtual_robot("Pepper")
@@ -222,7 +222,7 @@ def test_cpu_load_is_updated_when_reported_and_sorted_once_per_second(panel, win
     ("kind", "words", "pressed"),
     [("none", "No master is running", "Start a master here"), ("connected", "No nodes yet", None)],
 )
-def test_empty_panel_suggests_next_steps(qtbot, qapp, kind, words, pressed) -> None:
+def test_empty_nodes_panel_names_the_cause_and_can_start_a_master(qtbot, qapp, kind, words, pressed) -> None:
     window = Window(Session())
     window.session.master = MasterState(kind, window.session.master.address)
     panel = window.make(PANEL)

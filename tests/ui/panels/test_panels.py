@@ -84,7 +84,7 @@ def test_full_life_cycle_of_each_panel_raises_no_error(qtbot, qapp, name, sessio
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
+def test_every_button_and_text_field_has_an_accessible_name(qtbot, qapp, name) -> None:
     window = Window(Session.full())
     panel = window.make(description(name), (1000, 700))
     qtbot.addWidget(panel)
@@ -104,7 +104,7 @@ def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
 @pytest.mark.parametrize(
     "name", sorted(set(NAMES) - {"behaviour"})
 )  # covered by test_guidance for the web page
-def test_empty_panel_suggests_next_steps(qtbot, qapp, name) -> None:
+def test_empty_panel_shows_an_explanatory_text(qtbot, qapp, name) -> None:
     from PySide6.QtWidgets import QLabel
 
     window = Window(Session())

@@ -70,7 +70,7 @@ def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
     )
 
 
-def test_plug_in_panel_is_listed_docked_refreshed_and_restored(
+def test_plug_in_panel_is_listed_docked_and_refreshed(
     qtbot, plug_in: None, theme: Theme, session: Session
 ) -> None:
     window = MainWindow(session, theme, {**PANELS, "counter": PanelRegistry()["counter"]}, [])

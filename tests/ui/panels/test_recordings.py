@@ -97,7 +97,7 @@ def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, wind
     assert not list(unsaid(panel))
 
 
-def test_thumbnails_are_decoded_in_another_thread(qtbot, panel, folder):
+def test_thumbnail_of_a_recording_with_images_is_shown(qtbot, panel, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     (facts,) = (each for each in panel._scan.files if each.path.stem == "camera")
 
@@ -304,7 +304,7 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     assert not list(unsaid(panel))
 
 
-def test_filter_finds_names_notes_and_topics(qtbot, panel):
+def test_filter_finds_notes_and_topics_ignoring_case(qtbot, panel):
     seen(qtbot, panel, "arm", "camera", "cut")
     panel.filter.setText("FIRST")
     assert "camera" not in names(panel)

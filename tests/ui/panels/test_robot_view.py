@@ -135,7 +135,7 @@ def test_press_outside_all_objects_has_no_effect(panel, window) -> None:
     assert window.session.changes("Pepper") == []
 
 
-def test_reset_restores_the_initial_positions(panel, window) -> None:
+def test_reset_button_sends_a_reset_to_the_robot(panel, window) -> None:
     panel.reset.show()
     press(panel.reset)
     assert window.session.changes("Pepper") == [{"reset": True}]

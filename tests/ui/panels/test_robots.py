@@ -120,7 +120,7 @@ def test_only_the_try_button_of_the_focused_card_is_filled(qtbot, panel) -> None
     assert panel.cards["say"].try_button.kind == "plain"
 
 
-def test_actions_are_searched(panel) -> None:
+def test_search_shows_actions_of_a_category_and_reports_no_match(panel) -> None:
     QTest.keyClicks(panel.finder, "lights")  # the category of both actions
     assert [name for name, card in panel.cards.items() if card.isVisibleTo(panel)] == ["light", "emotion"]
     panel.finder.setText("fly")

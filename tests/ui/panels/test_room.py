@@ -199,7 +199,7 @@ def choose(panel: RobotPanel, words: str) -> None:
     QTest.mouseClick(opened, LEFT, pos=opened.actionGeometry(action).center())
 
 
-def test_objects_are_added_removed_and_restored(panel, window) -> None:
+def test_objects_are_added_and_removed_and_the_room_is_reset(panel, window) -> None:
     press(panel.add)
     choose(panel, "Add a ball")
     panel.refresh()

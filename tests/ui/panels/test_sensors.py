@@ -59,7 +59,7 @@ def window(qapp) -> Window:
     return Window(Session.full())
 
 
-def test_every_sensor_except_images_has_one_row(qtbot, window) -> None:
+def test_sensors_except_images_are_listed_with_their_values(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)

@@ -184,7 +184,7 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
     go_on.set()
 
 
-def test_closing_disarms_and_empty_panel_suggests_next_steps(window, panel) -> None:
+def test_closing_disarms_and_a_network_without_services_shows_the_empty_page(window, panel) -> None:
     window.session.acting.arm()
     panel.dispose()
     assert not window.session.acting.arming.is_on
@@ -203,7 +203,7 @@ def test_service_from_a_menu_command_is_selected(window, panel) -> None:
     assert window.commands == ["service.call:set_language"]
 
 
-def test_replies_of_any_shape_are_shown_in_a_bounded_number_of_rows() -> None:
+def test_large_and_deeply_nested_replies_are_shown_in_a_bounded_number_of_rows() -> None:
     assert [row.text for row in reply_rows(None)] == ["null"]
     assert all(len(row.text) < 2 * MAX_TEXT_CHARS for row in reply_rows("x" * 1000))
     assert len(reply_rows(list(range(10_000)))) == MAX_ROWS + 1

@@ -237,12 +237,12 @@ def test_columns_are_selected_in_a_menu_and_restored_with_the_layout(qtbot, pane
     assert again.save_state()["columns"] == {}
 
 
-def test_publishers_are_an_optional_column() -> None:
+def test_publisher_cell_lists_the_nodes_of_a_topic() -> None:
     topic = Topic("/x", publisher_nodes=("camera", "lidar"), subscribers=2)
     assert nodes_cell(topic).text == "camera, lidar"
 
 
-def test_tooltips_report_the_number_of_messages_not_shown(panel, window) -> None:
+def test_tooltips_report_the_number_of_shown_messages(panel, window) -> None:
     rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
     topic = window.session.topics["/odom"]
     assert rate.tip(topic) == "Messages per second, as reported by the publishers"

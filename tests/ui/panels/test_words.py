@@ -216,7 +216,7 @@ def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) ->
 
 @pytest.mark.parametrize("language", words.languages(words.LOCALE_FOLDER))
 @pytest.mark.parametrize("columns", [topics.COLUMNS, nodes.COLUMNS], ids=["topics", "nodes"])
-def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, language, columns) -> None:
+def test_headers_of_topics_and_nodes_are_not_clipped_in_any_language(theme, language, columns) -> None:
     """A narrow table does not widen a column for its header, so the translation must be short."""
     catalog = words.read(words.po_file(words.LOCALE_FOLDER, language), language)
     metrics = QFontMetricsF(header_font(theme))

@@ -36,7 +36,7 @@ def acting_of(window: MainWindow) -> SessionActing:
     return window.session.acting
 
 
-def test_menu_commands_open_their_panels_and_stop_disarms(window: MainWindow) -> None:
+def test_publish_and_call_commands_open_their_panels_and_stop_disarms(window: MainWindow) -> None:
     acting, run = acting_of(window), window.commands.run
     assert run("publish.topic:/blackboard")
     bench = window.show_layout("developer")

@@ -104,7 +104,7 @@ def test_banner_covers_no_control_and_moves_no_layout(
     assert places(window) == before, "no strip is left"
 
 
-def test_banner_covers_no_text_on_the_start_page(window: MainWindow, mouse: Mouse) -> None:
+def test_banner_is_above_the_heading_of_the_start_page(window: MainWindow, mouse: Mouse) -> None:
     show(window, "start")
     say(window)
     assert place(window, window.banner).bottom() <= place(window, window.start._question).top()
@@ -210,7 +210,7 @@ def test_alert_count_opens_the_alerts_by_mouse_and_keyboard(window: MainWindow, 
     assert window.current_layout == "behaviour"
 
 
-def test_shift_tab_from_the_banner_reaches_every_control_of_the_window(
+def test_shift_tab_from_the_banner_reaches_stop_and_the_alert_count(
     qtbot, window: MainWindow, mouse: Mouse
 ) -> None:
     window.activateWindow()

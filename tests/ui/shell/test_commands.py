@@ -101,7 +101,7 @@ def found() -> list[tuple[Path, str, int]]:
     return [(path, words, line) for path in modules() for words, line in named(path)]
 
 
-def test_command_references_in_all_sources_are_collected() -> None:
+def test_command_references_in_core_code_panels_and_buttons_are_collected() -> None:
     words = {words for _, words, _ in found()}
     assert {
         "network.others",  # an alert of the core
@@ -128,7 +128,7 @@ def test_lists_of_command_ids_contain_only_existing_commands() -> None:
     assert {*STEP_ICONS, *MENU_ROLES, *SPEED_COMMANDS, *LAYOUT_COMMANDS, STOP_COMMAND} <= IDS
 
 
-def test_tab_menu_lists_only_tab_commands() -> None:
+def test_every_tab_command_of_the_tab_menu_is_registered() -> None:
     source = (Path(app.__file__).parent / "ui" / "panels" / "behaviour" / "tabs.py").read_text("utf-8")
     listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
     assert len(listed) == 6

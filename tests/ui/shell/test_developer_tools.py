@@ -83,7 +83,7 @@ def test_layout_button_shows_the_current_name_and_offers_the_other_layouts(tools
     assert tools.layout.text() == "Developer"
 
 
-def test_unavailable_layout_commands_are_disabled_only_while_the_menu_is_open(
+def test_unavailable_delete_command_is_disabled_only_while_the_layout_menu_is_open(
     tools, commands, dropped
 ) -> None:
     click(tools.layout)
@@ -103,7 +103,7 @@ def test_panel_menu_closes_an_open_panel(tools, window, dropped) -> None:
     assert "console" not in window.bench.open_names()
 
 
-def test_layout_and_panel_menus_are_hidden_with_large_text_in_a_narrow_window(tools, window) -> None:
+def test_layout_menu_is_hidden_with_large_text_in_a_narrow_window(tools, window) -> None:
     window.resize(1100, 700)
     assert tools.layout.isVisible()
     window.theme.set_text_percent(200)

@@ -35,7 +35,7 @@ def widths(window: MainWindow, *names: str) -> list[int]:
     return [bench.docks[name].width() for name in names]
 
 
-def test_side_columns_keep_their_width_at_every_window_size(
+def test_side_columns_are_fixed_in_the_behaviour_and_grow_in_the_developer_layout(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     window.show()

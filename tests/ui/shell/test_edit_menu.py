@@ -37,7 +37,7 @@ def test_edit_commands_apply_to_the_focused_text_field(
     assert field.text() == "hello"
 
 
-def test_edit_commands_apply_to_the_text_field_while_the_menu_bar_has_focus(
+def test_select_all_applies_to_the_text_field_while_the_menu_bar_has_focus(
     window: MainWindow, commands: Commands, field: QLineEdit
 ) -> None:
     window.bar.menus.setFocus()

@@ -48,7 +48,7 @@ def test_saving_a_new_behaviour_opens_the_file_dialog(
     assert len(answers.asked) == 1
 
 
-def test_latest_edit_of_the_editor_is_saved(
+def test_saving_flushes_the_behaviour_editor(
     commands: Commands, window: MainWindow, document, answers, tmp_path
 ) -> None:
     answers.path = tmp_path / "a.nepb"
@@ -355,7 +355,9 @@ def test_file_that_is_not_a_behaviour_raises_an_alert(commands, window, document
     assert document.workspace == BLOCKS
 
 
-def test_unwritable_folder_raises_an_alert(commands: Commands, window, document, answers, tmp_path) -> None:
+def test_failed_save_raises_an_alert_until_the_behaviour_is_saved_elsewhere(
+    commands: Commands, window, document, answers, tmp_path
+) -> None:
     document.apply_edit(BLOCKS)
     (tmp_path / "file").write_text("in the way", "utf-8")
     answers.path = tmp_path / "file" / "x.nepb"
@@ -367,7 +369,7 @@ def test_unwritable_folder_raises_an_alert(commands: Commands, window, document,
     assert list(window.session.alerts.active) == []
 
 
-def test_fix_changes_the_blocks_and_updates_the_editor(commands: Commands, document: Document) -> None:
+def test_fix_changes_the_blocks_and_the_fix_counter(commands: Commands, document: Document) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
     document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [wait]}})
     before = document.fixes

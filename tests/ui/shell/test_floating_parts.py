@@ -152,7 +152,9 @@ def test_focus_ring_surrounds_the_focused_widget_and_follows_its_geometry(
     assert not ring.isVisible()
 
 
-def test_mouse_click_hides_the_focus_ring(qtbot, place: QWidget, theme: Theme) -> None:
+def test_mouse_click_shows_no_focus_ring_and_the_next_tab_key_does(
+    qtbot, place: QWidget, theme: Theme
+) -> None:
     ring = FocusRing(theme, place)
     field, other = QLineEdit(), QLineEdit()
     place.layout().addWidget(other)

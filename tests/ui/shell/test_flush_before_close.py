@@ -53,7 +53,9 @@ def test_hanging_editor_does_not_block_closing(qtbot, qapp) -> None:
     assert waits.ready()
 
 
-def test_closing_the_window_saves_the_latest_edit(qtbot, window: MainWindow, commands, monkeypatch) -> None:
+def test_window_closes_after_the_editor_has_flushed_the_latest_edit(
+    qtbot, window: MainWindow, commands, monkeypatch
+) -> None:
     bench = window.show_layout("behaviour")
     editor, shut = Late(), []
     monkeypatch.setattr(bench.docks["behaviour"].panel, "flush", editor.flush)
@@ -93,7 +95,7 @@ def test_work_that_cannot_be_saved_is_reported_before_closing(
     assert left["workspace"] == BLOCKS
 
 
-def test_second_close_after_the_warning_discards_unsaved_work(
+def test_window_closes_at_the_second_attempt_if_work_cannot_be_saved(
     window: MainWindow, commands, home: Path
 ) -> None:
     (home / "journal").parent.mkdir(parents=True, exist_ok=True)

@@ -34,7 +34,7 @@ def text(language: str, page: str) -> str:
     return (FOLDER / language / page).read_text("utf-8")
 
 
-def test_guide_has_a_page_for_each_common_question() -> None:
+def test_guide_has_the_expected_pages_and_exists_in_every_selectable_language() -> None:
     assert [page.title for page in read_pages(FOLDER, "en", lambda _command: "F1")] == TITLES
     assert "es" in LANGUAGES
     assert {code for code, _name in i18n.selectable_languages()} <= set(LANGUAGES), (

@@ -138,7 +138,9 @@ def test_both_layouts_show_their_panels(qtbot, window: MainWindow, commands: Com
     assert window.bar.switch.value == "developer"
 
 
-def test_default_arrangement_matches_the_design(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_docks_of_both_layouts_have_their_default_sizes_and_positions(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     show(qtbot, window)
     commands.run("layout.behaviour")
     docks = window.benches["behaviour"].docks
@@ -198,7 +200,7 @@ def test_failed_panel_shows_an_error_and_the_window_keeps_running(
     assert topics.refreshed > 0
 
 
-def test_f12_triggers_stop_from_every_focused_widget(
+def test_f12_triggers_stop_in_every_layout_and_in_a_floating_dock(
     qtbot, window: MainWindow, commands: Commands, monkeypatch
 ) -> None:
     stops: list[str] = []
@@ -459,7 +461,9 @@ def test_commands_are_run_by_id_and_unknown_ids_fail(qtbot, window: MainWindow, 
     assert not commands.run("tab:nobody")
 
 
-def test_alert_is_shown_in_the_banner_until_resolved(qtbot, window: MainWindow, commands: Commands) -> None:
+def test_alert_is_shown_in_the_banner_until_resolved_or_dismissed(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
     show(qtbot, window)
     window.show_layout("developer")
     alerts = window.session.alerts
@@ -535,7 +539,7 @@ def test_theme_change_applies_immediately(qtbot, window: MainWindow, commands: C
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_large_text_clips_no_button_of_the_bars(
+def test_large_text_clips_no_button_of_the_run_bar(
     qtbot, window: MainWindow, commands: Commands, percent: int
 ) -> None:
     show(qtbot, window)
@@ -597,7 +601,7 @@ def test_all_buttons_of_the_behaviour_layout_have_accessible_names(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_panel_titles_grow_with_the_text_size(
+def test_panel_titles_are_not_clipped_at_any_text_size(
     qtbot, window: MainWindow, commands: Commands, percent: int
 ) -> None:
     show(qtbot, window)
@@ -611,7 +615,7 @@ def test_panel_titles_grow_with_the_text_size(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_stop_results_are_never_clipped_in_the_smallest_window(
+def test_stop_result_is_not_clipped_in_a_narrow_window_at_any_text_size(
     qtbot, window: MainWindow, commands, percent: int
 ) -> None:
     show(qtbot, window)
@@ -695,7 +699,7 @@ def test_floating_or_closing_a_panel_does_not_move_focus_to_another_panel(
     assert focus is None or not any(d.isAncestorOf(focus) for d in bench.docks.values())
 
 
-def test_system_file_dialogs_are_not_modal(qtbot, window: MainWindow, tmp_path: Path) -> None:
+def test_system_save_dialog_is_not_modal(qtbot, window: MainWindow, tmp_path: Path) -> None:
     show(qtbot, window)
     asked: list[Path] = []
     SystemDialogs(window).save(str(tmp_path / "Dance.nepb"), asked.append)
@@ -710,7 +714,9 @@ def test_system_file_dialogs_are_not_modal(qtbot, window: MainWindow, tmp_path: 
     dialog.close()
 
 
-def test_last_used_layout_is_shown_after_restart(window: MainWindow, commands: Commands) -> None:
+def test_last_layout_is_empty_for_the_start_page_and_for_a_blank_behaviour(
+    window: MainWindow, commands: Commands
+) -> None:
     assert last_layout(window) == "", "a first start"
     commands.run("layout.developer")
     assert last_layout(window) == "developer"
@@ -741,7 +747,7 @@ def test_loading_layout_shows_its_bars_first_and_then_its_panels(
 
 
 @pytest.mark.parametrize("kind", ["good", "bad", "none"])
-def test_start_with_a_file_argument_shows_that_file(
+def test_file_argument_is_opened_and_a_damaged_file_raises_an_alert(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     monkeypatch.setattr(window, "start_session", lambda: None)
@@ -782,7 +788,7 @@ def test_first_start_offers_the_first_steps_and_the_second_start_does_not(
 
 
 @pytest.mark.parametrize("instead", ["work of last time", "open work", "a file", "an earlier version"])
-def test_first_steps_are_not_offered_when_work_is_open_or_recovered(
+def test_first_steps_are_not_offered_with_existing_work_or_settings(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instead: str
 ) -> None:
     monkeypatch.setattr(window, "start_session", lambda: None)

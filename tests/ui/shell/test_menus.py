@@ -60,7 +60,7 @@ def test_text_check_marks_and_shortcuts_are_painted(qtbot, theme: Theme) -> None
     menu.close()
 
 
-def test_every_menu_entry_has_a_mnemonic(qtbot, theme: Theme) -> None:
+def test_every_enabled_menu_entry_is_triggered_by_its_mnemonic(qtbot, theme: Theme) -> None:
     place, done = QWidget(), []
     made = [QAction(words, place) for words in ("Cortar", "Copiar", "Última", "No")]
     for action in made:

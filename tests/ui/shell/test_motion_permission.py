@@ -111,7 +111,7 @@ def test_always_allow_that_cannot_be_saved_is_reported_and_motion_is_allowed(win
     assert window.done == ["moved"]
 
 
-def test_stop_closes_the_permission_question(window) -> None:
+def test_withdrawn_permission_request_closes_the_question(window) -> None:
     window.ask("move")
     window.permission.withdraw()
     window.question.refresh()

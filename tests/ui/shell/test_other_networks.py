@@ -118,7 +118,7 @@ def test_setting_that_cannot_be_saved_is_reported(
 
 
 @pytest.mark.parametrize("percent", [100, 200])
-def test_texts_are_translated_and_fit(
+def test_texts_of_the_sheet_are_translated_and_not_clipped(
     qtbot, pseudo, theme: Theme, sheet: OtherNetworksSheet, world: World, percent: int
 ) -> None:
     theme.set_text_percent(percent)

@@ -51,7 +51,7 @@ def test_positions_of_matched_letters_are_reported() -> None:
 
 
 @pytest.mark.parametrize("query", ["xyz", "savex", "zz top", "keyboard mouse"])
-def test_non_matching_entries_are_not_found(query: str) -> None:
+def test_entries_that_lack_a_word_of_the_query_are_not_found(query: str) -> None:
     assert found("Save", "Keyboard shortcuts", "Stop the program", query=query) == []
 
 
@@ -225,7 +225,7 @@ def test_command_is_found_and_run(palette: CommandPalette, window: MainWindow) -
     assert words(palette)[0] == "Dark"
 
 
-def test_recently_used_commands_are_remembered_after_restart(
+def test_recently_used_commands_are_saved_in_the_settings(
     palette: CommandPalette, window: MainWindow
 ) -> None:
     QTest.keyClicks(palette.field, "larger")
@@ -358,7 +358,7 @@ def test_result_list_is_bounded_with_ten_thousand_topics(palette: CommandPalette
     assert palette.height() < 600
 
 
-def test_screen_reader_text_contains_command_shortcut_and_reason(palette: CommandPalette) -> None:
+def test_screen_reader_text_contains_command_menu_and_shortcut(palette: CommandPalette) -> None:
     palette.field.setText("stop the program")
     index = palette.rows.currentIndex()
     spoken = index.data(Qt.ItemDataRole.AccessibleTextRole)

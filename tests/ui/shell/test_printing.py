@@ -116,7 +116,7 @@ def test_only_the_requested_pages_are_painted(qtbot, tmp_path: Path, first, last
 
 
 @pytest.mark.qt_log_ignore("QPainter::begin")
-def test_printer_that_rejects_the_job_is_reported(qtbot, tmp_path: Path) -> None:
+def test_paint_pdf_returns_false_if_the_printer_cannot_be_opened(qtbot, tmp_path: Path) -> None:
     printer = QPrinter(QPrinter.PrinterMode.ScreenResolution)
     printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
     printer.setOutputFileName(str(tmp_path / "no folder" / "out.pdf"))

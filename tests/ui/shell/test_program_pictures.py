@@ -54,7 +54,7 @@ def test_image_is_written_with_the_extension_of_its_format(tmp_path: Path) -> No
     assert said == ["Saved Greeting 1.2.svg"]
 
 
-def test_unwritable_folder_is_reported(tmp_path: Path) -> None:
+def test_image_that_cannot_be_saved_is_reported(tmp_path: Path) -> None:
     said: list[str] = []
     (tmp_path / "file").write_text("")
     made(Editor(b"<svg/>"), said).save(tmp_path / "file" / "a.svg", "svg", True)

@@ -293,7 +293,7 @@ def test_plot_shows_data_before_the_playhead_and_restarts_on_return_to_live(
     assert len(plot.shown[0].curve.samples) == 0
 
 
-def test_image_panels_show_images_at_the_playhead(qtbot, window, session, path, whole):
+def test_image_panel_shows_the_image_at_the_playhead(qtbot, window, session, path, whole):
     opened(qtbot, window, path)
     image = window.bench.docks["image"].panel
     go_to(qtbot, window, whole[40][0])

@@ -225,7 +225,7 @@ def test_report_sheet_is_operated_by_keyboard(
 
 
 @pytest.mark.parametrize("percent", [100, 200])
-def test_texts_are_translated_and_fit(
+def test_texts_of_the_report_sheet_are_translated_and_not_clipped(
     qtbot,
     pseudo: None,
     theme: Theme,
@@ -282,5 +282,5 @@ def test_checking_for_a_new_version_only_opens_the_releases_page(
     assert ("example.org" in said[0]) is not works
 
 
-def test_buttons_have_accessible_names(sheet: ReportSheet) -> None:
+def test_buttons_of_the_report_sheet_have_accessible_names(sheet: ReportSheet) -> None:
     assert all(button.accessibleName() for button in sheet.findChildren(Button))

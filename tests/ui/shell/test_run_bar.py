@@ -77,7 +77,9 @@ def tools(qtbot, theme: Theme) -> ToolBar:
         ("unanswered", False, False, False, "Stop again", "error"),
     ],
 )
-def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, stop, look) -> None:
+def test_run_bar_shows_buttons_result_and_text_of_each_state(
+    bar: RunBar, state, run, pause, step, stop, look
+) -> None:
     bar.show_view(VIEWS[state])
     can_press = run or state == "running"  # the button is Restart while running
     assert (bar.run.isEnabled(), bar.pause.isEnabled(), bar.step.isEnabled()) == (can_press, pause, step)
@@ -123,7 +125,7 @@ def test_restart_replaces_run_and_is_filled_when_the_blocks_were_edited(bar: Run
     assert not bar.restart.isVisible()
 
 
-def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
+def test_run_restart_confirm_and_stop_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     told: list[str] = []
     names = ("run.run", "run.restart", "run.pause", "run.step", "run.stop", "run.confirm", *SPEED_COMMANDS)
 

@@ -38,7 +38,7 @@ def press(segments, value: str) -> None:
     QTest.mouseClick(segments._segments[value], Qt.MouseButton.LeftButton)
 
 
-def test_every_settings_choice_applies_immediately_and_is_saved(
+def test_appearance_settings_apply_immediately_and_are_saved(
     sheet: SettingsSheet, window: MainWindow, home: Path
 ) -> None:
     press(sheet.mode, "dark")

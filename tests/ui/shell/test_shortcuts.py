@@ -74,7 +74,9 @@ def test_shortcuts_are_formatted_with_macos_symbols() -> None:
     assert tip_with_key("Save", "", "darwin") == "Save"
 
 
-def test_macos_menu_bar_is_native(qtbot, theme: Theme, window: MainWindow, commands) -> None:
+def test_macos_menu_bar_is_native_and_uses_application_menu_roles(
+    qtbot, theme: Theme, window: MainWindow, commands
+) -> None:
     for platform, native in (("darwin", True), ("linux", False), ("win32", False)):
         bar = AppBar(theme, LAYOUTS, platform)
         qtbot.addWidget(bar)

@@ -226,7 +226,7 @@ def test_tab_of_a_tabified_panel_shows_a_count_badge(qtbot, window: MainWindow) 
     qtbot.waitUntil(lambda: badge() is None)
 
 
-def test_narrow_title_shows_other_tabs_as_icons_with_accessible_names(qtbot, window: MainWindow) -> None:
+def test_tab_in_a_narrow_title_is_shortened_and_has_a_tooltip(qtbot, window: MainWindow) -> None:
     window.theme.set_text_percent(200)
     window.resize(1024, 600)
     bench = window.show_layout("behaviour")

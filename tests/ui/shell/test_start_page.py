@@ -223,9 +223,7 @@ def test_start_page_clips_no_text_at_any_text_size(
             assert shown.height() >= room, shown.text()
 
 
-def test_first_button_is_visible_with_large_text_in_a_low_window(
-    qtbot, page: StartPage, theme: Theme
-) -> None:
+def test_card_art_is_hidden_with_large_text_in_a_low_window(qtbot, page: StartPage, theme: Theme) -> None:
     page.resize(1024, 530)
     theme.set_text_percent(200)
     first = page.robot_card

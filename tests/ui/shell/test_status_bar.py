@@ -63,7 +63,7 @@ def test_health_item_shows_no_robot_when_none_is_connected() -> None:
     assert facts(fakes.Session()).health() == ("circle-dashed", "No robot", "off")
 
 
-def test_save_state_shows_its_time(session: fakes.Session) -> None:
+def test_save_state_shows_the_time_of_saving_or_that_work_is_backed_up(session: fakes.Session) -> None:
     assert facts(session).save_state()[1] == ""
     session.document.saved_at = 8 * 3600 + 41 * 60
     assert facts(session).save_state()[1] == "Saved 8:41"

@@ -179,7 +179,7 @@ def test_stop_key_triggers_once_per_press(window: MainWindow, stops: list[str]) 
     assert stops == ["stop"]
 
 
-def test_no_widget_in_the_window_is_modal() -> None:
+def test_user_interface_code_makes_no_modal_calls() -> None:
     found = [
         f"{path.name}: {ast.unparse(node)}"
         for path in Path(app.ui.__file__).parent.rglob("*.py")

@@ -143,7 +143,7 @@ def test_value_cannot_be_set_while_the_behaviour_does_not_run(shown: MainWindow,
      ("0,2", 0.2), ("1.234,5", "1.234,5"), ("1_000", "1_000"),
      ("1e999", "1e999"), ("nan", "nan"), ("18446744073709551615", 2**64 - 1)],
 )  # fmt: skip
-def test_typed_value_is_parsed_as_a_number_if_possible(words: str, value: object) -> None:
+def test_typed_value_is_parsed_as_number_boolean_or_text(words: str, value: object) -> None:
     made = parse_value(words)
     assert made == value
     assert type(made) is type(value)

@@ -126,7 +126,7 @@ def test_versions_of_other_files_with_the_same_name_are_listed_below(
     assert rows(sheet) == [same, ("Versions of other files named Mine", ""), same]
 
 
-def test_empty_version_list_explains_how_versions_are_created(qtbot, commands, shown, tmp_path: Path) -> None:
+def test_explanation_replaces_an_empty_version_list(qtbot, commands, shown, tmp_path: Path) -> None:
     commands.files.open(saved(tmp_path / "Mine.nepb"))
     sheet = opened(qtbot, commands, shown)
     assert not sheet.rows.isVisible()

@@ -266,7 +266,7 @@ def test_tab_order_follows_the_reading_order(desk: Desk) -> None:
     assert unsaid(desk.sheet) == []
 
 
-def test_rejected_robot_links_to_the_selection_of_robots(desk: Desk) -> None:
+def test_rejection_of_a_robot_command_links_to_the_selection_of_robots(desk: Desk) -> None:
     server, sheet = desk.switch_on(), desk.sheet
     server.rejections = (Rejection(1.0, "http://lab.example", "refused", kind="robot", robot="Turtle"),)
     sheet.refresh()
@@ -316,7 +316,7 @@ def test_test_page_opens_in_the_browser_of_this_computer(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize(("size", "percent"), [((1024, 700), 150), ((1100, 700), 200), ((1600, 1000), 100)])
-def test_texts_are_translated_and_fit(
+def test_texts_of_the_web_pages_sheet_are_translated_and_not_clipped(
     qtbot, pseudo, theme: Theme, desk: Desk, size: tuple[int, int], percent: int
 ) -> None:
     theme.set_text_percent(percent)

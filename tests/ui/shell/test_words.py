@@ -232,7 +232,7 @@ def test_tool_bar_hides_tools_instead_of_shortening_texts(qtbot, whole: MainWind
                 assert button.width() >= button.sizeHint().width() - 1, (view.state, button.text())
 
 
-def test_tools_hidden_for_lack_of_room_reappear_after_the_run(qtbot, whole: MainWindow) -> None:
+def test_tools_hidden_for_lack_of_room_reappear_when_there_is_room(qtbot, whole: MainWindow) -> None:
     whole.resize(2400, 800)
     whole.commands.run("layout.developer")
     bar, keep = whole.tool_bar, whole.tools.keep
@@ -324,7 +324,7 @@ def test_version_history_is_translated(qtbot, whole: MainWindow, tmp_path: Path)
     assert untranslated(whole.toast.text, "Mine") == []
 
 
-def test_name_dialog_is_translated(whole: MainWindow) -> None:
+def test_name_sheet_is_translated(whole: MainWindow) -> None:
     whole.commands.run("layout.developer")
     whole.commands.run("layout.keep")
     (sheet,) = whole.findChildren(NameSheet)

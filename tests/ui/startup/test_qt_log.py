@@ -93,7 +93,7 @@ class Stuck(io.StringIO):
         return super().write(text)
 
 
-def test_blocked_terminal_does_not_block_the_window():
+def test_blocked_terminal_does_not_block_logging():
     stuck = Stuck()
     handler = TerminalHandler(stuck)
     for n in range(1000):

@@ -53,7 +53,7 @@ def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", SECOND, name, *files], cwd=cwd, env=environ)
 
 
-def test_start_without_a_running_instance_opens_a_window(name: str) -> None:
+def test_start_request_is_not_sent_without_a_running_instance(name: str) -> None:
     assert send_request(name, StartRequest()) is False
 
 

@@ -205,7 +205,7 @@ def test_window_clips_no_text(
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_status_bar_elides_items_that_do_not_fit(qtbot, theme: Theme, percent: int) -> None:
+def test_visible_status_items_are_not_clipped_at_any_text_size(qtbot, theme: Theme, percent: int) -> None:
     theme.set_text_percent(percent)
     bar = StatusBar(theme)
     qtbot.addWidget(bar)

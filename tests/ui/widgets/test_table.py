@@ -181,7 +181,7 @@ def test_stretch_column_takes_the_remaining_width(view) -> None:
     assert view.columnWidth(0) == 100  # not below its own width
 
 
-def test_row_height_follows_the_density(view) -> None:
+def test_large_row_height_uses_the_large_font(view) -> None:
     view.set_row_height(36, large=True)
     assert view.rowHeight(0) == 36
     assert view.cell_font(Cell("x")).pixelSize() == 14

@@ -165,7 +165,7 @@ def test_chip_without_text_is_hidden_and_chip_without_parent_opens_no_window(qtb
         chip.set("x", "sparkling")
 
 
-def test_only_enabled_primary_buttons_are_filled(qtbot, theme: Theme) -> None:
+def test_primary_button_is_filled_only_while_enabled(qtbot, theme: Theme) -> None:
     primary = Button(theme, "Try", "play", kind="primary")
     shown(qtbot, primary)
     assert theme.colour("accent").name() in colours(primary)
@@ -294,7 +294,7 @@ def test_search_field_shows_its_shortcut_only_while_empty(qtbot, theme: Theme) -
 
 
 @pytest.mark.parametrize("percent", [100, 150, 200])
-def test_controls_grow_with_the_text_size(theme: Theme, percent: int) -> None:
+def test_button_and_chip_fit_their_text_at_every_text_size(theme: Theme, percent: int) -> None:
     theme.set_text_percent(percent)
     button = Button(theme, "Use the virtual robot", "bot", size="large")
     font = QFontMetricsF(theme.font("button"))
@@ -379,7 +379,7 @@ def test_scroll_area_grows_with_longer_text(qtbot) -> None:
     qtbot.waitUntil(lambda: about.height() == before)
 
 
-def test_tab_moves_through_rows_and_not_into_a_combo_box_popup(qtbot) -> None:
+def test_tab_stops_exclude_the_popup_of_a_combo_box(qtbot) -> None:
     column = ScrollColumn("Rows")
     qtbot.addWidget(column)
     choice = QComboBox()

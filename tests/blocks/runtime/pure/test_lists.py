@@ -17,7 +17,7 @@ from tests.blocks.samples import block, get, list_of, number, started, text, wor
 FRUITS = list_of(text("apple"), text("pear"), text("fig"))
 
 
-def test_list_items_are_indexed_from_1_and_lists_are_formatted_as_text() -> None:
+def test_list_operations_index_items_from_1() -> None:
     fruits = lists.new_list("apple", "pear", "fig")
     assert [lists.item(fruits, where) for where in (1, 2.0, "first", "last")] == [
         "apple", "pear", "apple", "fig",

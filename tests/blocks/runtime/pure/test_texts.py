@@ -109,12 +109,12 @@ def test_text_operations_return_expected_results(name, given, expected):
     assert (type(result), result) == (type(expected), expected)
 
 
-def test_text_length_is_limited():
+def test_length_of_replaced_text_is_limited():
     with pytest.raises(BehaviourError, match="too long"):
         texts.replaced("a" * 1000, "a", "b" * 2000)
 
 
-def test_text_blocks_run_and_error_names_its_block():
+def test_letter_block_runs_and_error_names_its_block():
     far = block("texts_letter", "far", WHERE="number", NUMBER=number(9), TEXT=text("Hello"))
     first = block("texts_letter", WHERE="first", NUMBER=number(9), TEXT=text("Ada"))
     run = play(workspace(started(write(first), write(far))))

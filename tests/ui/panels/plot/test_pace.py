@@ -35,7 +35,7 @@ class Canvas:
     painted_s = 0.0
 
 
-def test_paint_time_is_counted_only_once_per_refresh() -> None:
+def test_paint_time_is_counted_only_once() -> None:
     pace, canvas = DrawThrottle(), Canvas()
     canvas.painted_s = 100.0
     with pace.measure(canvas):

@@ -235,7 +235,7 @@ def test_footer_reports_undecodable_messages_and_discarded_points(panel) -> None
 # -- time --------------------------------------------------------------------------------------------------
 
 
-def test_plot_scrolls_with_new_data_and_recording_continues_while_paused(panel) -> None:
+def test_plot_scrolls_with_new_data_and_keeps_receiving_it_while_paused(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 70))
     look(panel)
@@ -309,7 +309,7 @@ def test_drag_pans_the_plot_and_pauses_following(panel) -> None:
     assert panel.freeze.isChecked()
 
 
-def test_zoom_stays_within_the_range_of_floats() -> None:
+def test_zoom_keeps_the_time_span_within_its_limits() -> None:
     view = TimeView()
     for factor in (1e-30, 1e30, 1e30, 1e-5):
         view.zoom(factor, 5.0, view.visible_range(0.0, 10.0))
@@ -407,7 +407,7 @@ def test_plot_shortcuts_work_while_the_table_has_focus(panel) -> None:
         (12345, "12\u2009345"), (4.2e-7, f"4.2e{MINUS}07"), (10**400, "∞"), ([1], ""),
     ],
 )  # fmt: skip
-def test_table_shows_the_values_of_the_curves(value, words) -> None:
+def test_values_are_formatted_for_the_curve_table(value, words) -> None:
     assert value_text(value) == words
 
 
@@ -493,7 +493,7 @@ def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) 
 # -- fields from other panels ------------------------------------------------------------------------------
 
 
-def test_field_is_added_by_drag_and_drop() -> None:
+def test_field_round_trips_as_drag_data_and_invalid_data_is_ignored() -> None:
     data = field_mime_data("ros2 /odom", 'pose["first name"]')
     assert dropped_field(data) == ("ros2 /odom", 'pose["first name"]')
     assert data.text() == 'ros2 /odom.pose["first name"]'
