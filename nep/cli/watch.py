@@ -180,7 +180,7 @@ class _AlarmRunner:
         self._view: GraphView | None = None
         self._poll_at = 0.0
         self._is_master_down = False
-        self._has_reported_unknown = 0
+        self._has_reported_unknown = False
 
     def check_send_actions(self) -> None:
         # Raises `typer.BadParameter` if an alarm would move a robot without permission.
@@ -273,7 +273,7 @@ class _AlarmRunner:
     def _report_unknown_once(self, view: GraphView) -> None:
         if self._has_reported_unknown:
             return
-        self._has_reported_unknown = 1
+        self._has_reported_unknown = True
         topics = [name for name, info in view.topics.items() if info.publishers]
         nodes = [info.name for info in view.nodes.values()]
         for condition in (rule.condition for rule in self.alarms.rules if rule.is_enabled):

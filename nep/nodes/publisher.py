@@ -461,7 +461,7 @@ def unencodable_path(payload: object, encode: Callable[[object], Encoded]) -> st
         for step, part in _children(value):
             nodes_left -= 1
             if nodes_left <= 0:
-                return path
+                return path.removeprefix(".")
             if not _is_encodable(part, encode):
                 path, value = path + step, part
                 break

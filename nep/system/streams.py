@@ -19,7 +19,7 @@ _REPLACEMENTS = {
     **dict.fromkeys("●•", "*"), "│": "|", "…": "...", "→": "->", "←": "<-", "↔": "<->", "✗": "x", "✓": "+",
     "≤": "<=", "≥": ">=", "\u00d7": "x", "°": " deg",
 }  # fmt: skip
-_ERROR_HANDLER = "nep.protocol.encoding"
+_ERROR_HANDLER = "nep.replace_unencodable"
 _READER_GONE_ERRNOS = frozenset(
     {errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])}
 )

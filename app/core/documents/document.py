@@ -409,7 +409,7 @@ class Document:
         self.name = name_of(path, behaviour_file.name) if path is not None else behaviour_file.name
         self.path, self.workspace = path, behaviour_file.workspace
         self.robots, self.unknown_fields = dict(behaviour_file.robots), behaviour_file.unknown_fields
-        self._compile_s = self._compiling_key = None
+        self._compiled = self._compile_s = self._compiling_key = None
         self.dirty = False
         self.saved_at = self._stamp = None
         self.revision += 1

@@ -311,6 +311,8 @@ def parse_value(text: str, kind: str) -> object:
     try:
         value: object = orjson.loads(stripped)
     except orjson.JSONDecodeError:
+        if kind not in {"bool", "list", "dict"}:
+            raise ValueError(_("enter a value as JSON, such as {example}").format(example='"text"')) from None
         value = None
     if kind == "bool" and not isinstance(value, bool):
         raise ValueError(_("enter true or false"))

@@ -173,7 +173,7 @@ class Server:
     def _decode_request(self, call: IncomingCall) -> object:
         codec = codec_by_number(call.codec)
         if codec is None:
-            reason = _("this version doesn't know the codec of the reply; update nep")
+            reason = _("this version doesn't know the codec of the request; update nep")
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 

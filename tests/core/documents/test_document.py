@@ -451,7 +451,7 @@ def test_long_file_opened_in_unmodified_tab_is_compiled_in_background(
     document.compiler = compiler
     assert document.newest_program() is not None, "an empty one is compiled at once"
     document.open(tmp_path / "long.nepb")
-    before = document.newest_program()
-    until(lambda: document.newest_program() is not before)
+    assert document.newest_program() is None, "the program of the previous content isn't returned"
+    until(lambda: document.newest_program() is not None)
     assert document.newest_program() is document.program()
     compiler.close()

@@ -236,6 +236,7 @@ def test_parameter_text_round_trips_to_same_value(value: object, kind: str) -> N
         ("9" * 5000, "int", "a whole number"), ("{}", "list", "a list as JSON"),
         ("[", "list", "a list as JSON"),
         ("[1]", "dict", "an object as JSON"), ("", "dict", "an object as JSON"),
+        ("[", "other", "a value as JSON"),
     ],
 )  # fmt: skip
 def test_value_of_wrong_type_is_rejected_with_advice(text: str, kind: str, said: str) -> None:

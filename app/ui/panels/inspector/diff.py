@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Final, Literal
@@ -191,6 +192,8 @@ def _serialized(value: object) -> object:
     # The serialized form compares as JSON does; values that JSON lacks (bytes in msgpack) are returned
     # unchanged.
     try:
-        return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
+        serialized = orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
+        # orjson serializes NaN as null
+        return json.dumps(value, sort_keys=True) if b"null" in serialized else serialized
     except (TypeError, RecursionError):
         return value

@@ -23,7 +23,6 @@ CAPABILITIES = ("clientPublish", "services", "connectionGraph")
 ENCODING = "json"
 """Encoding of messages published by clients, and of requests and responses of services."""
 MAX_ID = 2**32 - 1
-_MESSAGE, _SERVICE = 1, 2  # opcodes of clients
 _MESSAGE_DATA = struct.Struct("<BIQ")
 """Header of a message: opcode 1, subscription id, log time in nanoseconds."""
 _RESPONSE = struct.Struct("<BIII")
