@@ -87,7 +87,7 @@ def test_kill_by_the_system_is_reported_once_and_requested_exit_is_not(
     again = start()
     again.says(OFFER)
     report = next((again.home / "log" / "crashes").glob("*.txt")).read_text("utf-8")
-    assert "without a word" in report
+    assert "without leaving a trace" in report
     again.click("Dismiss")
     again.process.send_signal(signal.SIGTERM)
     assert again.process.wait(END_S) == 0

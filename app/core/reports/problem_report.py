@@ -40,14 +40,14 @@ else:
 
 FILE_SUFFIX = ".zip"
 README_TEXT = (
-    "A report of a problem, made by NEP Studio {version} because a person asked for it.\n\n"
-    "what-happened.txt  what the person wrote\n"
-    "versions.txt       what Studio is made of and runs on\n"
-    "doctor.txt         what the connection doctor found\n"
-    "settings.json      the settings; of most of them only the names\n"
-    "log/               the log files of Studio\n"
-    "crashes/           reports of crashes\n"
-    "work/              behaviours, only if the person wanted that\n"
+    "Problem report, created by NEP Studio {version} at the request of the user.\n\n"
+    "what-happened.txt  description by the user\n"
+    "versions.txt       versions of Studio, its libraries and the system\n"
+    "doctor.txt         findings of the connection doctor\n"
+    "settings.json      settings; most of them only by name\n"
+    "log/               log files of Studio\n"
+    "crashes/           crash reports\n"
+    "work/              behaviours, only if the user included them\n"
 )
 MAX_NAME_LENGTH = 60
 
@@ -127,7 +127,7 @@ def create_report(parts: ReportParts, happened: str, documents: Sequence[Reporte
     """
     files: list[tuple[str, bytes]] = [
         ("README.txt", README_TEXT.format(version=__version__).encode()),
-        ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
+        ("what-happened.txt", (happened.strip() or "(no description)").encode("utf-8", "replace")),
         ("versions.txt", _anonymize(_format_versions(parts))),
         ("settings.json", _anonymize(_format_settings(parts.settings))),
         ("doctor.txt", _anonymize(parts.doctor())),

@@ -40,8 +40,8 @@ MAX_TRACE_BYTES = 1_000_000
 CLOCK_TOLERANCE_S = 2.0
 """Tolerance in seconds when the start time of a process is compared with the clock."""
 NO_TRACE_CAUSE = (
-    "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
-    "computer's session ended"
+    "the process ended without leaving a trace: it was killed by the system (for example for lack of "
+    "memory) or by a user, or the session of the computer ended"
 )
 
 _log = logging.getLogger("studio.run")
@@ -179,7 +179,7 @@ class StudioRun:
             how = NO_TRACE_CAUSE
         start_time = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
         version = parse_version(entry.get("version"))
-        text = f"It was version {version or 'not known'}, begun {start_time}.\n\n{trace}\n{self._log_tail()}"
+        text = f"Version {version or 'unknown'}, started {start_time}.\n\n{trace}\n{self._log_tail()}"
         return Crash("studio", how, text, version)
 
     def _read_trace(self, mark: Path) -> str:
