@@ -1,4 +1,4 @@
-"""Show all widgets in the light and dark theme, or save an image of them.
+"""Show common widgets in the light and dark theme, or save an image of them.
 
 Usage: python tools/gallery.py [PICTURE.png] [--text PERCENT]
 """
@@ -134,7 +134,7 @@ def _status_widgets(theme: Theme) -> list[QWidget]:
 
 
 def page(theme: Theme) -> QWidget:
-    """Create a page with all widgets."""
+    """Create a page with common widgets."""
     container = QWidget()
     container.setAutoFillBackground(True)
     column = QVBoxLayout(container)

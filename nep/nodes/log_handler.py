@@ -139,7 +139,10 @@ class NewErrorFilter:
         return True
 
     def new_records(self, payload: object) -> list[LogRecord]:
-        """Return the errors of a latched list that were not shown yet, oldest first."""
+        """Return the records of a latched list that were not shown yet, oldest first, and remember them.
+
+        Records without a time stamp are omitted.
+        """
         entries = payload[-MAX_LAST_ERRORS:] if isinstance(payload, list) else []
         records = sorted(map(LogRecord.from_plain, entries), key=lambda record: record.stamp_ns)
         return [record for record in records if record.stamp_ns and self.is_new(record)]

@@ -251,7 +251,7 @@ class TopicField(Field):
         return {"type": "field_topic", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
-        """Return a valid topic name: 1 to 200 bytes without white space, control characters and "{".
+        """Return a valid topic name: 1 to 200 bytes without white space, control characters or "{".
 
         Raises:
             FieldError: The name is invalid.

@@ -26,7 +26,7 @@ class QuietNodes:
         self._counted: dict[str, tuple[int, float]] = {}
 
     def update(self, graph_input: GraphInput, now: float) -> None:
-        """Apply new statistics; ``now`` is monotonic seconds. New nodes count as active."""
+        """Apply new statistics; ``now`` is in monotonic seconds. New nodes count as active."""
         sums = {entry.key: 0 for entry in graph_input.nodes if entry.gone_s is None}
         unknown = {
             entry.key

@@ -21,7 +21,7 @@ ALERT, NOT_SAVED_ALERT = "reach", "reach:kept"
 
 @dataclass(frozen=True, slots=True)
 class RemoteAccessChanged:
-    """Event: the master has replied to the request to listen on some addresses.
+    """Event: the request to the master to listen on some addresses has succeeded or failed.
 
     Attributes:
         hosts: Requested addresses.
@@ -125,7 +125,7 @@ class RemoteAccess:
                 self._request(saved_hosts)
 
     def on_changed(self, event: RemoteAccessChanged) -> None:
-        """Apply the master's reply: update `hosts`, or raise an alert if the request failed."""
+        """Apply the result of the request: update `hosts`, or raise an alert if the request failed."""
         if not event.message:
             self.hosts = event.hosts
             self._alerts.resolve(ALERT)

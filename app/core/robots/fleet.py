@@ -170,7 +170,7 @@ class Fleet:
         link = self._get_link(name)
         described = link.robot.action(action)
         if described is None:
-            raise RobotInputError((_("{robot} can't {action}").format(robot=name, action=action),))
+            raise RobotInputError((_("{robot} has no action “{action}”").format(robot=name, action=action),))
         problems = described.check(input)
         if problems:
             raise RobotInputError(problems, described.problems(input))

@@ -23,7 +23,7 @@ OPEN_DOCTOR_LABEL = lazy("Open the connection doctor")
 DISCARD_ALERT = "leaving"
 INSTALLATION_ALERT = "installation"
 """Id of the alert about Studio's installation. The id "program" belongs to the program of a behaviour."""
-ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
+ROBOT_ALERT_PREFIXES = ("robot", "moving", "camera", "rejected", "errors")
 """Id prefixes of alerts about one robot. They are followed by a colon and the name of the robot."""
 
 REAL_ROBOT_HINT = lazy("Check that it is switched on and connected to the same Wi-Fi.")
@@ -293,7 +293,7 @@ class Health:
         names = {link.name for link in self._fleet.links}
         for name in self._robots - names:
             self._gone_since.pop(name, None)
-            for kind in ROBOT_ALERTS:
+            for kind in ROBOT_ALERT_PREFIXES:
                 self._alerts.resolve(f"{kind}:{name}")
         self._robots = names
 

@@ -80,7 +80,7 @@ class Title:
 
 @dataclass(frozen=True)
 class Suggested:
-    """Initial value in forms and blocks, for a parameter whose value must be given."""
+    """Initial value of a required parameter in forms and blocks."""
 
     value: object
 
@@ -96,12 +96,12 @@ class _HexColour:
 
 
 @dataclass(frozen=True)
-class _PictureText:
+class _ImageText:
     """Marker of a text that is an image."""
 
 
 Colour: TypeAlias = Annotated[str, _HexColour()]
-Image: TypeAlias = Annotated[str, _PictureText()]
+Image: TypeAlias = Annotated[str, _ImageText()]
 """Image as ``data:image/jpeg;base64,...``, or as the address of an image."""
 
 
@@ -228,7 +228,7 @@ def _annotation_schema(note: object, schema: Schema) -> Schema:
         return {"rb:advanced": True}
     if isinstance(note, _HexColour):
         return {"pattern": "^#[0-9a-fA-F]{6}$", "rb:widget": "colour"}
-    if isinstance(note, _PictureText):
+    if isinstance(note, _ImageText):
         return {"format": "uri-reference", "contentMediaType": "image/jpeg", "rb:widget": "image"}
     raise TypeError(_("{note} isn't a valid annotation for a robot's value").format(note=repr(note)))
 

@@ -13,14 +13,14 @@ class Tab:
 
     Attributes:
         key: Key of the behaviour.
-        program: Latest workspace.
-        generation: Number that changes when the program is replaced, to detect outdated edits.
+        program: Latest workspace, in Blockly's JSON format.
+        generation: Number that changes when the workspace is replaced, to detect outdated edits.
         is_loaded: True if the page has loaded the tab.
         states: Newest payload of each state of the blocks, such as highlights, by name of the command.
     """
 
     key: str
-    program: WorkspaceJson
+    workspace: WorkspaceJson
     generation: int
     is_loaded: bool = False  # loaded in the page, with undo stack, zoom and scroll position
     states: dict[str, object] = field(default_factory=dict)
@@ -71,7 +71,7 @@ class Tabs:
         """Replace the program of the shown tab; `tab_for_edit` rejects later edits of the old program."""
         self._generations += 1
         self.shown.generation = self._generations
-        self.shown.program = program
+        self.shown.workspace = program
         self.shown.states.clear()
 
     def tab_for_edit(self, key: str, generation: int) -> Tab | None:

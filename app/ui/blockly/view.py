@@ -112,12 +112,12 @@ class BlocklyView(BlocklyHost):
 
         Edits of the last 150 ms may be missing; see `flush`.
         """
-        return self._tabs.shown.program.blocks
+        return self._tabs.shown.workspace.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
         """Return the latest program of a tab, or None if there is no such tab."""
         tab = self._tabs[key]
-        return tab.program.blocks if tab is not None else None
+        return tab.workspace.blocks if tab is not None else None
 
     def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
         """Show a behaviour, with its undo stack, zoom and scroll position.
@@ -150,7 +150,7 @@ class BlocklyView(BlocklyHost):
 
     def apply_edit(self, workspace: Mapping[str, object]) -> None:
         """Change the program of the shown tab as one undoable edit; `changed` is not emitted."""
-        self._tabs.shown.program = WorkspaceJson.from_blocks(workspace)
+        self._tabs.shown.workspace = WorkspaceJson.from_blocks(workspace)
         self._send_command("change", workspace)
 
     def flush(self, callback: Callable[[WorkspaceJson], None]) -> None:
@@ -160,7 +160,7 @@ class BlocklyView(BlocklyHost):
         edits: they were flushed when another tab was shown.
         """
         if not self._up:
-            callback(self._tabs.shown.program)
+            callback(self._tabs.shown.workspace)
             return
         self._tokens += 1
         self._waiting[self._tokens] = callback
@@ -172,7 +172,8 @@ class BlocklyView(BlocklyHost):
         Args:
             kind: "png" or "svg".
             white: True for a white background, False for a transparent one.
-            callback: Called exactly once with the image; with b"" if there are no blocks or no page.
+            callback: Called exactly once with the image; with b"" if there are no blocks, or if the editor's
+                page isn't loaded.
         """
         if not self._up:
             callback(b"")
@@ -190,7 +191,8 @@ class BlocklyView(BlocklyHost):
             title: Title.
             date: Formatted date.
             layout: Page size and margins.
-            callback: Called exactly once with the PDF; with b"" if there are no blocks or no page.
+            callback: Called exactly once with the PDF; with b"" if there are no blocks, or if the editor's
+                page isn't loaded.
         """
         if not self._up:
             callback(b"")
@@ -458,7 +460,7 @@ class BlocklyView(BlocklyHost):
             without(b"")
         waiting, self._waiting = self._waiting, {}
         for callback in waiting.values():
-            callback(self._tabs.shown.program)
+            callback(self._tabs.shown.workspace)
         self.history_changed.emit(False, False)
         self.visible_sensors_changed.emit(())
         self.watched_variables_changed.emit(())
@@ -470,7 +472,7 @@ class BlocklyView(BlocklyHost):
         tab = self._tabs.shown
         payload: Json = {"key": tab.key}
         if not tab.is_loaded:
-            payload |= {"generation": tab.generation, "workspace": tab.program.blocks}
+            payload |= {"generation": tab.generation, "workspace": tab.workspace.blocks}
             tab.is_loaded = True
         self._bridge.send_command("tab", payload)
         for name, value in tab.states.items():
@@ -487,8 +489,8 @@ class BlocklyView(BlocklyHost):
     def _on_edited(self, key: str, generation: int, workspace: str) -> None:
         tab = self._tabs.tab_for_edit(key, generation)
         if tab is not None:
-            tab.program = WorkspaceJson(workspace)
-            self.changed.emit(key, tab.program)
+            tab.workspace = WorkspaceJson(workspace)
+            self.changed.emit(key, tab.workspace)
 
     def _on_picture_rendered(self, token: int, data: str) -> None:
         callback = self._pictures.pop(token, None)

@@ -117,7 +117,7 @@ class PicturePlacement:
             share_x + (view.width() / 2 - position.x()) / max(1e-9, rotated.width()),
             share_y + (view.height() / 2 - position.y()) / max(1e-9, rotated.height()),
         )
-        self._normalize_centre(view, picture)
+        self._clamp_centre(view, picture)
 
     def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
         """Move the image by a distance in px. An image that is fitted to the view stays in place."""
@@ -128,7 +128,7 @@ class PicturePlacement:
             (view.width() / 2 - area.x() - dx) / max(1e-9, area.width()),
             (view.height() / 2 - area.y() - dy) / max(1e-9, area.height()),
         )
-        self._normalize_centre(view, picture)
+        self._clamp_centre(view, picture)
 
     def set_zoom(self, zoom: float | None) -> None:
         """Set the zoom in logical pixels per image pixel, or None to fit the view."""
@@ -158,7 +158,7 @@ class PicturePlacement:
         else:
             self.is_flipped_vertically, self.centre = not self.is_flipped_vertically, (x, 1 - y)
 
-    def _normalize_centre(self, view: QSizeF, picture: QSizeF) -> None:
+    def _clamp_centre(self, view: QSizeF, picture: QSizeF) -> None:
         # Normalizes the centre, so that the next movement starts where the image is displayed.
         area = self.area(view, picture)
         self.centre = (

@@ -476,7 +476,7 @@ class MainWindow(QMainWindow):
         }
         if self.current_layout == "behaviour":
             self.status.show_entries(
-                (formatter.health(), formatter.save_state()),
+                (formatter.health(), formatter.save_status()),
                 (
                     formatter.arming(),
                     formatter.recording(),

@@ -14,7 +14,7 @@ from nep.backends.nanomsg.library import listen, load_pynng, new_socket, queue_l
 from nep.backends.nanomsg.sub_socket import PollableSub
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
-from nep.backends.zeromq.sockets import RejectionLog, wait_until
+from nep.backends.zeromq.sockets import RejectionCounter, wait_until
 from nep.backends.zeromq.sub_socket import MessageBuffer
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import ClosedError, NepError, WireError
@@ -207,7 +207,7 @@ class DirectSubSocket(UnbatchedReader):
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""

@@ -20,7 +20,7 @@ from nep.backends.nanomsg.endpoints import format_endpoint, subscriber_topic_par
 from nep.backends.nanomsg.library import bound_port, listen, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import HandshakePublisher
-from nep.backends.zeromq.sockets import LOOPBACK, RejectionLog, wait_until
+from nep.backends.zeromq.sockets import LOOPBACK, RejectionCounter, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
@@ -82,7 +82,7 @@ class NanomsgPublisher(HandshakePublisher):
         self._hellos: dict[str, int] = {}
         """Subscriber id by the address of its connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         super().__init__(threading.Condition(threading.Lock()), {})
         self._message_socket.add_post_pipe_connect_cb(self._handle_pipe_added)
         self._message_socket.add_post_pipe_remove_cb(self._handle_pipe_removed)

@@ -22,7 +22,7 @@ from nep.backends.services import (
     limit_reply_size,
     rejection_reply,
 )
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import WireError
 from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
 
@@ -90,7 +90,7 @@ class NanomsgServer:
         self._socket = socket
         self._framing = framing
         self._on_close = on_close
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         self._lock = threading.Lock()
         self._answered_at = 0.0
         self._contexts: set[Any] = set()

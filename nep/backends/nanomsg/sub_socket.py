@@ -15,7 +15,7 @@ from nep.backends.base import SubscriberSpec
 from nep.backends.nanomsg.endpoints import parse_endpoint, split_message, subscriber_topic_part
 from nep.backends.nanomsg.library import FDS_PER_SOCKET, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionCounter
 from nep.backends.zeromq.sub_socket import MessageBuffer, MessageParser
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import TooManyFilesError, WireError
@@ -90,7 +90,7 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self._sub = PollableSub(codec_for(spec.msg_type).name)
         self.fd = self._sub.fd
         self._name = spec.topic

@@ -16,7 +16,7 @@ from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.ros.type_mapping import STAMP, Unpacker, installed_definition, is_ros_type, unpacker_for
 from nep.backends.waking import WakingSubscriber
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
 from nep.messages.message import NO_EXTENSION, Message, MessageKind, received_message
@@ -82,7 +82,7 @@ class RospySubscriber(WakingSubscriber):
         self.ready: deque[Message] = deque()
         self.received = 0
         self.lost: int | None = None
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self.is_closed = False
         self._owner = owner
         self._reader_problem = ""

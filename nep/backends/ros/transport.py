@@ -20,7 +20,7 @@ from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
 from nep.backends.ros.type_mapping import installed_definition, ros_type_of, to_ros_body
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
@@ -65,7 +65,7 @@ class RospyPublisher:
         self._lock = threading.RLock()
         self._is_closed = False
         self._room = QueueLimit()
-        self._drops = RejectionLog()
+        self._drops = RejectionCounter()
         queue = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue=queue

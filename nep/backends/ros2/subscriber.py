@@ -32,7 +32,7 @@ from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
 _BATCH_SIZE = 256
-_BATCH_BYTES = 64 * 2**20
+_MAX_BATCH_BYTES = 64 * 2**20
 _MAX_SOURCES = 4096
 """Maximum number of publishers that are tracked."""
 
@@ -90,7 +90,7 @@ class Ros2Subscriber(WakingSubscriber):
         self.received = self.refused = 0
         self.problem = ""
         self.is_closed = False
-        batch = 0 if spec.sink is None else _BATCH_BYTES
+        batch = 0 if spec.sink is None else _MAX_BATCH_BYTES
         self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._dropped = 0
         self._transport = transport
@@ -263,7 +263,7 @@ class Ros2Subscriber(WakingSubscriber):
     def take_batch(self) -> list[Message]:
         """Remove and return the messages for one call of the sink."""
         with self._transport.changed:
-            return self.inbox.pop_all(_BATCH_BYTES)
+            return self.inbox.pop_all(_MAX_BATCH_BYTES)
 
     @property
     def lost(self) -> int | None:

@@ -33,7 +33,7 @@ from nep.backends.services import (
 from nep.backends.zenoh.keys import service_key
 from nep.backends.zenoh.library import load_zenoh, prevent_finalization
 from nep.backends.zenoh.session import ZenohSession
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.requests import (
@@ -67,7 +67,7 @@ class ZenohServer:
         self.is_closed = False
         self._session = session
         self._on_close = on_close
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         self._lock = threading.Lock()
         self._queries: set[Any] = set()
         self._key = service_key(spec.service, time.time_ns(), spec.id)
@@ -188,7 +188,7 @@ class ZenohClient(ClientCalls[_Call]):
         self._session = session
         self._deadlines = deadlines
         self._on_close = on_close
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         session.check(self.record)
 
     # ---- calling

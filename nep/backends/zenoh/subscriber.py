@@ -14,7 +14,7 @@ from nep.backends.zenoh.early_messages import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
 from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.backends.zeromq.sub_socket import MessageParser
 from nep.errors import WireError
 from nep.i18n import _
@@ -62,7 +62,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._on_close = on_close
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._sources = PublisherTracker()
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         self._early = EarlyMessages[tuple[_TopicParser, list[bytes]]](self._sources, spec.max_messages)
         self._problem = ""
         self._own_parser = self._new_topic_parser(spec.topic)

@@ -22,7 +22,7 @@ from nep.backends.connection import Direct
 from nep.backends.zeromq.byte_window import TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import (
-    RejectionLog,
+    RejectionCounter,
     Socket,
     bind,
     connect,
@@ -278,7 +278,7 @@ class OriginalSubSocket(UnbatchedReader):
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""

@@ -25,7 +25,7 @@ from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, can_share, start
 from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import (
     Part,
-    RejectionLog,
+    RejectionCounter,
     RemoteConnection,
     Socket,
     set_send_high_water_mark,
@@ -220,7 +220,7 @@ class NativePublisher(HandshakePublisher):
                 self._read_subscriptions_locked()
 
     @property
-    def rejections(self) -> RejectionLog:
+    def rejections(self) -> RejectionCounter:
         """Log of rejected subscriptions."""
         return self._subscriptions.rejections
 

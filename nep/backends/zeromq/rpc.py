@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, RejectionLog, Socket, wait_until
+from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, RejectionCounter, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.protocol.encoding import call_of_graph_reply, decode_reply, encode_request
@@ -71,7 +71,7 @@ class RpcClient:
         self._requests: dict[int, PendingRequest] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self.has_more = False
         """True if `read` has left messages unread."""
         self.is_connected = False

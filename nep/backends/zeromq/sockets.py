@@ -59,7 +59,7 @@ _MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
-class RejectionLog:
+class RejectionCounter:
     """Counter of rejected inputs that stores the newest reason.
 
     Not thread-safe: guarded by the owner's lock.

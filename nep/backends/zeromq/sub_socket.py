@@ -20,7 +20,7 @@ from nep.backends.zeromq.byte_window import WINDOW_BYTES
 from nep.backends.zeromq.loss import PublisherTracker, TrackedPublisher
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import (
-    RejectionLog,
+    RejectionCounter,
     Socket,
     enable_keep_alive,
     is_remote,
@@ -245,7 +245,7 @@ class SubSocket:
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv

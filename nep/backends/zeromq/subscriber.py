@@ -29,7 +29,7 @@ import zmq
 from nep.backends.base import SubscriberSpec, Wakeable
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog, wait_until
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionCounter, wait_until
 from nep.backends.zeromq.sub_socket import MessageBuffer, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
@@ -61,7 +61,7 @@ class Readable(Protocol):
     """Interface of a socket that returns messages. Guarded by the subscriber's lock."""
 
     fd: int
-    rejections: RejectionLog
+    rejections: RejectionCounter
     """Log of rejected messages."""
 
     @property

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from nep.backends.zeromq.byte_window import SendWindow
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import RejectionLog, RemoteConnection
+from nep.backends.zeromq.sockets import RejectionCounter, RemoteConnection
 from nep.protocol.wire import Hello, parse_acceptance, parse_acknowledgement, parse_hello, topic_part
 
 _logger = logging.getLogger("nep")
@@ -39,7 +39,7 @@ class Subscriptions:
         self._remote_connections: dict[int, RemoteConnection] = {}
         """Connections of subscribers on other computers, by id."""
         self.shared: SharedPayloads | None = None
-        self.rejections = RejectionLog()
+        self.rejections = RejectionCounter()
         self._id = publisher
         self._name = topic
         self._topic = topic_part(topic)

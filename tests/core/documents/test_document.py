@@ -91,7 +91,7 @@ def test_slow_disk_does_not_block_and_newest_edit_is_journalled(
 
 
 @pytest.mark.parametrize("end", [Document.new, Document.close, lambda document: document.save()])
-def test_work_discarded_during_journal_write_does_not_reappear(
+def test_journal_is_deleted_when_its_document_is_replaced_closed_or_saved_during_a_write(
     on_a_slow_disk: Document,
     slow: SlowJournal,
     journal_writer: BackgroundWorker[bool],

@@ -116,7 +116,7 @@ def test_publishers_still_opening_for_evicted_robots_are_closed(strangers: Stran
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
 
 
-def test_moved_robot_that_left_is_still_named_by_stop(strangers: Strangers) -> None:
+def test_disconnected_robot_that_was_moved_remains_a_stop_target(strangers: Strangers) -> None:
     strangers.come("Pepper")
     strangers.fleet.moved.record_command(["Pepper"], "form")
     strangers.leave()

@@ -173,7 +173,7 @@ def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet)
     assert len(world.changes) == 2
 
 
-def test_permission_applies_to_this_program_and_permanent_permission_to_its_computer(
+def test_permission_ends_with_the_program_and_permanent_permission_covers_its_restarts(
     fleet: Fleet, tmp_path: Path
 ) -> None:
     fleet.connect(turtle(virtual=False), "/Turtle/description", STRANGE)

@@ -182,7 +182,7 @@ def test_failed_signing_aborts_packaging(tmp_path: Path, monkeypatch: pytest.Mon
     assert [call[0] for call in calls(log)] == ["codesign"]
 
 
-def test_unreachable_notary_service_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_notary_submission_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, fails="xcrun")
     monkeypatch.setenv("PATH", str(log.parent))
     with pytest.raises(PackageError, match="'xcrun notarytool submit' ended with 3"):

@@ -68,7 +68,7 @@ def test_many_small_messages_need_few_window_entries() -> None:
     assert window.unacked_bytes == 0
 
 
-def test_acknowledgement_is_requested_per_step_and_again_while_the_window_is_full() -> None:
+def test_acknowledgement_is_requested_once_per_interval_and_again_while_the_window_is_full() -> None:
     window = SendWindow()
     window.add_sent(1, ACK_INTERVAL_BYTES - 1)
     assert not window.should_request_ack(0.0, has_room=True)

@@ -77,7 +77,7 @@ def test_loss_counting_starts_at_the_first_message_without_an_echo() -> None:
     assert (sources.received, sources.lost) == (1, 0)
 
 
-def test_repeated_latched_message_is_discarded() -> None:
+def test_repeated_latched_message_is_reported_as_duplicate_and_not_counted() -> None:
     sources = PublisherTracker()
     assert sources.count_message(1, 5, is_alone=True)
     assert not sources.count_message(1, 5, is_alone=True)

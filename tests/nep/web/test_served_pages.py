@@ -112,7 +112,7 @@ def response(server: WebServer, path: str, **headers: str) -> tuple[int, str]:
     return found.status, body
 
 
-def test_server_serves_http_and_websockets_at_one_port(server: WebServer, page: Peer) -> None:
+def test_server_serves_http_and_websockets_on_one_port(server: WebServer, page: Peer) -> None:
     status, body = response(server, "/")
     assert (status, "<!doctype html>" in body) == (HTTPStatus.OK, True)
     assert f"ws://127.0.0.1:{server.port}/" in response(server, "/starter.html")[1]

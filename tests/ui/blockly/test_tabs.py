@@ -24,12 +24,12 @@ TABS = "document.querySelectorAll('.nepTab').length"
 
 def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     tabs = Tabs()
-    assert tabs.shown.program.blocks == EMPTY_WORKSPACE
+    assert tabs.shown.workspace.blocks == EMPTY_WORKSPACE
     assert tabs.show("a", WorkspaceJson.from_blocks(A)) == ""
     assert tabs[""] is None
     assert tabs.show("b", WorkspaceJson.from_blocks(B)) is None
     assert tabs.show("a", WorkspaceJson.from_blocks({})) is None
-    assert tabs.shown.program.blocks == A
+    assert tabs.shown.workspace.blocks == A
 
 
 def test_edits_of_a_closed_tab_or_a_replaced_workspace_are_ignored() -> None:
@@ -43,7 +43,7 @@ def test_edits_of_a_closed_tab_or_a_replaced_workspace_are_ignored() -> None:
     assert tabs.close("a")
     assert tabs.tab_for_edit("a", generation) is None
     assert not tabs.close("a")
-    assert tabs.shown.program.blocks == EMPTY_WORKSPACE
+    assert tabs.shown.workspace.blocks == EMPTY_WORKSPACE
 
 
 @pytest.fixture

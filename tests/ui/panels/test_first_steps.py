@@ -174,7 +174,7 @@ def test_show_me_points_at_the_block_of_the_connected_robot(panel, window) -> No
     assert window.commands[-1] == "point.button:run.run"
 
 
-def test_detached_block_shows_a_hint_where_to_attach_the_block(panel, window) -> None:
+def test_hint_for_a_detached_block_says_where_to_attach_it(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
     assert panel.rows[2].hint.text() == "You'll find it under Speech, on the left."

@@ -39,7 +39,7 @@ def test_typed_file_extension_selects_the_image_format(tmp_path: Path) -> None:
     said: list[str] = []
     editor, answers = Editor(b"<svg/>"), Answers()
     answers.path = tmp_path / "Tea.SVG"
-    made(editor, said, answers).ask_save()
+    made(editor, said, answers).save_as()
     assert answers.asked == [f"Save blocks as image: {Path.home() / 'Tea'}"]
     assert editor.asked == [("svg", True)]
     assert answers.path.read_bytes() == b"<svg/>"

@@ -64,11 +64,11 @@ def test_health_item_shows_no_robot_when_none_is_connected() -> None:
 
 
 def test_save_state_shows_the_time_of_saving_or_that_work_is_backed_up(session: fakes.Session) -> None:
-    assert facts(session).save_state()[1] == ""
+    assert facts(session).save_status()[1] == ""
     session.document.saved_at = 8 * 3600 + 41 * 60
-    assert facts(session).save_state()[1] == "Saved 8:41"
+    assert facts(session).save_status()[1] == "Saved 8:41"
     session.document.dirty = True
-    assert facts(session).save_state()[1] == "Not saved · backed up"
+    assert facts(session).save_status()[1] == "Not saved · backed up"
 
 
 def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Session) -> None:
@@ -76,9 +76,9 @@ def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Sessio
     session.document._journal_error = (
         "can't back up unsaved work (No space left on device); save the file now"
     )
-    assert facts(session).save_state() == ("circle-x", "Not saved · no backup", "error")
+    assert facts(session).save_status() == ("circle-x", "Not saved · no backup", "error")
     session.document._journal_error = None
-    assert facts(session).save_state()[1] == "Not saved · backed up"
+    assert facts(session).save_status()[1] == "Not saved · backed up"
 
 
 def test_traffic_item_counts_nodes_topics_and_messages_of_the_live_network(session: fakes.Session) -> None:

@@ -398,7 +398,7 @@ def test_robots_chip_is_translated(pseudo, states: tuple[str, ...], run: str) ->
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
 def test_status_bar_items_are_translated(pseudo, session) -> None:
     facts = StatusFormatter(session())
-    told = [facts.health(), facts.save_state(), facts.topics(), facts.master(), facts.traffic()]
+    told = [facts.health(), facts.save_status(), facts.topics(), facts.master(), facts.traffic()]
     told += [facts.lost(), facts.displayed_messages(), facts.window()]
     for alert in list(facts._session.alerts.active):
         facts._session.alerts.resolve(alert.id)

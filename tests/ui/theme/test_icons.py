@@ -133,7 +133,7 @@ def test_copies_of_an_icon_outlive_the_original(theme: Theme) -> None:
     assert all(not copy.pixmap(QSize(16, 16), 1.0).isNull() for copy in copies)
 
 
-def test_repeatedly_painted_icon_is_rendered_once_with_identical_pixels(qapp) -> None:
+def test_cached_icon_is_rendered_once_and_looks_like_a_directly_painted_icon(qapp) -> None:
     def painted(paint: Callable[[QPainter], None]) -> QImage:
         image = QImage(40, 40, QImage.Format.Format_RGB32)
         image.setDevicePixelRatio(2.0)

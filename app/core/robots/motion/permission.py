@@ -100,7 +100,7 @@ class MotionPermission:
         self.revision = 0
 
     def is_allowed(self, robot: Robot) -> bool:
-        """Return True if this robot may move without asking the user."""
+        """Return True if this robot may be moved without asking the user."""
         return (
             robot.virtual
             or self._program_key(robot) in self._allowed

@@ -151,7 +151,7 @@ class StopReport:
         return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
     def with_unreached(self, names: Iterable[str], reason: str = "") -> StopReport:
-        """Return the report with a result added for each of these robots that is missing in it.
+        """Return the report with a result added for each of these robots that is missing from it.
 
         Args:
             names: Names of the robots that should have been stopped.

@@ -147,7 +147,7 @@ def columns(
 
     Args:
         stats: Statistics of the curves.
-        has_cursors: Returns True if there are cursors; the columns about A and B are hidden otherwise.
+        has_cursors: Returns True if there are cursors; the columns of cursors A and B are hidden otherwise.
         is_gone: Returns True for a curve whose topic no longer exists.
     """
     cells = _CellFactory(stats, is_gone)

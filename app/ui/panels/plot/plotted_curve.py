@@ -38,7 +38,7 @@ class PlotCurve:
         return self.curve.text
 
     def to_json(self) -> dict[str, object]:
-        """Return the state for the layout."""
+        """Return the state of the curve as a JSON object, which is saved with the layout."""
         source = self.curve.source
         state: dict[str, object] = {
             "text": self.name,

@@ -17,7 +17,7 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext, pgettext
 from nep.recordings.reader import RecordedTopic
 
-TABLE_HEIGHT = 150
+TABLE_HEIGHT_PX = 150
 
 
 class TopicList(QWidget):
@@ -48,7 +48,7 @@ class TopicList(QWidget):
         self.table.order_changed.connect(self._show_rows)
         self.table.filter_requested.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.table.setFixedHeight(round(theme.scaled(TABLE_HEIGHT)))
+        self.table.setFixedHeight(round(theme.scaled(TABLE_HEIGHT_PX)))
         row = Flow(gap=8, row_gap=6)
         for widget in (self.all, self.none):
             row.addWidget(widget)

@@ -71,7 +71,8 @@ class SayBar(QWidget):
     """Bar with a field for speech, its suggestions, and the menu of simulated events.
 
     Args:
-        awaited: Returns the values of an event's field that running or open programs react to.
+        awaited: Returns the values of an event's field that blocks in open behaviours react to, those of
+            the current behaviour first.
 
     Signals:
         speech_submitted: Text to say to the robot.

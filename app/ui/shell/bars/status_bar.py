@@ -104,7 +104,7 @@ class StatusFormatter:
         text = text if count > 1 else _("{robot} is connected")
         return "circle-dashed", text.format(robot=name, count=count), "off"
 
-    def save_state(self) -> StatusEntry:
+    def save_status(self) -> StatusEntry:
         """Return the time of the last save or, for unsaved changes, the state of the backup.
 
         The entry is empty for a behaviour without changes that wasn't saved yet.

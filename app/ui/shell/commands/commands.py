@@ -46,7 +46,7 @@ class Commands:
         self.variables = VariableCommands(shell, session, self.files)
         self.replay = ReplayCommands(shell, session, dialogs)
         self.files.open_recording = self.replay.open
-        self.files.open_layout = self.view.open_layout
+        self.files.open_layout = self.view.import_layout
         self._handlers = Handlers(
             session,
             shell,

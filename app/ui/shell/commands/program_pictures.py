@@ -58,7 +58,7 @@ class ImageCommands:
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
         self._shell, self._session, self._dialogs = shell, session, dialogs
 
-    def ask_save(self) -> None:
+    def save_as(self) -> None:
         """Ask for a file and format, then save the image."""
         suggestion = suggested_path(self._session.document)
 

@@ -197,7 +197,7 @@ COMMANDS: tuple[C, ...] = (
       separator_above=True),
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
-    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.ask_save(), "File",
+    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.save_as(), "File",
       icon="image-down", disabled_reason=_editor_disabled_reason),
     C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.show_dialog(), "File", ("Ctrl+P",),
       "printer", disabled_reason=_editor_disabled_reason),

@@ -377,9 +377,9 @@ class ViewCommands:
 
     def ask_layout(self) -> None:
         """Ask for a layout file and import it."""
-        self._files.dialogs.open_layout(str(Path.home()), self.open_layout)
+        self._files.dialogs.open_layout(str(Path.home()), self.import_layout)
 
-    def open_layout(self, path: Path) -> None:
+    def import_layout(self, path: Path) -> None:
         """Import a layout file and show the layout; an error is shown in a toast."""
         shell = self._shell
         try:
@@ -453,7 +453,7 @@ class ViewCommands:
         self._shell.panel_focus.focus(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
-        """Open the guide at the last viewed page."""
+        """Open the guide at the last selected entry of its list."""
         if self._guide is None:
             shell = self._shell
             self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)

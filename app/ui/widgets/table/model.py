@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
 CELL_ROLE = int(Qt.ItemDataRole.UserRole)
-MAX_RUNS = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
+MAX_REMOVED_RANGES = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
 _ROOT = QModelIndex()
 
 
@@ -233,7 +233,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
             return
         new_keys = set(keys)
         runs = _consecutive_runs([index for index, key in enumerate(self._rows.keys) if key not in new_keys])
-        if len(runs) > MAX_RUNS:
+        if len(runs) > MAX_REMOVED_RANGES:
             self.beginResetModel()
             self._rows = _Rows(list(rows), keys)
             self.endResetModel()

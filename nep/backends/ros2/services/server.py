@@ -18,7 +18,7 @@ from nep.backends.services import (
     limit_reply_size,
     rejection_reply,
 )
-from nep.backends.zeromq.sockets import RejectionLog
+from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import NepError
 from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
@@ -46,7 +46,7 @@ class Ros2Server:
         self.endpoints = ("ros2",)
         self._on_close = on_close
         self._participant = participant
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         self._type = service_type_for(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
             participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request

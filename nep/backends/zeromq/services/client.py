@@ -19,7 +19,7 @@ import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import RejectionLog, is_remote
+from nep.backends.zeromq.sockets import RejectionCounter, is_remote
 from nep.errors import (
     ClosedError,
     NepError,
@@ -154,7 +154,7 @@ class SocketClient:
         """Time at which the connection to an unlisted server is closed if new calls wait."""
         self._attempts = 0
         self._retry_at = 0.0
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
         self._is_closed = False
         self._replied = self._failed = self._late = 0
 

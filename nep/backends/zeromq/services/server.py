@@ -25,7 +25,7 @@ from nep.backends.services import (
 )
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import RejectionLog, Socket
+from nep.backends.zeromq.sockets import RejectionCounter, Socket
 from nep.errors import WireError
 from nep.protocol.requests import PublisherCount, clamp_count
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, Framing, Reply
@@ -51,7 +51,7 @@ class CallReader:
         self._service = service
         self._framing = framing
         self._stats = tally
-        self._rejections = RejectionLog()
+        self._rejections = RejectionCounter()
 
     def read(
         self,
