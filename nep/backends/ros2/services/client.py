@@ -41,6 +41,7 @@ class _Call:
     deadline: float
     callback: OutcomeCallback
     servers: frozenset[bytes] | None = None
+    is_server_missing: bool = False
 
     @property
     def size(self) -> int:
@@ -222,7 +223,7 @@ class Ros2Client(ClientCalls[_Call]):
     def expire(self, now: float) -> float:
         """Send waiting calls, fail expired ones, and return the next deadline. See `ExpiringClient.expire`.
 
-        Calls whose servers have disappeared fail as well.
+        Calls whose servers were missing at the previous check, too, fail as well.
         """
         with self._lock:
             is_waiting = any(each.servers is None for each in self._calls.values())
@@ -233,8 +234,11 @@ class Ros2Client(ClientCalls[_Call]):
         with self._lock:
             calls = tuple(self._calls.values())
         for call in calls:
-            if call.servers is not None and not call.servers & existing:
+            is_server_gone = call.servers is not None and not call.servers & existing
+            if is_server_gone and call.is_server_missing:
                 self._finish(call, ServerGoneError(self.spec.service))
+            elif is_server_gone:
+                call.is_server_missing = True  # its replies may have arrived, but not been read yet
             elif call.deadline <= now:
                 kind = NoServerError if call.servers is None else ServiceTimeoutError
                 self._finish(call, kind(self.spec.service, call.timeout_s or 0.0))
