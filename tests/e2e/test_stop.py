@@ -88,6 +88,7 @@ def test_f12_during_the_drag_of_a_field_stops(turning: Studio) -> None:
     turning.click("Developer")
     turning.click("Filter topics")
     turning.screen.type("pose")
+    until(lambda: len(turning.rows("Topics")) == 1, "only the topic of the pose is listed")
     turning.screen.click(*middle(turning.row("Topics", "/Pepper/pose")["rect"]))
     x, y = middle(turning.row("Newest message", "theta")["rect"])
     turning.screen.move(x, y)

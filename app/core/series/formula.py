@@ -191,7 +191,8 @@ class _Parser:
                 out.append(repr(float(duration[1]) * _UNIT_SECONDS[duration[2]]))
                 position, wants_value = duration.end(), False
                 continue
-            if letter == "_" and wants_value:
+            before = self._text[position - 1 : position]
+            if letter == "_" and not (before.isalnum() or before in {"_", "."}):  # only fields get such names
                 raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80]))
             out.append("**" if letter == "^" else letter)
             if not letter.isspace():

@@ -13,7 +13,7 @@ class Tab:
 
     Attributes:
         key: Key of the behaviour.
-        program: Latest workspace, in Blockly's JSON format.
+        workspace: Latest workspace, in Blockly's JSON format.
         generation: Number that changes when the workspace is replaced, to detect outdated edits.
         is_loaded: True if the page has loaded the tab.
         states: Newest payload of each state of the blocks, such as highlights, by name of the command.

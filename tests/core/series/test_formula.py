@@ -105,6 +105,8 @@ def test_window_functions_can_be_nested() -> None:
         ("True + /odom.x", "can't be evaluated"),
         ("abs(*[/odom.x])", "isn't a valid formula"),
         ("(y := /odom.x)", "isn't a valid formula"),
+        ("[_0]", "isn't a valid formula"),
+        ("/odom.x[_0] + (y := _0)", "isn't a valid formula"),
         ("1" * 350 + " * /odom.x", "can't be evaluated"),
     ],
 )
