@@ -72,13 +72,20 @@ def test_stack_with_invalid_shadow_blocks_is_preserved(person):
     assert person(state=state).newest() == state
 
 
+def is_on_grid(block: dict) -> bool:
+    """Return True if a block is at a point of the page's grid, whose spacing is 28."""
+    return block["x"] % 28 == block["y"] % 28 == 14
+
+
 def test_unknown_blocks_survive_moving_deleting_and_undo(qtbot, view, person):
     rover = {"type": "robot_rover_do_wave", "id": "r", "x": 140, "y": 140, "fields": {"A": 1}}
     them = person(rover)
     them.drag("[data-id=r]", QPoint(640, 400))
-    qtbot.waitUntil(lambda: them.tops()[0]["x"] > 300, timeout=WAIT_MS)
+    # the dropped block snaps to the grid after the next frame, which may be delayed
+    qtbot.waitUntil(lambda: them.tops()[0]["x"] > 300 and is_on_grid(them.tops()[0]), timeout=WAIT_MS)
     them.wait_for("!document.querySelector('.blocklyDragging')")
     moved = them.tops()[0]
+    assert is_on_grid(moved)
     assert {**moved, "x": 0, "y": 0} == {**rover, "x": 0, "y": 0}
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: them.tops() == [], timeout=WAIT_MS)
