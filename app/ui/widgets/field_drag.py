@@ -69,8 +69,9 @@ class FieldDrag(QObject):
         self._data = field_mime_data(topic, path)
         self._target: QWidget | None = None
         self._is_accepted = False
-        self._label = _floating_label(self._data.text())
-        self._watched = [source, *filter(None, [QApplication.focusWidget()])]
+        self._source = source
+        self._label = _floating_label(self._data.text(), source.window())
+        self._watched = {source, QApplication.focusWidget() or source}
         for widget in self._watched:
             widget.installEventFilter(self)
         QGuiApplication.setOverrideCursor(Qt.CursorShape.ForbiddenCursor)
@@ -78,16 +79,10 @@ class FieldDrag(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
-        if watched is self._watched[0]:
-            if kind == QEvent.Type.MouseMove and isinstance(event, QMouseEvent):
-                self._move(event.globalPosition().toPoint())
-                return True
-            if kind == QEvent.Type.MouseButtonRelease and isinstance(event, QMouseEvent):
-                self._move(event.globalPosition().toPoint())
-                self._drop(event.globalPosition().toPoint())
-                return True
-            if kind == QEvent.Type.Hide:
-                self.cancel()
+        if watched is self._source and kind == QEvent.Type.Hide:
+            self.cancel()
+        elif watched is self._source and isinstance(event, QMouseEvent):
+            return self._handle_mouse(event)
         if kind in {QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress} and isinstance(event, QKeyEvent):
             if event.key() != Qt.Key.Key_Escape:
                 return False
@@ -101,6 +96,17 @@ class FieldDrag(QObject):
         """End the drag without a drop."""
         self._leave()
         self._end()
+
+    def _handle_mouse(self, event: QMouseEvent) -> bool:
+        position = event.globalPosition().toPoint()
+        if event.type() == QEvent.Type.MouseButtonRelease and event.button() == Qt.MouseButton.LeftButton:
+            self._move(position)
+            self._drop(position)
+        elif event.buttons() & Qt.MouseButton.LeftButton:
+            self._move(position)
+        else:
+            self.cancel()  # another widget, such as a menu, received the release
+        return True
 
     def _move(self, position: QPoint) -> None:
         self._label.move(position + _LABEL_OFFSET)
@@ -133,7 +139,8 @@ class FieldDrag(QObject):
                 widget.removeEventFilter(self)
         self._target, self._is_accepted = None, False
         QGuiApplication.restoreOverrideCursor()
-        self._label.close()
+        if isValid(self._label):
+            self._label.close()
         self.deleteLater()
 
     def _send(self, kind: type[QDragEnterEvent | QDragMoveEvent], target: QWidget, position: QPoint) -> bool:
@@ -154,13 +161,12 @@ def _drop_target(position: QPoint) -> QWidget | None:
     return widget
 
 
-def _floating_label(text: str) -> QWidget:
+def _floating_label(text: str, window: QWidget) -> QWidget:
     widget = label(text, "code")
     widget.setProperty("raised", "true")
     widget.setContentsMargins(8, 4, 8, 4)
-    widget.setWindowFlags(
-        Qt.WindowType.ToolTip | Qt.WindowType.FramelessWindowHint | Qt.WindowType.WindowTransparentForInput
-    )
+    flags = Qt.WindowType.ToolTip | Qt.WindowType.FramelessWindowHint
+    widget.setParent(window, flags | Qt.WindowType.WindowTransparentForInput)
     widget.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
     widget.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
     widget.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -47,11 +47,16 @@ def widgets(qtbot) -> Iterator[tuple[QWidget, Target]]:
     window.close()
 
 
-def send(source: QWidget, kind: QEvent.Type, position: QPoint) -> None:
-    """Send a mouse event at a position in `source` with the left button."""
-    button = Qt.MouseButton.LeftButton
-    place, plain = QPointF(source.mapToGlobal(position)), Qt.KeyboardModifier.NoModifier
-    QApplication.sendEvent(source, QMouseEvent(kind, QPointF(position), place, button, button, plain))
+def send(
+    source: QWidget,
+    kind: QEvent.Type,
+    position: QPoint,
+    button: Qt.MouseButton = Qt.MouseButton.LeftButton,
+    held: Qt.MouseButton = Qt.MouseButton.LeftButton,
+) -> None:
+    """Send a mouse event at a position in `source`, by default with the left button held."""
+    location, plain = QPointF(source.mapToGlobal(position)), Qt.KeyboardModifier.NoModifier
+    QApplication.sendEvent(source, QMouseEvent(kind, QPointF(position), location, button, held, plain))
 
 
 def test_field_is_dropped_on_the_widget_under_the_mouse(qapp, widgets) -> None:
@@ -84,5 +89,34 @@ def test_escape_cancels_the_drag(qapp, widgets) -> None:
     send(source, QEvent.Type.MouseMove, QPoint(300, 100))
     QTest.keyClick(source, Qt.Key.Key_Escape)
     send(source, QEvent.Type.MouseButtonRelease, QPoint(300, 100))
+    assert target.events == ["entered", "left"]
+    assert QGuiApplication.overrideCursor() is None
+
+
+def test_another_button_does_not_end_the_drag(qapp, widgets) -> None:
+    source, target = widgets
+    FieldDrag(source, "/odom", "speed")
+    send(source, QEvent.Type.MouseMove, QPoint(300, 100))
+    send(source, QEvent.Type.MouseButtonRelease, QPoint(300, 100), Qt.MouseButton.RightButton)
+    assert target.events == ["entered"]
+    send(source, QEvent.Type.MouseButtonRelease, QPoint(300, 100))
+    assert target.events == ["entered", ("/odom", "speed")]
+
+
+def test_drag_ends_if_another_widget_received_the_release(qapp, widgets) -> None:
+    source, target = widgets
+    source.setMouseTracking(True)  # as the tree of the Inspector
+    FieldDrag(source, "/odom", "speed")
+    send(source, QEvent.Type.MouseMove, QPoint(300, 100))
+    send(source, QEvent.Type.MouseMove, QPoint(300, 100), held=Qt.MouseButton.NoButton)
+    assert target.events == ["entered", "left"]
+    assert QGuiApplication.overrideCursor() is None
+
+
+def test_hidden_source_ends_the_drag(qapp, widgets) -> None:
+    source, target = widgets
+    FieldDrag(source, "/odom", "speed")
+    send(source, QEvent.Type.MouseMove, QPoint(300, 100))
+    source.hide()
     assert target.events == ["entered", "left"]
     assert QGuiApplication.overrideCursor() is None
