@@ -25,7 +25,7 @@ def test_examples_have_the_expected_names_and_descriptions():
         ("Greeting", "Waves when it sees a face"),
         ("Reaction to touch", "Laughs when its head is touched"),
         ("Tour guide", "Walks to three stations and speaks"),
-        ("A quiz", "Asks questions; touch its head to answer “yes”"),
+        ("A quiz", "Touch its head to answer “yes”"),
         ("A dance", "Sways and blinks, using functions"),
         ("A careful walk", "Walks while nothing is in its way"),
         ("The finder", "Looks for the ball and for a face"),

@@ -257,7 +257,7 @@ class NoteIcon extends Blockly.icons.CommentIcon {
     return block instanceof Blockly.BlockSvg && !block.isDeadOrDying() && visibleBlockOf(block) !== block;
   }
 
-  /** Keeps the bubble in place while its block is hidden in a collapsed one and has no position of its own. */
+  /** Keeps the bubble in place while its block is hidden in a collapsed block and therefore has no position. */
   override onLocationChange(corner: Blockly.utils.Coordinate): void {
     const previousLocation = this.getBubbleLocation();
     const unfolded = this.wasHidden && !this.isHidden();

@@ -50,7 +50,7 @@ export class Source {
     this.hasEchoed = false;
   }
 
-  /** Whether nothing has been received for so long that the subscriber should reconnect. */
+  /** True if the subscriber should reconnect, because nothing was received for a long time. */
   get isSilent(): boolean {
     return this.endpoint !== undefined && !this.isConnected && performance.now() >= this.reconnectAt;
   }
