@@ -19,7 +19,7 @@ from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
         (1, 1, False), (1, 1.0, True), (1, True, True), (math.nan, math.nan, False), (None, 0, True),
         ([1], [1], False), ([1], [True], True), ({"a": [0]}, {"a": [False]}, True), ({}, [], True),
         ({"a": 1, "b": 2}, {"b": 2, "a": 1}, False), ([math.nan], [math.nan], False),
-        ([math.nan], [None], True),
+        ([math.nan], [None], True), ({1: None, "a": 2}, {1: None, "a": 2}, False),
         ({"a": b"x"}, {"a": b"x"}, False), ({"a": b"x"}, {"a": b"y"}, True), ("a", "a", False),
     ],
 )  # fmt: skip

@@ -185,15 +185,27 @@ def _are_equal(before: object, after: object) -> bool:
     # compare their JSON texts.
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
         return before == after
-    return size_of(before) == size_of(after) and _serialized(before) == _serialized(after)
+    if size_of(before) != size_of(after):
+        return False
+    serialized = _serialized(before)
+    if serialized != _serialized(after):
+        return False
+    may_have_nan = isinstance(serialized, bytes) and b"null" in serialized  # orjson serializes NaN as null
+    return not may_have_nan or _with_nan(before) == _with_nan(after)
+
+
+def _with_nan(value: object) -> str:
+    # JSON text with NaN; "" if keys of several types can't be sorted or the nesting is too deep.
+    try:
+        return json.dumps(value, sort_keys=True)
+    except (TypeError, RecursionError):
+        return ""
 
 
 def _serialized(value: object) -> object:
     # The serialized form compares as JSON does; values that JSON lacks (bytes in msgpack) are returned
     # unchanged.
     try:
-        serialized = orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
-        # orjson serializes NaN as null
-        return json.dumps(value, sort_keys=True) if b"null" in serialized else serialized
+        return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError):
         return value
