@@ -35,9 +35,9 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tools.computer import ROOT, Computer, Trouble, end, timed, venv_python
+from tools.computer import ROOT, CommandError, Computer, stop_process, timed, venv_python
 from tools.fuzz import fuzz
-from tools.system_packages import bring_system_packages, bring_test_packages
+from tools.system_packages import install_system_packages, install_test_packages
 from tools.versions import environment, pip, versions
 
 PYTHONS = ((3, 10), (3, 13))
@@ -56,11 +56,11 @@ SCRIPTS = {
 def stamp(folder: Path, extra: str) -> str:
     """Return a digest of the files that the environment depends on: pyproject.toml, pins, translations."""
     digest = hashlib.sha256()
-    made_of = [
+    files = [
         *sorted((folder / "requirements").glob("*.txt")),
         *sorted((folder / "nep").glob("locale/*/*/*.po")),
     ]
-    for path in (folder / "pyproject.toml", *made_of):
+    for path in (folder / "pyproject.toml", *files):
         digest.update(path.read_bytes())
     return f"{digest.hexdigest()} {extra}"
 
@@ -82,20 +82,20 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
     # An interrupted run must not leave a valid stamp.
     (folder / ".venv" / "nep-stamp").unlink(missing_ok=True)
     if not computer.ask([str(python), "-c", "import pip; print(pip.__version__)"]):
-        with timed("making the virtual environment .venv"):
-            make = [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")]
-            if computer.do(make, computer.environ, None) != 0:
-                raise Trouble("the virtual environment couldn't be created; Python's output is above")
-    with timed("installing the pinned packages (the first time some 250 MB are brought)"):
+        with timed("creating the virtual environment .venv"):
+            create = [sys.executable, "-m", "venv", "--clear", str(folder / ".venv")]
+            if computer.do(create, computer.environ, None) != 0:
+                raise CommandError("the virtual environment couldn't be created; Python's output is above")
+    with timed("installing the pinned packages (downloads about 250 MB the first time)"):
         install(computer, python, extra)
     probe = [str(python), "-c", "import PySide6.QtWebEngineWidgets"]
-    with timed("loading Qt WebEngine once"):
+    with timed("checking that Qt WebEngine loads"):
         if computer.do(probe, computer.environ, None) != 0:
-            raise Trouble("Qt WebEngine does not load; the library named above is missing on this computer")
-    with timed("compiling Studio, so that its first start is as quick as the later ones"):
+            raise CommandError("Qt WebEngine can't be loaded; install the system library named above")
+    with timed("compiling Studio to bytecode, for a fast first start"):
         # Compile errors appear on import anyway, and a read-only folder is no problem.
-        compile_ours = [str(python), "-m", "compileall", "-q", "-x", "node_modules", "app", "nep"]
-        computer.do(compile_ours, computer.environ, None)
+        compile_command = [str(python), "-m", "compileall", "-q", "-x", "node_modules", "app", "nep"]
+        computer.do(compile_command, computer.environ, None)
     (folder / ".venv" / "nep-stamp").write_text(stamp(folder, extra), encoding="utf-8")
     return python
 
@@ -103,25 +103,25 @@ def make_environment(computer: Computer, folder: Path, extra: str) -> Path:
 def install(computer: Computer, python: Path, extra: str) -> None:
     """Install the pinned packages and this folder with uv, or with pip if that fails.
 
-    uv takes a third of pip's time, but ignores pip's configuration, such as another package index.
+    uv is three times as fast as pip but ignores pip's configuration, such as another package index.
     """
     quiet = [] if sys.stdout.isatty() else ["--quiet"]
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *quiet]
-    # Hashes ensure that files are those that were tested. The project itself has none: it is this folder, and
+    # Hashes ensure that the tested files are installed. The project itself is this folder and has no hash;
     # its build dependencies are pinned.
     pinned = ["--require-hashes", "-r", f"requirements/{extra}.txt"]
     uv = [str(python), "-m", "uv", "pip", "install", "--python", str(python), "--no-config", *quiet]
     environ = {"UV_HTTP_RETRIES": "0", "UV_LINK_MODE": "copy"} | dict(computer.environ)
-    quickly = (
+    uv_steps = (
         [*pip, "--no-deps", "--require-hashes", "-r", "requirements/installer.txt"],
         [*uv, "--compile-bytecode", *pinned],
     )
-    if any(computer.do(step, environ, None) != 0 for step in quickly):
-        print("· the quick way did not go, see above: now by pip, which takes longer", flush=True)
+    if any(computer.do(step, environ, None) != 0 for step in uv_steps):
+        print("· uv failed, see above; installing with pip, which takes longer", flush=True)
         if computer.do([*pip, *pinned], computer.environ, None) != 0:
-            raise Trouble("the packages couldn't be installed; pip's output is above")
+            raise CommandError("the packages couldn't be installed; pip's output is above")
     if computer.do([*pip, "--no-deps", "--no-build-isolation", "-e", "."], computer.environ, None) != 0:
-        raise Trouble("Studio couldn't be installed; pip's output is above")
+        raise CommandError("Studio couldn't be installed; pip's output is above")
 
 
 @contextlib.contextmanager
@@ -145,21 +145,21 @@ def virtual_screen() -> Iterator[int]:
     """Start a virtual X display and yield its number."""
     program = shutil.which("Xvfb")
     if program is None:
-        raise Trouble("there is no screen, and no Xvfb to make a virtual one; install the package xvfb")
+        raise CommandError("no screen was found, and Xvfb is missing; install the package xvfb")
     reader, writer = os.pipe()
     command = [program, "-displayfd", str(writer), "-screen", "0", SCREEN, "-nolisten", "tcp"]
-    # In a session of its own, so that Ctrl+C ends the programs that draw on it first.
+    # In a session of its own, so that Ctrl+C stops the programs that use the display before the display.
     server = subprocess.Popen(command, pass_fds=[writer], start_new_session=True, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:
         with os.fdopen(reader) as output:
             number = output.readline().strip()
         if not number:
-            raise Trouble(f"the virtual screen did not start; try '{program} :99' to see why")
+            raise CommandError(f"the virtual screen didn't start; run '{program} :99' to see the error")
         yield int(number)
     finally:
         server.terminate()
-        end(server)
+        stop_process(server)
 
 
 def demo(computer: Computer, arguments: Sequence[str]) -> int:
@@ -168,13 +168,13 @@ def demo(computer: Computer, arguments: Sequence[str]) -> int:
     command = [str(python), "-m", "app", "--demo", *arguments]
     pictures = ROOT / "build" / "demo"
     if not computer.has_screen and "--self-drive" not in arguments:
-        print("· no screen here: Studio runs on a virtual one and does the main job alone", flush=True)
+        print("· no screen found: running Studio unattended on a virtual screen", flush=True)
         command += ["--self-drive", str(pictures)]
     with screen(computer) as environ:
         code = computer.do(command, environ, None)
     if "--self-drive" in command:
         images = sorted(pictures.glob("*.png"))
-        print(f"· {len(images)} pictures of the window are in {pictures}", flush=True)
+        print(f"· saved {len(images)} screenshots to {pictures}", flush=True)
     return code
 
 
@@ -187,7 +187,7 @@ def script(
     """Run one of the project's scripts in the environment; return its exit code."""
     path, extra = scripts[name]
     if not (ROOT / path).is_file():
-        raise Trouble(f"'{name}' needs '{path}', which this revision does not have")
+        raise CommandError(f"'{name}' needs '{path}', which doesn't exist in this revision")
     python = make_environment(computer, ROOT, extra)
     if name == "test" and not (computer.which("node") and computer.which("npm")):
         print(
@@ -204,7 +204,7 @@ def package(computer: Computer, arguments: Sequence[str]) -> int:
     python = environment(computer, sys.executable, folder, "package", is_for_oldest=True)
     install_command = [*pip(python), "--no-deps", "--no-build-isolation", "--force-reinstall", "."]
     if computer.do(install_command, computer.environ, None) != 0:
-        raise Trouble("Studio couldn't be installed; pip's output is above")
+        raise CommandError("Studio couldn't be installed; pip's output is above")
     forwarded = [each for each in arguments if each != "--"]
     return computer.do([str(python), "-m", "installers.package", *forwarded], computer.environ, None)
 
@@ -213,14 +213,14 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
     """Prepare this computer and run a command; return its exit code."""
     lowest, highest = PYTHONS
     if not lowest <= computer.version <= highest:
-        raise Trouble(
-            "Python {}.{} to {}.{} is needed, this is {}.{}".format(*lowest, *highest, *computer.version)
+        raise CommandError(
+            "Python {}.{} to {}.{} is needed; this is {}.{}".format(*lowest, *highest, *computer.version)
         )
     begin = time.monotonic()
     if command not in {"versions", "fuzz"}:  # these don't use Qt and need no system packages
-        bring_system_packages(computer)
+        install_system_packages(computer)
     if command == "test":
-        bring_test_packages(computer)
+        install_test_packages(computer)
     if command == "setup":
         make_environment(computer, ROOT, "dev")
         code = 0
@@ -244,7 +244,7 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
 def main(arguments: Sequence[str] | None = None, computer: Computer | None = None) -> int:
     """Run the command line and return the exit code: that of the command, or 2 or 130.
 
-    2 means that something is missing on this computer, 130 that the command was stopped by Ctrl+C.
+    2 means that a requirement is missing or an argument is invalid, 130 that Ctrl+C stopped the command.
     """
     args = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(
@@ -252,14 +252,14 @@ def main(arguments: Sequence[str] | None = None, computer: Computer | None = Non
     )
     parser.add_argument("command", choices=["demo", *SCRIPTS, "versions", "fuzz", "package", "setup"])
     command: str = parser.parse_args(args[:1]).command
-    # Remove the virtual screen also when the terminal closes or CI cancels the job.
+    # Exit normally, which stops the virtual screen, when the terminal closes or CI cancels the job.
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda number, _frame: sys.exit(128 + number))
     try:
         return run(computer or Computer(), command, args[1:])
-    except Trouble as trouble:
-        print(f"dev.py: {trouble}", file=sys.stderr)
+    except CommandError as error:
+        print(f"dev.py: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("\nstopped", file=sys.stderr)

@@ -12,12 +12,12 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling's own parameter says nothing here
+class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling doesn't specify it
     """Hook that hatchling runs before each build."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's call
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - signature of hatchling
         """Compile all message catalogues."""
         sys.path.insert(0, str(Path(__file__).resolve().parent))
-        from tools.words import compile_all  # noqa: PLC0415 - Babel is there only while something is built
+        from tools.words import compile_all  # noqa: PLC0415 - Babel is installed only for builds
 
         compile_all()

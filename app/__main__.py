@@ -142,8 +142,8 @@ def _main(arguments: Sequence[str]) -> int:
     from app.core.storage.settings import saved_language  # noqa: PLC0415  not needed by child processes of a frozen build
 
     # a self-test leaves the user's settings unchanged
-    tests_itself = any(argument.startswith("--selft") for argument in arguments)
-    set_initial_language("" if tests_itself else saved_language())
+    is_self_test = any(argument.startswith("--selft") for argument in arguments)
+    set_initial_language("" if is_self_test else saved_language())
     if arguments[:1] == ["run"]:
         return run_behaviour(arguments[1:])
     parser = window_parser()
@@ -209,16 +209,16 @@ def self_test(folder: Path, *, web: bool) -> int:
         print_error(f"nep-studio: {error}")
         return 2
 
-    def show() -> int:
+    def run_steps() -> int:
         test.start_step("program", _("the program was loaded"))
         importlib.import_module("app.core.session")
         raise_open_file_limit()
         from app.ui.self_test import run_window_steps  # noqa: PLC0415  import errors go into the report
 
-        return run_window_steps(test, web=web)
+        return run_window_steps(test, loads_web_view=web)
 
     gc.disable()  # as at every start of the window
-    code = test.run(show)
+    code = test.run(run_steps)
     outcome = test.report.failure or _("the self-test passed")
     with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
         (sys.stderr if code else sys.stdout).write(f"{outcome}: {test.environment.folder}\n")
@@ -267,17 +267,17 @@ def join_threads(within_s: float) -> tuple[str, ...]:
     Args:
         within_s: Maximum wait in seconds, for all threads together.
     """
-    until = time.monotonic() + within_s
-    others = [
+    deadline_s = time.monotonic() + within_s
+    other_threads = [
         thread
         for thread in threading.enumerate()
         if not thread.daemon
         and thread is not threading.current_thread()
         and thread is not threading.main_thread()
     ]
-    for thread in others:
-        thread.join(max(0.0, until - time.monotonic()))
-    return tuple(thread.name for thread in others if thread.is_alive())
+    for thread in other_threads:
+        thread.join(max(0.0, deadline_s - time.monotonic()))
+    return tuple(thread.name for thread in other_threads if thread.is_alive())
 
 
 def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
@@ -290,10 +290,12 @@ def end_process(code: int, within_s: float = JOIN_TIMEOUT_S) -> int:
         code: Exit code of the process.
         within_s: Maximum wait in seconds.
     """
-    running = join_threads(within_s)
-    if not running:
+    running_threads = join_threads(within_s)
+    if not running_threads:
         return code
-    _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in running))
+    _log.error(
+        "exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in running_threads)
+    )
     logging.shutdown()
     flush_streams()
     os._exit(code)

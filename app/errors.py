@@ -191,11 +191,11 @@ class RobotValueError(AppError, ValueError):
         place: Name of the invalid part of the value; "" for the whole value.
     """
 
-    def __init__(self, template: str, place: str = "", **holes: object) -> None:
+    def __init__(self, template: str, place: str = "", **placeholder_values: object) -> None:
         # `template` is a `lazy` text; its placeholder `place` and the others are filled here.
         self.place = place
-        self._template, self._holes = template, holes
-        super().__init__(_(template).format(place=place or _("the value"), **holes))
+        self._template, self._placeholder_values = template, placeholder_values
+        super().__init__(_(template).format(place=place or _("the value"), **placeholder_values))
 
     def nested_in(self, outer: str) -> RobotValueError:
         """Return this error for an outer value.
@@ -204,7 +204,7 @@ class RobotValueError(AppError, ValueError):
             outer: Name of the part of the outer value that contains the invalid value.
         """
         location = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
-        return RobotValueError(self._template, location, **self._holes)
+        return RobotValueError(self._template, location, **self._placeholder_values)
 
 
 class UnknownRobotError(AppError):

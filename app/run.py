@@ -73,8 +73,8 @@ def run_file(
         keep_position: True to leave virtual robots where they are; otherwise they are moved to their start
             position.
     """
-    ending = interrupted or threading.Event()
-    write_line = _LineWriter(out or sys.stdout, ending)
+    stop_requested = interrupted or threading.Event()
+    write_line = _LineWriter(out or sys.stdout, stop_requested)
     try:
         name, workspace, descriptions = read(Path(path))
         known_robots = _parse_descriptions(descriptions)
@@ -96,7 +96,9 @@ def run_file(
                 stopper.set_robots(
                     StopTarget(robot, discovered.owners.get(robot.name)) for robot in used_robots
                 )
-                return _run(program, discovered, _Connection(master, node, stopper), write_line, ending)
+                return _run(
+                    program, discovered, _Connection(master, node, stopper), write_line, stop_requested
+                )
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
@@ -144,7 +146,7 @@ def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
     parsed = parse_workspace(workspace)
     started = tuple(script for script in parsed.scripts if _START_BLOCK_TYPE.match(script[0].type))
     blocks = Workspace(started, parsed.variables).all_blocks()
-    return tuple(sorted({block.field_text("ROBOT") for block in blocks if block.enabled} - {""}))
+    return tuple(sorted({block.field_text("ROBOT") for block in blocks if block.is_enabled} - {""}))
 
 
 class _LineWriter:
@@ -152,12 +154,12 @@ class _LineWriter:
 
     Args:
         stream: Stream for the output.
-        ending: Event that is set if the stream can't be written any more.
+        stop_requested: Event that is set if the stream can't be written any more.
     """
 
-    def __init__(self, stream: TextIO, ending: threading.Event) -> None:
+    def __init__(self, stream: TextIO, stop_requested: threading.Event) -> None:
         self._stream = stream
-        self._ending = ending
+        self._stop_requested = stop_requested
         self._lock = threading.Lock()
         self._problem: str | None = None
 
@@ -175,10 +177,10 @@ class _LineWriter:
                 self._stream.write(line + "\n")
                 self._stream.flush()
             except (OSError, ValueError) as error:
-                is_gone = isinstance(error, (BrokenPipeError, ValueError))
+                is_closed = isinstance(error, (BrokenPipeError, ValueError))
                 reason = getattr(error, "strerror", None) or str(error)
-                self._problem = "" if is_gone else reason.lower()
-                self._ending.set()
+                self._problem = "" if is_closed else reason.lower()
+                self._stop_requested.set()
 
     def report_problem(self) -> None:
         # Silent when the reader closed the stream: that is a normal end.
@@ -209,7 +211,7 @@ def _rejection_exit_code(
     missing = sorted(set(robot_names) - {robot.name for robot in robots})
     if missing:
         write_line(
-            _("{robots} not found. Switch it on, or start the virtual robot.").format(
+            _("Not found: {robots}. Switch on the robots or start virtual ones.").format(
                 robots=format_list(missing)
             )
         )
@@ -221,17 +223,19 @@ def _rejection_exit_code(
 
 
 def _would_move(program: Program, robots: Sequence[Robot], write_line: Callable[[str], None]) -> bool:
-    real = [robot for robot in robots if not robot.virtual]
-    used_actions = actions_by_robot(program, real)
-    moves = {robot.name: risky_action_titles(robot, actions) for robot, actions in used_actions}
-    for name, titles in moves.items():
+    real_robots = [robot for robot in robots if not robot.virtual]
+    used_actions = actions_by_robot(program, real_robots)
+    risky_titles_by_robot = {
+        robot.name: risky_action_titles(robot, actions) for robot, actions in used_actions
+    }
+    for name, titles in risky_titles_by_robot.items():
         if titles:
             write_line(
-                _("{robot} would move ({actions}). Add --allow-moving if it may.").format(
+                _("{robot} would move ({actions}). To allow this, add --allow-moving.").format(
                     robot=name, actions=", ".join(titles)
                 )
             )
-    return any(moves.values())
+    return any(risky_titles_by_robot.values())
 
 
 def _reset_positions(node: nep.Node, robots: Sequence[Robot]) -> None:
@@ -270,29 +274,29 @@ def _run(
     if interrupted.is_set():
         return FAILED if write_line.has_failed else INTERRUPTED
     owners = {name: owner.node_id for name, owner in discovered.owners.items()}
-    late = _LateRobotMonitor(connection.node, runner) if program.publishes else None
+    late_robots = _LateRobotMonitor(connection.node, runner) if program.publishes else None
     try:
         runner.start(program, [robot.source for robot in discovered.robots], connection.master, owners=owners)
         while not runner.wait(POLL_INTERVAL_S) and not interrupted.is_set():
-            if late is not None:
-                late.poll()
+            if late_robots is not None:
+                late_robots.poll()
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
     with without_interrupts():
         # Immediately, and again when the program has ended and can't move the robots any more.
-        stopper.send_stop(ends=runner.program_key)
+        stopper.send_stop(program_key=runner.program_key)
         runner.close()
         names = [
             *(robot.name for robot in discovered.robots if robot.name in program.robots),
             *events.unresponsive_robots,
         ]
-        report = stopper.stop_all(names, ends=runner.program_key)
+        report = stopper.stop_all(names, program_key=runner.program_key)
         for line in stop_lines(report):
             write_line(line)
     if was_interrupted:
         return INTERRUPTED if not report.unconfirmed_robots and not write_line.has_failed else FAILED
-    return OK if events.ok and not report.unconfirmed_robots else FAILED
+    return OK if events.is_ok and not report.unconfirmed_robots else FAILED
 
 
 class _LateRobotMonitor:
@@ -300,11 +304,11 @@ class _LateRobotMonitor:
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
-        self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
+        self._next_poll_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
         self._known_topics: tuple[str, ...] = ()
 
     def poll(self) -> None:
-        if time.monotonic() < self._next_s:
+        if time.monotonic() < self._next_poll_s:
             return
         with suppress(NepError):
             view = self._node.graph()
@@ -315,7 +319,7 @@ class _LateRobotMonitor:
                 moving = moving_topics(view, map(controls_of, discovered.robots), unread)
                 self._runner.set_robots({}, moving.topics)
                 self._known_topics = topics if not unread else ()
-        self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
+        self._next_poll_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
 
 
 class _RunEvents:
@@ -323,19 +327,19 @@ class _RunEvents:
 
     def __init__(self, write_line: Callable[[str], None]) -> None:
         self._write_line = write_line
-        self._last = ""
-        self.ok = True
+        self._last_description = ""
+        self.is_ok = True
         self.unresponsive_robots: tuple[str, ...] = ()
 
     def __call__(self, event: RunnerEvent) -> None:
-        if event.kind == "running" and event.description != self._last:
-            self._last = event.description
+        if event.kind == "running" and event.description != self._last_description:
+            self._last_description = event.description
             if event.description:
                 self._write_line(event.description)
         elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
             self._write_line(event.text)
         if event.kind == "ended":
-            self.ok, self.unresponsive_robots = event.is_ok, event.unresponsive_robots
+            self.is_ok, self.unresponsive_robots = event.is_ok, event.unresponsive_robots
             if event.elapsed_s is not None:
                 self._write_line(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
 
@@ -346,17 +350,21 @@ def stop_lines(report: StopReport) -> list[str]:
     There is one line if all robots have stopped and no other program replied on their behalf,
     otherwise one for each robot and each such program.
     """
-    strange = [
+    impostor_lines = [
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name
         )
         for name, program in report.impostors
     ]
     if not report.robots:
-        return strange
-    others = [robot.message for robot in report.robots if not robot.is_confirmed]
-    if others or strange:
-        return [*(robot.message for robot in report.robots if robot.is_confirmed), *others, *strange]
+        return impostor_lines
+    unconfirmed_lines = [robot.message for robot in report.robots if not robot.is_confirmed]
+    if unconfirmed_lines or impostor_lines:
+        return [
+            *(robot.message for robot in report.robots if robot.is_confirmed),
+            *unconfirmed_lines,
+            *impostor_lines,
+        ]
     if len(report.robots) == 1:
         return [
             _("{robot} stopped ({elapsed} ms)").format(

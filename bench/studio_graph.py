@@ -109,10 +109,10 @@ class Runs:
         """Measure and print the window for `seconds`, with or without updates."""
         figures.go_on(on)
         run_for(2.0)
-        before = self.panel.canvas.painted
+        before = self.panel.canvas.paint_count
         self.rows[name] = self.meter.measure(seconds)
         figures.go_on(False)
-        show(name, self.rows[name], self.panel.canvas.painted - before)
+        show(name, self.rows[name], self.panel.canvas.paint_count - before)
 
     def place_all(self) -> float:
         """Expand every group and wait for the layout of all nodes.
@@ -124,7 +124,7 @@ class Runs:
         scene = panel.canvas.scene
         assert scene is not None
         every = frozenset(group.key for group in scene.graph.groups)
-        panel._options = replace(panel._options, toggled=every)  # noqa: SLF001
+        panel._options = replace(panel._options, toggled_groups=every)  # noqa: SLF001
         while len(late) < 2 or not placed(panel):
             late.append(self.meter.measure(0.25).late_max)
         print(

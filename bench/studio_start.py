@@ -63,7 +63,7 @@ app = module.make_application()
 at["application"] = now()
 session = module.Session()
 at["session"] = now()
-window = module.make_window(session, module.Options(new_window=True))
+window = module.make_window(session, module.Options(opens_new_window=True))
 at["built"] = now()
 class Eyes(QObject):
     def eventFilter(self, watched, event):

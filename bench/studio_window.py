@@ -87,7 +87,7 @@ def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
         session = Session(
             Settings(Path(home)), address=address, journal_folder=Path(home), start_processes=False
         )
-        window = make_window(session, Options(theme="light", new_window=True))
+        window = make_window(session, Options(theme="light", opens_new_window=True))
         window.show()
         window.start_session()
         window.commands.run(f"layout.{layout}")

@@ -18,11 +18,11 @@ UNUSED_OF_PYQTGRAPH = ("console", "dockarea", "examples", "exporters", "flowchar
 EXCLUDED_MODULES = (
     *(f"pyqtgraph.{name}" for name in UNUSED_OF_PYQTGRAPH),
     "PySide6.QtTest", "OpenGL", "numba", "cupy", "scipy",  # optional imports of pyqtgraph
-    "PySide6.QtQml", "PySide6.QtQuick",  # Chromium brings their libraries; their hooks add all of QML
+    "PySide6.QtQml", "PySide6.QtQuick",  # QtWebEngine needs only their libraries; their hooks add all of QML
     "tkinter", "_tkinter", "turtle", "idlelib", "lib2to3", "pydoc_data", "ensurepip", "pip", "setuptools",
     "wheel", "pkg_resources", "IPython", "matplotlib", "PIL", "pytest", "_pytest", "hypothesis", "mypy",
     "babel", "numpy.f2py", "numpy.distutils",
-    "readline",  # GNU's, under the General Public License; nothing of ours asks for lines by it
+    "readline",  # under the GNU General Public License; not used by Studio
 )  # fmt: skip
 
 _LANGUAGES = ("en", "es", "fr", "ja")
@@ -87,7 +87,7 @@ def is_wanted(name: str) -> bool:
     if _QT_FFMPEG.match(path.name) and ("PySide6" in parts or len(parts) == 1):
         return False
     if parts[:1] == ("pyqtgraph",):
-        return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(parts[1:3])  # colour maps have licences of their own
+        return not {*UNUSED_OF_PYQTGRAPH, "maps"} & set(parts[1:3])  # the colour maps have separate licences
     if parts[:1] == ("zstandard",) and path.name.startswith("_cffi."):
         return False  # second build of the library, for Pythons other than CPython
     if parts[:2] == ("cv2", "data"):

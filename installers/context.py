@@ -113,5 +113,5 @@ class Context:
             raise PackageError(f"'{arguments[0]}' can't be run: {error.strerror}") from error
         if completed.returncode != 0:
             raise PackageError(
-                f"'{Path(arguments[0]).name}' ended with {completed.returncode}; its words are above"
+                f"'{Path(arguments[0]).name}' exited with {completed.returncode}; its output is above"
             )

@@ -27,8 +27,8 @@ PAPER, EDGE = "#FFFFFF", "#8A94A6"
 
 def paint_program(painter: QPainter, rect: QRectF, theme: Theme) -> None:
     """Paint the logo with a small margin."""
-    room = rect.width() * MARGIN
-    paint_logo(painter, rect.adjusted(room, room, -room, -room), theme)
+    margin = rect.width() * MARGIN
+    paint_logo(painter, rect.adjusted(margin, margin, -margin, -margin), theme)
 
 
 def paint_behaviour(painter: QPainter, rect: QRectF, theme: Theme) -> None:
@@ -57,7 +57,7 @@ def main() -> int:
     _application = QApplication(sys.argv[:1])  # required by the theme
     theme, folder = Theme("light"), Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    is_well = True
+    is_saved = True
     for name, picture in PICTURES.items():
         for size in SIZES:
             image = QImage(size, size, QImage.Format.Format_ARGB32)
@@ -66,8 +66,8 @@ def main() -> int:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             picture(painter, QRectF(image.rect()), theme)
             painter.end()
-            is_well = image.save(str(folder / f"{name}-{size}.png")) and is_well
-    return 0 if is_well else 1
+            is_saved = image.save(str(folder / f"{name}-{size}.png")) and is_saved
+    return 0 if is_saved else 1
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python3 dev.py package                      packages of this system and client libraries
     python3 dev.py package -- --system clients  only nep for JavaScript, C# (NuGet) and Unity
     python3 dev.py package -- --system windows  Windows packages; on Linux with Wine
-    python3 dev.py package -- --keep-frozen     pack again without freezing
+    python3 dev.py package -- --keep-frozen     reuse the frozen program of an earlier build
 
 Also writes a bill of materials (CycloneDX) for each system, and the SHA-256 checksums.
 """
@@ -71,7 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="dev.py package", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--system", choices=[*SYSTEMS, CLIENTS])
-    parser.add_argument("--keep-frozen", action="store_true", help=f"take the '{APP}' that is frozen already")
+    parser.add_argument(
+        "--keep-frozen", action="store_true", help=f"reuse the frozen '{APP}' of an earlier build"
+    )
     options = parser.parse_args(arguments)
     contexts = [
         Context(system) for system in ([options.system] if options.system else [CLIENTS, this_system()])
@@ -88,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     sums = write_sums(dist)
     print(
-        f"· in {dist.name}/, after {time.monotonic() - start_s:.0f} s:\n{format_sizes([*paths, sums])}",
+        f"· built in {time.monotonic() - start_s:.0f} s, in {dist.name}/:\n{format_sizes([*paths, sums])}",
         flush=True,
     )
     return 0

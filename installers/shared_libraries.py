@@ -21,12 +21,12 @@ def remove_unneeded(folder: Path, users: Iterable[Path], needed_by: Callable[[Pa
         users: Binaries that may be linked with the libraries.
         needed_by: Returns the names of the libraries that a file is linked with.
     """
-    waiting, needed = list(users), set[str]()
-    while waiting:
-        for name in needed_by(waiting.pop()):
+    unchecked, needed = list(users), set[str]()
+    while unchecked:
+        for name in needed_by(unchecked.pop()):
             if name not in needed and (folder / name).is_file():
                 needed.add(name)
-                waiting.append(folder / name)
+                unchecked.append(folder / name)
     for path in folder.iterdir():
         if path.name not in needed:
             path.unlink()

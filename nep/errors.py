@@ -461,14 +461,14 @@ class TooManyFilesError(NepError):
         self.opened = opened
         self.limit = limit
         if opened is not None and limit is not None:
-            has = _("this program has {opened} of {limit} files open").format(opened=opened, limit=limit)
+            usage = _("this program has {opened} of {limit} files open").format(opened=opened, limit=limit)
         else:
-            has = _("this program has reached its limit of open files")
+            usage = _("this program has reached its limit of open files")
         step = _(
             "close unused nodes and files, or raise the limit with 'ulimit -n {files}' before you start it"
         )
         step = step.format(files=max(8192, 2 * (limit or 0)))
-        super().__init__(_("can't create {what}: {has}; {step}").format(what=what, has=has, step=step))
+        super().__init__(_("can't create {what}: {has}; {step}").format(what=what, has=usage, step=step))
 
 
 class EncodeError(NepError, ValueError):

@@ -122,13 +122,13 @@ class Quaternion:
                 )
             )
         x, y, z, w = (each / length for each in (self.x, self.y, self.z, self.w))
-        up = 2.0 * (w * y - z * x)
-        if abs(up) > 1.0 - 1e-12:
-            yaw = math.copysign(2.0, -up) * math.atan2(x, w)
-            return 0.0, math.copysign(math.pi / 2, up), math.remainder(yaw, math.tau)
+        sin_pitch = 2.0 * (w * y - z * x)
+        if abs(sin_pitch) > 1.0 - 1e-12:
+            yaw = math.copysign(2.0, -sin_pitch) * math.atan2(x, w)
+            return 0.0, math.copysign(math.pi / 2, sin_pitch), math.remainder(yaw, math.tau)
         return (
             math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            math.asin(up),
+            math.asin(sin_pitch),
             math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
         )
 

@@ -1,4 +1,4 @@
-"""Translations of user-visible text, by gettext. A wrong translation falls back to English.
+"""Translations of user-visible text, by gettext. A translation with wrong placeholders falls back to English.
 
     from nep.i18n import _, ngettext
 
@@ -79,23 +79,23 @@ class _Catalogue:
         self.language = language
         self._translations = translations
         self._metadata = metadata
-        self._checked: dict[tuple[str | None, str], str] = {}
-        self._rejected: set[str] = set()
+        self._checked_translations: dict[tuple[str | None, str], str] = {}
+        self._rejected_translations: set[str] = set()
 
     def translate(self, context: str | None, english: str) -> str:
         if self._translations is None or not english:
             return english
         key = context, english
-        if key not in self._checked:
+        if key not in self._checked_translations:
             translation = (
                 self._translations.gettext(english)
                 if context is None
                 else self._translations.pgettext(context, english)
             )
-            self._checked[key] = (
+            self._checked_translations[key] = (
                 translation if self._has_same_placeholders(translation, (english,)) else english
             )
-        return self._checked[key]
+        return self._checked_translations[key]
 
     def translate_plural(self, singular: str, plural: str, count: int) -> str:
         if self._translations is not None:
@@ -108,8 +108,8 @@ class _Catalogue:
         # Both must have the same placeholders. A mismatch is logged once.
         if translation in english or placeholders(translation) in [placeholders(each) for each in english]:
             return True
-        if translation not in self._rejected:
-            self._rejected.add(translation)
+        if translation not in self._rejected_translations:
+            self._rejected_translations.add(translation)
             _log.warning(
                 "the translation '%s' doesn't have the placeholders of '%s'; using English",
                 translation,
@@ -276,8 +276,10 @@ def number(value: float, spec: str = "g") -> str:
     """Format a number with the decimal and group separators of the current language."""
     catalogue = _current_catalogue()
     text = format(value, spec)
-    signs = {".": catalogue.metadata_text("decimal", "."), ",": catalogue.metadata_text("group", ",")}
-    return text if signs == {".": ".", ",": ","} else "".join(signs.get(each, each) for each in text)
+    separators = {".": catalogue.metadata_text("decimal", "."), ",": catalogue.metadata_text("group", ",")}
+    return (
+        text if separators == {".": ".", ",": ","} else "".join(separators.get(each, each) for each in text)
+    )
 
 
 def day_text(day: int, month: int, year: int | None = None) -> str:

@@ -47,18 +47,18 @@ _grace = leftovers.Grace(_GRACE_S, _GRACE_AFTER_LEAK_S)
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add ``--driver FILE`` (test the drivers of this file, too) and ``--long`` (run all tests)."""
-    told = "a driver of yours to hold tests/robots/driver/test_contract.py against (may be given again)"
-    told_long = (
+    long_help = (
         "run all tests: also those marked long, the groups of tests/long_groups.py, and each fault alone"
     )
-    parser.addoption("--long", action="store_true", help=told_long)
-    parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
-    told = "the same for a driver program in any language, by its command (docs/write-a-driver.md)"
-    parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=told)
+    driver_help = "also test the driver in this file with tests/robots/driver/test_contract.py (repeatable)"
+    command_help = "the same for a driver program in any language, by its command (docs/write-a-driver.md)"
+    parser.addoption("--long", action="store_true", help=long_help)
+    parser.addoption("--driver", action="append", default=[], metavar="FILE", help=driver_help)
+    parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=command_help)
     if importlib.util.find_spec("pytestqt") is None:
         # Without pytest-qt (dev.py versions), its options must still be accepted; they have no effect.
         for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):
-            parser.addini(name, "an option of pytest-qt, which is not here", type="linelist")
+            parser.addini(name, "an option of pytest-qt, which is not installed", type="linelist")
 
 
 def _selected(config: pytest.Config) -> tuple[tuple[str, ...], str | None]:
@@ -120,7 +120,7 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
 
 
 @pytest.fixture(autouse=True)
-def _nothing_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
+def _fail_on_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
     """Fail a test that leaves a thread, socket, pipe or file open; the check takes 0.4 ms per test."""
     threads, open_before = leftovers.threads(), leftovers.descriptors()
     yield
@@ -130,11 +130,11 @@ def _nothing_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     left = sorted(thread.name for thread in leftovers.threads() - threads)
     if left:
         _grace.add_leak(request.path)
-        pytest.fail(f"threads are left behind: {left}")
-    refused = _allowances.refused(open_before, deadline)
-    if refused:
+        pytest.fail(f"leaked threads: {left}")
+    leaked = _allowances.leaked(open_before, deadline)
+    if leaked:
         _grace.add_leak(request.path)
-        pytest.fail(f"descriptors are left behind: {refused}")
+        pytest.fail(f"leaked descriptors: {leaked}")
 
 
 def _end_if_stuck(item: pytest.Item) -> None:
@@ -167,15 +167,15 @@ def pytest_runtest_logfinish() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _crashes_are_told(pytestconfig: pytest.Config) -> Iterator[None]:
+def _restore_fault_handler(pytestconfig: pytest.Config) -> Iterator[None]:
     """Restore pytest's fault handler, which Studio's own crash handler replaces.
 
     Without it, a worker that crashes would leave no message.
     """
     yield
-    told_to = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest's copy of the real stderr
-    if told_to is not None:
-        faulthandler.enable(told_to)
+    stderr = pytestconfig.stash.get(fault_handler_stderr_fd_key, None)  # pytest's copy of the real stderr
+    if stderr is not None:
+        faulthandler.enable(stderr)
 
 
 @pytest.fixture

@@ -27,8 +27,8 @@ VALUES: Mapping[str, str] = {
     "-1e999": "-1e999",
     "NaN": "NaN",
     "empty text": '""',
-    "half letter": r'"\ud800"',
-    "control letters": json.dumps("\x1b]0;x\x07\u202e\u2028\x00\n"),
+    "lone surrogate": r'"\ud800"',
+    "control characters": json.dumps("\x1b]0;x\x07\u202e\u2028\x00\n"),
     "path": '"../../etc/passwd"',
     "braces": '"{0} {name} %s %n {0.__class__}"',
     "long text": json.dumps("n" * 20_000),
@@ -36,7 +36,7 @@ VALUES: Mapping[str, str] = {
     "empty map": "{}",
     "list of lists": "[[[[]]], [1, null], {}]",
     "map of maps": '{"": {"a": {"b": null}}, "__proto__": []}',
-    "half letter as name": r'{"\udc80": 1}',
+    "lone surrogate as name": r'{"\udc80": 1}',
     "60 levels": "[" * 50 + "{}" + "]" * 50,
     "1000 lists": "[" * LEVELS + "]" * LEVELS,
     "1000 maps": '{"a":' * LEVELS + "1" + "}" * LEVELS,
@@ -45,7 +45,7 @@ VALUES: Mapping[str, str] = {
 }
 """Fragments of JSON by description."""
 
-WHOLES: tuple[bytes, ...] = (
+INVALID_PAYLOADS: tuple[bytes, ...] = (
     *(each.encode() for each in VALUES.values()),
     b"",
     b"{",
@@ -77,7 +77,7 @@ def with_long_name(message: Mapping[str, object]) -> Iterator[bytes]:
 
 def payloads(*messages: Message, share: int = 1) -> Iterator[bytes]:
     """Yield every hostile payload for a receiver of these messages. `share` as in `in_every_field`."""
-    yield from WHOLES
+    yield from INVALID_PAYLOADS
     for message in messages:
         yield from in_every_field(message, share)
 

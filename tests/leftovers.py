@@ -31,13 +31,13 @@ FIRST_USES = {"anon_inode:": 8, "unnamed socket": 3, "pipe:": 2}
 
 Examples are libzmq's context, and Qt's file dialog and network. The limit is for the whole process.
 """
-POOLED = "Thread (pooled)"
+POOL_THREAD = "Thread (pooled)"
 """System name of the threads in Qt's thread pools.
 
-They start with large images and end after an idle time. Each has one descriptor, and no test can end
-it.
+They are started for large images and exit after an idle time. Each has one descriptor, which tests can't
+close.
 """
-_OF_POOLED = "anon_inode:[eventfd]"
+_POOL_DESCRIPTOR = "anon_inode:[eventfd]"
 PAGE = "QtWebEngineProcess"
 _FD = "/proc/self/fd"
 _CLOSED_SOON_S = 0.3
@@ -62,7 +62,7 @@ def descriptors() -> dict[int, str]:
         listening = [each for each in _connections() if each.status == psutil.CONN_LISTEN]
         return {hash(each.laddr): f"listening {each.laddr}" for each in listening}
     found = {}
-    for name in os.listdir(_FD):  # noqa: PTH208 - after every test: paths take three times as long
+    for name in os.listdir(_FD):  # noqa: PTH208 - runs after every test; pathlib takes three times as long
         try:
             found[int(name)] = os.readlink(f"{_FD}/{name}")  # noqa: PTH115 - see above
         except OSError:
@@ -83,7 +83,7 @@ def _connections() -> list[Any]:
     return psutil.Process().net_connections(kind="inet")
 
 
-def told(number: int, target: str) -> str:
+def describe(number: int, target: str) -> str:
     """Return a description of a descriptor (socket address or file path), or "" when it is closed."""
     if not target.startswith("socket:"):
         return target
@@ -107,7 +107,7 @@ def _is_unnamed(family: str, address: object) -> bool:
 class Grace:
     """Time for threads to end and descriptors to close after a test.
 
-    It is shorter once a test of the file leaked: a leak takes the whole time, and one mistake often
+    It is shorter after a leak in the same file: a leak takes the whole time, and one mistake often
     makes all tests of a file leak.
     """
 
@@ -131,7 +131,7 @@ class Allowances:
     def __init__(self) -> None:
         self._left = Counter(FIRST_USES)
 
-    def refused(self, before: dict[int, str], deadline: float) -> list[str]:
+    def leaked(self, before: dict[int, str], deadline: float) -> list[str]:
         """Return descriptions of the descriptors that were opened since ``before`` and must not stay open.
 
         libzmq and Qt close descriptors in their own threads, which is slow on a busy computer: wait
@@ -164,13 +164,13 @@ def _wait(done: Callable[[], bool], deadline: float) -> None:
 def _opened(before: dict[int, str]) -> list[str]:
     """Return descriptions of the descriptors opened since, without those that libraries keep open."""
     opened = [
-        told(number, target) for number, target in descriptors().items() if before.get(number) != target
+        describe(number, target) for number, target in descriptors().items() if before.get(number) != target
     ]
     left = sorted(each for each in opened if each and not KEPT.match(each))
-    if _OF_POOLED in left:
+    if _POOL_DESCRIPTOR in left:
         for _thread in range(_pooled_threads()):
-            if _OF_POOLED in left:
-                left.remove(_OF_POOLED)
+            if _POOL_DESCRIPTOR in left:
+                left.remove(_POOL_DESCRIPTOR)
     return left
 
 
@@ -179,7 +179,7 @@ def _pooled_threads() -> int:
     found = 0
     for name in Path("/proc/self/task").glob("*/comm"):
         with suppress(OSError):  # the thread has just ended
-            found += name.read_text().strip() == POOLED
+            found += name.read_text().strip() == POOL_THREAD
     return found
 
 

@@ -2,9 +2,9 @@
 
     def test_every_word_is_translated(pseudo) -> None:
         shown = visible_text()                       # "[Ƥéƥƥéř đíđ ñóť áñšŵéř ~~~~]"
-        assert untranslated(shown, "Pepper") == []   # data is passed by name: it is never translated
+        assert untranslated(shown, "Pepper") == []   # data, which is never translated
 
-The fixture ``pseudo`` is in tests/conftest.py. A sentence that is not marked (by `_`, `lazy`, `plazy`,
+The fixture ``pseudo`` is in tests/conftest.py. A text that is not marked (by `_`, `lazy`, `plazy`,
 `ngettext`, `pgettext`, as text of a block or of an example) stays English, even if it is passed to `_`.
 Use `untranslated_in` for a widget and its children. Neither Babel nor compiled catalogues are needed.
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[1]
 MARKS = {"_": 1, "gettext": 1, "lazy": 1, "ngettext": 2, "pgettext": 2, "plazy": 2}
-"""Functions that mark sentences, and how many string arguments each has."""
+"""Functions that mark translatable texts, with their number of string arguments."""
 UNITS = frozenset({
     "GB", "Hz", "KB", "MB", "TB", "cm", "deg", "fps", "kB", "kHz", "km", "mW", "min", "mm", "ms", "ns", "px",
     "rad",
@@ -52,7 +52,7 @@ _FACTS: Mapping[str, object] = {
 
 
 class _Pseudo(NullTranslations):
-    """Translations of the marked sentences into the pseudo-language."""
+    """Translations of the marked texts into the pseudo-language."""
 
     def gettext(self, message: str) -> str:
         return pseudo(message) if (None, message) in marked() else message
@@ -72,7 +72,7 @@ def words() -> object:
 
 @lru_cache(maxsize=1)
 def marked() -> frozenset[tuple[str | None, str]]:
-    """Return (context, sentence) of every marked sentence; for `ngettext`, (singular, plural)."""
+    """Return (context, text) of every marked text; for `ngettext`, (singular, plural)."""
     told = (*sentences_of_blocks(), *sentences_of_examples())
     found: set[tuple[str | None, str]] = {(context, english) for context, english, _place in told}
     for folder in ("nep", "app"):
@@ -114,7 +114,7 @@ def untranslated_in(widget: QWidget, *data: str, hidden: bool = True) -> list[st
 
 
 def texts_of(widget: QWidget, *, hidden: bool = True) -> Iterator[tuple[str, str]]:
-    """Yield place and text of all that a widget and its children show, with tool tips, accessible names."""
+    """Yield the place and text of every text of a widget and its children, including tool tips."""
     from PySide6.QtWidgets import QWidget
 
     for each in (widget, *widget.findChildren(QWidget)):

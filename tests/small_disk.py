@@ -22,13 +22,13 @@ class SmallDisk:
         """Skip the test on systems that do not permit mounting."""
         unshare = shutil.which("unshare")
         if unshare is None:
-            pytest.skip("a disk of one's own needs Linux with unshare")
+            pytest.skip("needs Linux with unshare")
         self.folder = folder
         self._unshare = [unshare, "-rm", "sh", "-c"]
         self._mount = f"mount -t tmpfs -o size=256k,mode=777 none '{folder}'"
         tried = subprocess.run([*self._unshare, self._mount], check=False, capture_output=True)
         if tried.returncode:
-            pytest.skip("this computer does not permit disks of one's own (unshare -rm)")
+            pytest.skip("needs permission for user namespaces (unshare -rm)")
 
     def run(self, code: str, before: str = "true") -> dict[str, object]:
         """Run a Python program with the folder as its argument; return the object that it prints as JSON.

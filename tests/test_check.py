@@ -15,7 +15,7 @@ from tools.check import ROOT, Check, Outcome, checks, run, run_all, summary
 
 def test_checks_run_in_order_with_tests_last() -> None:
     names = [check.name for check in checks(fast=False)]
-    assert names == ["ruff check", "ruff format", "mypy", "lint-imports", "tests read", "pytest"]
+    assert names == ["ruff check", "ruff format", "mypy", "lint-imports", "collect tests", "pytest"]
     assert [check.name for check in checks(fast=True)] == names[:-2]
 
 

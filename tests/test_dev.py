@@ -71,35 +71,35 @@ class FakeSystem:
 
 def test_no_command_runs_when_no_package_is_missing() -> None:
     system = FakeSystem(installed=set(PACKAGES))
-    dev.bring_system_packages(system.computer())
+    dev.install_system_packages(system.computer())
     assert system.ran == []
 
 
 def test_only_missing_packages_are_installed_without_refreshing_valid_lists() -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
-    dev.bring_system_packages(system.computer())
+    dev.install_system_packages(system.computer())
     assert [command[-1] for command in system.ran] == ["libnss3"]
     assert "DPkg::Lock::Timeout=600" in system.ran[0]
 
 
 def test_missing_package_lists_are_refreshed_first() -> None:
     system = FakeSystem(served={*PACKAGES, "xvfb", "python3.11-venv"})
-    dev.bring_system_packages(system.computer(environ={}, has_ensurepip=False))
+    dev.install_system_packages(system.computer(environ={}, has_ensurepip=False))
     assert ["update" in command for command in system.ran] == [True, False]
     assert {*PACKAGES, "xvfb", "python3.11-venv"} <= system.installed
 
 
 def test_package_lists_are_refreshed_after_a_failure_and_a_second_failure_is_reported() -> None:
     system = FakeSystem(listed=set(PACKAGES), fails=True)
-    with pytest.raises(dev.Trouble, match="no space left"):
-        dev.bring_system_packages(system.computer())
+    with pytest.raises(dev.CommandError, match="no space left"):
+        dev.install_system_packages(system.computer())
     assert [("update" in command) for command in system.ran] == [False, True, False]
 
 
 def test_unavailable_package_is_named() -> None:
     system = FakeSystem(served=set(PACKAGES) - {"libnss3"})
-    with pytest.raises(dev.Trouble, match="no package for libnss3"):
-        dev.bring_system_packages(system.computer())
+    with pytest.raises(dev.CommandError, match="no package for libnss3"):
+        dev.install_system_packages(system.computer())
 
 
 @pytest.mark.parametrize("name", ["libasound2", "libasound2t64"])
@@ -114,9 +114,9 @@ def test_package_is_recognized_by_its_former_and_current_name(name: str) -> None
 
 def test_user_without_root_is_shown_the_install_command() -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3", "libgl1"}, listed={"libgl1"})
-    with pytest.raises(dev.Trouble) as trouble:
-        dev.bring_system_packages(system.computer(root=False))
-    line = str(trouble.value).splitlines()[-1]
+    with pytest.raises(dev.CommandError) as raised:
+        dev.install_system_packages(system.computer(root=False))
+    line = str(raised.value).splitlines()[-1]
     assert line.startswith("  sudo apt-get update && sudo apt-get install -y")
     assert line.endswith("libgl1 libnss3")
     assert system.ran == []
@@ -127,14 +127,14 @@ def test_test_packages_are_installed_by_root_and_printed_for_users_without_root(
 ) -> None:
     names = {name for packages in system_packages.TEST_PACKAGES.values() for name in packages}
     system = FakeSystem(listed=names)
-    system_packages.bring_test_packages(system.computer(root=False))
+    system_packages.install_test_packages(system.computer(root=False))
     assert system.ran == []
     printed = capsys.readouterr().out
     assert all(name in printed for name in names)
-    system_packages.bring_test_packages(system.computer())
+    system_packages.install_test_packages(system.computer())
     assert system.installed >= names
     ran = len(system.ran)
-    system_packages.bring_test_packages(system.computer())
+    system_packages.install_test_packages(system.computer())
     assert len(system.ran) == ran
 
 
@@ -143,7 +143,7 @@ def test_unavailable_test_packages_do_not_block_installing_the_available_package
 ) -> None:
     mono, *others = system_packages.TEST_PACKAGES.values()
     system = FakeSystem(served={name for packages in others for name in packages})
-    system_packages.bring_test_packages(system.computer())
+    system_packages.install_test_packages(system.computer())
     assert system.installed.isdisjoint(mono)
     assert system.installed >= {name for packages in others for name in packages}
     assert "mono-mcs" in capsys.readouterr().out
@@ -162,14 +162,14 @@ def test_system_packages_are_not_installed_outside_linux_or_without_apt() -> Non
     for platform in ("win32", "darwin"):
         computer = system.computer(platform=platform, environ={})
         assert computer.has_screen
-        dev.bring_system_packages(computer)
-    dev.bring_system_packages(replace(system.computer(), which=lambda name: None))
+        dev.install_system_packages(computer)
+    dev.install_system_packages(replace(system.computer(), which=lambda name: None))
     assert system.ran == []
 
 
 def test_unsupported_python_version_is_rejected_with_the_range() -> None:
     for version in ((3, 9), (3, 14)):
-        with pytest.raises(dev.Trouble, match=r"3\.10 to 3\.13 is needed"):
+        with pytest.raises(dev.CommandError, match=r"3\.10 to 3\.13 is needed"):
             dev.run(FakeSystem().computer(version=version), "test", [])
 
 
@@ -194,7 +194,7 @@ def test_packages_are_installed_once_and_again_when_the_pins_change(folder: Path
     for _ in range(2):
         assert dev.make_environment(fake_pip(system), folder, "dev") == folder / ".venv" / "bin" / "python"
     assert [("install" in command) for command in system.ran] == [True, True, True, False, False]
-    assert "compileall" in system.ran[4], "the first start is to be as quick as the later ones"
+    assert "compileall" in system.ran[4], "the first start must not compile"
     (folder / "requirements" / "dev.txt").write_text("other", encoding="utf-8")
     dev.make_environment(fake_pip(system), folder, "dev")
     assert len(system.ran) == 10
@@ -223,7 +223,7 @@ def test_pip_is_used_if_uv_cannot_be_installed_or_fails(
         return 1 if missing in command else 0
 
     dev.make_environment(replace(fake_pip(system), do=do), folder, "studio")
-    assert "by pip, which takes longer" in capsys.readouterr().out
+    assert "installing with pip, which takes longer" in capsys.readouterr().out
     packages, ours = [command for command in system.ran if "install" in command][-2:]
     assert "uv" not in packages
     assert packages[-3:] == ("--require-hashes", "-r", "requirements/studio.txt")
@@ -241,7 +241,7 @@ def test_dev_environment_satisfies_studio_and_studio_environment_does_not_satisf
 
 def test_failed_installation_raises_and_the_environment_stays_outdated(folder: Path) -> None:
     failing = replace(fake_pip(FakeSystem()), do=lambda command, environ, log: 1)
-    with pytest.raises(dev.Trouble, match="packages couldn't be installed"):
+    with pytest.raises(dev.CommandError, match="packages couldn't be installed"):
         dev.make_environment(failing, folder, "dev")
     assert not dev.is_fresh(folder, "dev")
 
@@ -311,7 +311,7 @@ def test_ctrl_c_ends_child_processes_that_ignore_the_signal(handler: str) -> Non
 
 def test_missing_script_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     lacking = {"nothing": ("tools/nothing.py", "dev")}
-    with pytest.raises(dev.Trouble, match=r"'nothing' needs 'tools/nothing.py'"):
+    with pytest.raises(dev.CommandError, match=r"'nothing' needs 'tools/nothing.py'"):
         dev.script(FakeSystem().computer(), "nothing", [], lacking)
 
 

@@ -24,7 +24,7 @@ from trove_classifiers import classifiers
 
 from nep.version import __version__
 from tools.computer import venv_python
-from tools.versions import PROMISED
+from tools.versions import SUPPORTED
 
 # time for two builds and an installation on a busy computer
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -124,9 +124,9 @@ def test_distribution_metadata_matches_the_version_licence_and_supported_pythons
     assert set(told.classifiers) <= classifiers
     assert told.requires_python is not None
     named = {found[1] for each in told.classifiers if (found := re.search(r":: (3\.\d+)$", each))}
-    assert named == set(PROMISED)
+    assert named == set(SUPPORTED)
     assert {minor for minor in range(30) if f"3.{minor}" in told.requires_python} == {
-        int(version.partition(".")[2]) for version in PROMISED
+        int(version.partition(".")[2]) for version in SUPPORTED
     }
     with zipfile.ZipFile(built.wheel) as archive:
         about = f"nep_studio-{__version__}.dist-info"

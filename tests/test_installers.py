@@ -1,4 +1,4 @@
-"""Tests of the files that make a double click on a .nepb file open Studio: desktop, MIME type, registry."""
+"""Tests of the files that associate .nepb files with Studio: desktop entry, MIME type, registry."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_tidy_again():
     pass
 """
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells descriptors")
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc/self/fd")
 
 
 @pytest.fixture(scope="module")
@@ -88,14 +88,14 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.parametrize(
     ("test", "words"),
     [
-        ("test_a_thread_of_a_log", "threads are left behind: ['talker log']"),
-        ("test_a_port", "descriptors are left behind: [\"listening socket ('127.0.0.1', "),
-        ("test_a_connection", "descriptors are left behind: [\"socket ('127.0.0.1', "),
-        ("test_an_abstract_socket", "descriptors are left behind: [\"socket b'\\\\x00left-"),
-        ("test_a_socket_of_a_path", "descriptors are left behind: [\"socket '/"),
+        ("test_a_thread_of_a_log", "leaked threads: ['talker log']"),
+        ("test_a_port", "leaked descriptors: [\"listening socket ('127.0.0.1', "),
+        ("test_a_connection", "leaked descriptors: [\"socket ('127.0.0.1', "),
+        ("test_an_abstract_socket", "leaked descriptors: [\"socket b'\\\\x00left-"),
+        ("test_a_socket_of_a_path", "leaked descriptors: [\"socket '/"),
         ("test_a_file", "/x']"),
-        ("test_pipes[3]", "descriptors are left behind: ['pipe:"),
-        ("test_events[11]", "descriptors are left behind: ['anon_inode:[eventfd]']"),
+        ("test_pipes[3]", "leaked descriptors: ['pipe:"),
+        ("test_events[11]", "leaked descriptors: ['anon_inode:[eventfd]']"),
     ],
 )
 def test_leaked_resource_fails_the_test_that_created_the_resource(report: str, test: str, words: str) -> None:

@@ -207,7 +207,7 @@ def test_link_applies_its_delay_and_rate_limit(figures: ModuleType) -> None:
     need_networks(figures)
     done = in_a_network(LINK)
     if "TUN device" in done.stderr:
-        pytest.skip("there is neither netem nor /dev/net/tun")
+        pytest.skip("needs netem or /dev/net/tun")
     assert not done.returncode, done.stderr
     (small_s, large_s), came, made_by, told = json.loads(done.stdout)
     assert came == [True, True]

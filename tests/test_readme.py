@@ -112,7 +112,7 @@ def test_readme_blocks_run_in_order_print_their_output_and_do_not_busy_wait(
 ) -> None:
     monkeypatch.setenv(
         "NEP_MASTER", os.environ["NEP_MASTER"]
-    )  # restored afterwards: a page's own master changes the value
+    )  # restored after the test, because pages start masters that change it
     with ExitStack() as stack:
         reader = Reader(stack)
         pages = "\n".join((ROOT / page).read_text(encoding="utf-8") for page in PAGES)

@@ -46,7 +46,7 @@ def test_similar_version_is_not_matched(version: str) -> None:
 
 
 def test_empty_section_is_rejected() -> None:
-    with pytest.raises(InvalidReleaseError, match=r"says nothing of 1\.0\.0"):
+    with pytest.raises(InvalidReleaseError, match=r"1\.0\.0' of CHANGELOG\.md is empty"):
         section(TEXT, "1.0.0")
 
 

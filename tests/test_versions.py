@@ -12,11 +12,11 @@ import pytest
 
 import dev
 from installers.macos import information
-from tools.computer import ROOT, Computer, Trouble, venv_python
-from tools.versions import OLDEST_MACOS, PROMISED, environment, find_interpreters, versions
+from tools.computer import ROOT, CommandError, Computer, venv_python
+from tools.versions import OLDEST_MACOS, SUPPORTED, environment, find_interpreters, versions
 
 HERE = "{}.{}".format(*sys.version_info[:2])
-OTHERS = [each for each in PROMISED if each != HERE]
+OTHERS = [each for each in SUPPORTED if each != HERE]
 QT = {"pyside6", "pyside6-essentials", "pyside6-addons", "shiboken6", "pytest-qt"}
 
 
@@ -72,9 +72,9 @@ def test_pythons_are_found_on_the_path_by_the_launcher_and_in_pyenv(tmp_path: Pa
 
 @pytest.mark.parametrize("said", ["", "3.9 cpython /bin/x\n", "pyenv: python3.12: command not found", "\0"])
 def test_interpreter_that_does_not_report_the_expected_version_is_ignored(said: str, tmp_path: Path) -> None:
-    system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in PROMISED})
+    system = Pythons({"/shim": said, sys.executable: said}, {f"python{each}": "/shim" for each in SUPPORTED})
     assert find_interpreters(system.computer(), tmp_path) == {}
-    with pytest.raises(Trouble, match="none of these Pythons is here; install one"):
+    with pytest.raises(CommandError, match="none of these Python versions was found; install one"):
         versions(system.computer(), [], tmp_path / "made", tmp_path)
 
 
@@ -92,11 +92,11 @@ def test_environments_are_created_once_with_hashes_and_missing_pythons_are_repor
         assert sum("venv" in command for command in system.ran) == expected
         assert sum("--require-hashes" in command for command in system.ran) == expected
     said = capsys.readouterr()
-    assert f"not on this computer: Python {', '.join(OTHERS)}\n" in said.out
+    assert f"not found on this computer: Python {', '.join(OTHERS)}\n" in said.out
     assert re.search(rf"Python {HERE}\s+ok", said.err)
     assert system.ran[-1][1:] == ["-m", "pytest", "-q", "tests/nep", "tests/interop"]
     assert all((ROOT / each).is_dir() for each in system.ran[-1][-2:])
-    assert system.ran[2][1:2] == ["-I"], "what was installed is tried, not the sources here"
+    assert system.ran[2][1:2] == ["-I"], "the installed package is tested, not the sources"
 
 
 def test_arguments_reach_pytest_and_given_folders_replace_the_default(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_failed_step_is_reported_and_the_tests_still_run(
 def test_built_file_is_installed_instead_of_the_source_folder(tmp_path: Path) -> None:
     built = tmp_path / "nep_studio-1.0.0-py3-none-any.whl"
     system = Pythons(here())
-    with pytest.raises(Trouble, match=f"there is no file {re.escape(str(built))}"):
+    with pytest.raises(CommandError, match=f"there is no file {re.escape(str(built))}"):
         versions(system.computer(), ["--plain", "--install", str(built)], tmp_path, tmp_path)
     assert system.ran == []
     built.touch()
@@ -170,7 +170,7 @@ def test_built_file_is_installed_instead_of_the_source_folder(tmp_path: Path) ->
 def test_failed_environment_is_recreated_and_failed_tests_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(Trouble, match="could not be made"):
+    with pytest.raises(CommandError, match="could not be created"):
         versions(Pythons(here(), fails="--require-hashes").computer(), [], tmp_path, tmp_path)
     for left in tmp_path.iterdir():
         left.rmdir()  # like venv --clear
@@ -186,7 +186,7 @@ def test_unsupported_python_version_is_rejected(tmp_path: Path) -> None:
 
 def test_versions_command_needs_no_qt_libraries(tmp_path: Path) -> None:
     system = Pythons({})
-    with pytest.raises(Trouble, match="none of these"):
+    with pytest.raises(CommandError, match="none of these"):
         dev.run(system.computer(), "versions", ["--only", "3.13"])
     assert system.ran == []
 

@@ -134,7 +134,7 @@ def test_outdated_translation_template_is_reported(words, tmp_path) -> None:
 def test_check_rejects_translations_with_wrong_placeholders(words, spanish, tmp_path) -> None:
     told = "\n".join(words.check(tmp_path))
     for wrong in ("falta uno", "{robto} está mal", "{robot} {", "un mensaje de {who}", "esperar %SEGUNDOS s"):
-        assert f"es: '{wrong}' has not the holes of" in told
+        assert f"es: '{wrong}' has other placeholders than" in told
     assert "'un mensaje'" not in told
 
 

@@ -94,7 +94,7 @@ def test_run_bar_is_translated_in_all_states() -> None:
         RunState("paused", "Greeting", paused_at="Xx"),
         RunState("stopping", "Greeting", elapsed_s=3.0, robots_to_stop=("Turtle", "Pepper"), replies=(DONE,)),
         RunState("proven", "Greeting", elapsed_s=3.0, errors={"a": "Xx"}),
-        RunState("proven", "Greeting", finished=True),
+        RunState("proven", "Greeting", is_finished=True),
         RunState("proven", "Greeting", has_stopped_blocks=True, elapsed_s=100.0),
         *(
             RunState("unanswered" if each.unconfirmed_robots else "proven", "Greeting", report=each)
@@ -104,7 +104,7 @@ def test_run_bar_is_translated_in_all_states() -> None:
     for state in states:
         for now in (0.01, 9.0):
             for elsewhere in (False, True):
-                view = view_of(state, ["Pepper", "Turtle"], now, elsewhere=elsewhere)
+                view = view_of(state, ["Pepper", "Turtle"], now, is_elsewhere=elsewhere)
                 said(view.title, view.detail, view.compact_text, view.result or "", view.confirm_label or "")
                 said(_(view.run_label), _(view.stop_label))
     said(view_of(RunState(), [], 0).detail)
@@ -136,7 +136,7 @@ def test_health_facts_of_robots_are_translated() -> None:
         replace(link, is_unresponsive=True, last_reply_s=3.0),
         replace(link, last_reply_s=3.0, is_stopping=True, values={"battery": 4}),
         replace(link, values={"battery": 80}),
-        replace(link, rejected=ReportedCount(12, 8.0), errors=ReportedCount(1)),
+        replace(link, rejected_messages=ReportedCount(12, 8.0), driver_exceptions=ReportedCount(1)),
     ]
     for each in links:
         for silent_s in (None, 99.0):
@@ -262,7 +262,7 @@ def test_errors_of_rejected_values_are_translated() -> None:
             wrong = value_problem(parameter, value)
             assert wrong is not None
             said(wrong)
-    said(*check_input("Xx", (replace(number, required=True),), {"zy": 1}), data=("zy",))
+    said(*check_input("Xx", (replace(number, is_required=True),), {"zy": 1}), data=("zy",))
     said(*check_input("Xx", (), 3))
 
 
@@ -308,7 +308,7 @@ def test_doctor_findings_are_translated() -> None:
         ),
         replace(well, masters=((master, 7780), (other, None)), loopback_problem="Xx", now_s=1.0),
         replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), is_gateway_enabled=False),
-        replace(well, original_files=("zz.py",), shadow="zz.py", clocks=(ClockFact("zz", 3.0),)),
+        replace(well, original_files=("zz.py",), shadowing_file="zz.py", clocks=(ClockFact("zz", 3.0),)),
         replace(well, files=FileFact(100, 100, 90, 100), programs=(ProgramFact(1, "zz", 99, 100),)),
     ):
         for finding in findings(facts):
@@ -349,5 +349,5 @@ def test_dropped_log_and_terminal_lines_are_reported_in_translation() -> None:
     said(str(text).replace("x", ""))
     handler.close()
     terminal = Terminal(io.StringIO())
-    terminal._lines_dropped, terminal._is_closing = 2, True
+    terminal._dropped_lines, terminal._is_closing = 2, True
     said(terminal._next_text())

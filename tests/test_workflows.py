@@ -17,7 +17,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from nep.version import __version__
-from tools.versions import PROMISED
+from tools.versions import SUPPORTED
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / ".github" / "workflows"
@@ -85,7 +85,7 @@ def test_ci_runs_the_readme_command_on_three_systems_with_oldest_and_newest_pyth
     assert "\npython3 dev.py test " in (ROOT / "README.md").read_text(encoding="utf-8")
     assert job["steps"][-1]["run"] == "python dev.py test"
     matrix = job["strategy"]["matrix"]
-    assert matrix["python"] == [PROMISED[0], PROMISED[-1]]
+    assert matrix["python"] == [SUPPORTED[0], SUPPORTED[-1]]
     assert [runner.partition("-")[0] for runner in matrix["runner"]] == ["windows", "macos", "ubuntu"]
 
 
@@ -137,7 +137,7 @@ def with_sums(folder: Path, files: Mapping[str, bytes], newline: str = "\n") -> 
 def place(tmp_path: Path) -> Path:
     """Working directory of a runner: the sources that the steps need, and packages with checksum lists."""
     if sys.platform != "linux":
-        pytest.skip("these steps run on Linux alone")
+        pytest.skip("these steps run on Linux only")
     for name in ("tools/__init__.py", "tools/release_notes.py", "nep/__init__.py", "nep/version.py"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copyfile(ROOT / name, tmp_path / name)
@@ -146,7 +146,7 @@ def place(tmp_path: Path) -> Path:
     )
     with_sums(tmp_path / "packages" / "package-windows", {"one-setup.exe": b"1", "one.zip": b"2"}, "\r\n")
     with_sums(tmp_path / "packages" / "package-linux", {"one.deb": b"3", "one two.tar.xz": b"4"})
-    program(tmp_path, "gh", 'printf "%s\\n" "$@" > said-to-gh; env | grep ^GH_ >> said-to-gh')
+    program(tmp_path, "gh", 'printf "%s\\n" "$@" > gh-call; env | grep ^GH_ >> gh-call')
     return tmp_path
 
 
@@ -177,7 +177,7 @@ def test_draft_has_all_packages_one_checksum_list_and_the_notes(place: Path) -> 
     assert (place / "notes.md").read_text(encoding="utf-8") == (
         f"- [A thing](https://example.org/nep/studio/blob/{TAG}/docs/web.md)\n"
     )
-    said = (place / "said-to-gh").read_text(encoding="utf-8").splitlines()
+    said = (place / "gh-call").read_text(encoding="utf-8").splitlines()
     assert said[:9] == [
         "release", "create", TAG, "--draft", "--verify-tag", "--title", f"NEP Studio {__version__}",
         "--notes-file", "notes.md",
@@ -189,13 +189,13 @@ def test_draft_has_all_packages_one_checksum_list_and_the_notes(place: Path) -> 
 def test_package_with_a_wrong_checksum_is_not_drafted(place: Path) -> None:
     (place / "packages" / "package-linux" / "one.deb").write_bytes(b"another")
     assert drafted(place) != 0
-    assert not (place / "said-to-gh").exists()
+    assert not (place / "gh-call").exists()
 
 
 def test_two_packages_with_the_same_name_are_not_drafted(place: Path) -> None:
     with_sums(place / "packages" / "package-macos", {"one.deb": b"3"})
     assert drafted(place) != 0
-    assert not (place / "said-to-gh").exists()
+    assert not (place / "gh-call").exists()
 
 
 def test_tag_that_differs_from_the_version_stops_the_release(place: Path) -> None:
@@ -207,7 +207,7 @@ def test_tag_that_differs_from_the_version_stops_the_release(place: Path) -> Non
     assert (jobs["try"]["needs"], jobs["draft"]["needs"]) == ("package", ["library", "clients", "try"])
 
 
-# ---- trial of each package, with stand-ins for programs of its system ------------------------------
+# ---- tests of the packages, with fake programs of each system --------------------------------------
 
 STUDIO = """#!/usr/bin/env bash
 [ "$1" = --selftest ] && mkdir -p "$2" && echo '{"ok": true}' > "$2/report.json" && echo "$0" >> {said}
@@ -250,7 +250,7 @@ def runner(tmp_path: Path, request: pytest.FixtureRequest) -> tuple[Path, str]:
     """Directory of a new computer with the packages, and the name of its system."""
     system: str = request.param
     if sys.platform != "linux":
-        pytest.skip("bash, with programs of other systems in its way")
+        pytest.skip("needs bash, with fake programs of other systems on PATH")
     place = tmp_path / "a computer"
     (place / "dist").mkdir(parents=True)
     for name, script in STAND_INS[system].items():
@@ -298,10 +298,10 @@ def tried(place: Path, system: str) -> str:
         (
             "windows",
             "Ñandú/Programs/NEP Studio/nep-studio.exe",
-            "temporary/a place/NEP Studio/nep-studio.exe",
+            "temporary/a folder/NEP Studio/nep-studio.exe",
         ),
         ("macos", "Applications/NEP Studio.app/Contents/MacOS/nep-studio", None),
-        ("linux", "bin/nep-studio", "temporary/a place/NEP Studio/nep-studio"),
+        ("linux", "bin/nep-studio", "temporary/a folder/NEP Studio/nep-studio"),
     ],
     indirect=["runner"],
 )
@@ -320,7 +320,7 @@ def test_package_is_installed_self_tested_and_removed(
 def test_failed_self_test_fails_the_trial(runner: tuple[Path, str]) -> None:
     place, system = runner
     (place / "studio").write_text("#!/usr/bin/env bash\nexit 1\n", encoding="utf-8")
-    assert tried(place, system).startswith("Self-test of what is installed")
+    assert tried(place, system).startswith("Self-test of the installed package")
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,12 @@
-# A bare Debian or Ubuntu in a folder, and commands in it; for the scripts beside this file, which source it.
-# Needs root, debootstrap and unshare. apt and pip use this computer's own configuration of mirrors, proxies and
-# certificates. Every mount lives in a name space of its own and is gone when the script ends.
+# Functions that create a minimal Debian or Ubuntu in a folder and run commands in it; sourced by the try_*.sh scripts.
+# Needs root, debootstrap and unshare. apt and pip use this computer's configuration of mirrors, proxies and
+# certificates. Mounts are made in a separate mount namespace, which ends with the command.
 
 begin=$SECONDS
 say() { printf '== %4d s  %s\n' $((SECONDS - begin)) "$*"; }
 
 check_programs() {
-    [ "$(id -u)" = 0 ] || { echo "only root can make a system in a folder; try: sudo $0" >&2; exit 2; }
+    [ "$(id -u)" = 0 ] || { echo "must be run as root; try: sudo $0" >&2; exit 2; }
     local program
     for program in debootstrap unshare "$@"; do
         command -v "$program" >/dev/null || { echo "'$program' is missing; try: apt-get install $program" >&2; exit 2; }
@@ -14,25 +14,25 @@ check_programs() {
 }
 
 UBUNTU_SUITES=" jammy noble " UBUNTU=http://archive.ubuntu.com/ubuntu
-UBUNTU_SCRIPT=/usr/share/debootstrap/scripts/gutsy # that of all since; Debian's debootstrap does not know the newest
+UBUNTU_SCRIPT=/usr/share/debootstrap/scripts/gutsy # used for all later releases; Debian's debootstrap lacks the newest ones
 
-make_system() { # FOLDER SUITE PACKAGES: as it is when somebody has just installed it
+make_system() { # FOLDER SUITE PACKAGES: create a newly installed system
     local system=$1 suite=$2 packages=$3 from=()
     if [[ $UBUNTU_SUITES = *" $suite "* ]]; then
         from=(--components=main,universe)
-        # Without the key (the package ubuntu-keyring) nothing proves that what comes is Ubuntu's.
+        # Without the key (package ubuntu-keyring), signatures can't be verified.
         [ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ] || from+=(--no-check-gpg)
     fi
-    if [ ! -e "$system/made" ]; then
-        say "making a bare $suite in $system"
+    if [ ! -e "$system/complete" ]; then
+        say "creating a minimal $suite in $system"
         mkdir -p "$(dirname "$system")"
         rm -rf --one-file-system "$system"
         debootstrap --variant=minbase --include="$packages" ${from[@]+"${from[@]}"} "$suite" "$system" \
             ${from:+"$UBUNTU" "$UBUNTU_SCRIPT"} >"$system.log" 2>&1 || { tail "$system.log" >&2; exit 1; }
-        # No package lists: a person's new computer has none, or old ones.
+        # No package lists: those of a newly installed computer are missing or outdated.
         rm -rf "$system"/var/lib/apt/lists/* "$system"/var/cache/apt/archives/*.deb
         cp -r /etc/apt/apt.conf.d/. "$system/etc/apt/apt.conf.d/"
-        # Hooks of the packages of this computer mean nothing over there.
+        # Hooks refer to programs of this computer.
         grep -lE 'Post-Invoke' "$system"/etc/apt/apt.conf.d/* | xargs -r rm
         if [[ $UBUNTU_SUITES = *" $suite "* ]]; then
             printf 'deb %s %s main universe\n' "$UBUNTU" "$suite" "$UBUNTU" "$suite-updates" \
@@ -46,7 +46,7 @@ make_system() { # FOLDER SUITE PACKAGES: as it is when somebody has just install
         for file in /etc/pip.conf /etc/ssl/certs/ca-certificates.crt; do
             [ ! -e "$file" ] || { mkdir -p "$system$(dirname "$file")" && cp "$file" "$system$file"; }
         done
-        touch "$system/made"
+        touch "$system/complete"
     fi
     cp -L /etc/resolv.conf "$system/etc/resolv.conf"
     cp -L /etc/hosts "$system/etc/hosts"
@@ -68,10 +68,10 @@ ln -s pts/ptmx "$system/dev/ptmx"; ln -s /proc/self/fd "$system/dev/fd"
 exec chroot --userspec="$user" "$system" /usr/bin/env -i "$@"
 '
 
-enter() { # SYSTEM USER HOME FOLDER COMMAND ...: run it there; its exit code
+enter() { # SYSTEM USER HOME FOLDER COMMAND ...: run a command in the system; return its exit code
     local system=$1 user=$2 home=$3 folder=$4 code=0 variable
     shift 4
-    # Only what a package manager needs to reach its servers comes in from this computer's environment.
+    # Pass on only the variables that package managers need to reach their servers.
     local variables=(HOME="$home" PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8)
     while IFS= read -r -d '' variable; do
         case $variable in

@@ -59,7 +59,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "names", nargs="*", choices=[*NAMES, *SPECIAL_NAMES, []], help="all when none is given"
+        "names", nargs="*", choices=[*NAMES, *SPECIAL_NAMES, []], help="default: all except the special ones"
     )
     names = parser.parse_args(own_arguments.split() if dashes else None).names or NAMES
     codes = []

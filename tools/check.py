@@ -69,14 +69,14 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
         Check("ruff format", (python, "-m", "ruff", "format", "--check", ".")),
         Check("mypy", (python, "-m", "mypy")),
         Check("lint-imports", (lint_imports, "--no-logo", "--cache-dir", "build/import-linter")),
-        Check("tests read", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), in_background=True),
+        Check("collect tests", (python, "-m", "pytest", "--collect-only", "-qq", "-n0"), in_background=True),
         Check("pytest", (python, "-m", "pytest", *parallel_options(), *pytest_arguments)),
     )
     if fast:
         return all_checks[:-2]
     return (
         (*all_checks[:-2], all_checks[-1]) if pytest_arguments else all_checks
-    )  # a few tests are collected quickly anyway
+    )  # selected tests are collected quickly
 
 
 def parallel_options() -> tuple[str, ...]:
@@ -94,7 +94,7 @@ def run(check: Check) -> Outcome:
     """Run a check and return its result."""
     if not check.in_background:
         print(f"\n=== {check.name}", flush=True)
-    # Many containers set it; compiled files are ignored by git.
+    # Many containers set it, but later runs need the compiled files, which git ignores.
     environ = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     begin = time.monotonic()
     out, errors = (subprocess.PIPE, subprocess.STDOUT) if check.in_background else (None, None)
@@ -134,8 +134,8 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the checks; return 0 if all passed, 1 if not, 130 after Ctrl+C."""
-    parser = argparse.ArgumentParser(description="Run every check of the project.")
-    parser.add_argument("--fast", action="store_true", help="leave the tests out")
+    parser = argparse.ArgumentParser(description="Run all checks of the project.")
+    parser.add_argument("--fast", action="store_true", help="skip the tests")
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
     options = parser.parse_args(arguments)
     try:

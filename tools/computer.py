@@ -15,11 +15,11 @@ from pathlib import Path
 from platform import machine
 
 ROOT = Path(__file__).resolve().parents[1]
-END_S = 10.0
+STOP_TIMEOUT_S = 10.0
 
 
-class Trouble(Exception):  # noqa: N818 (not a fault of this program, but of the computer it runs on)
-    """Error raised when the computer lacks a requirement; the message says how to fix it."""
+class CommandError(Exception):
+    """Error that ends a development command; the message says how to fix it."""
 
 
 def _ask(command: Sequence[str]) -> str:
@@ -37,24 +37,24 @@ def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None =
     """Run a command and return its exit code; its output goes to the terminal or to `log`.
 
     Ctrl+C also reaches the command, which is in the same process group. The command then has some
-    seconds to stop (`end`).
+    seconds to stop (`stop_process`).
     """
     with open(log, "ab") if log else contextlib.nullcontext() as output:  # noqa: PTH123 (a path or nothing)
         process = subprocess.Popen(command, cwd=ROOT, env=dict(environ), stdout=output, stderr=output)
         try:
             return process.wait()
         except BaseException:
-            end(process)
+            stop_process(process)
             raise
 
 
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Wait for a process to exit; terminate it after half of `END_S` seconds, and then kill it."""
-    for harder in (process.terminate, process.kill):
+def stop_process(process: subprocess.Popen[bytes]) -> None:
+    """Wait for a process to exit; terminate it after half of `STOP_TIMEOUT_S` seconds, and then kill it."""
+    for stop in (process.terminate, process.kill):
         with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(END_S / 2)
+            process.wait(STOP_TIMEOUT_S / 2)
             return
-        harder()
+        stop()
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tools.computer import ROOT, Computer, Trouble
+from tools.computer import ROOT, CommandError, Computer
 from tools.versions import environment
 
 FOLDER = ROOT / "build" / "fuzz"
@@ -53,7 +53,7 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
     """Fuzz the requested targets; return 1 if there are findings, else 0.
 
     With ``--list`` or ``--again``, targets are listed or one input is run instead. If the harness
-    fails, its exit code is returned. Raises Trouble on other systems than Linux and for unknown
+    fails, its exit code is returned. Raises CommandError on other systems than Linux and for unknown
     targets.
 
     Args:
@@ -64,15 +64,15 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
     parser = argparse.ArgumentParser(
         prog="dev.py fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", metavar="TARGET", help="all when none is given")
-    parser.add_argument("--minutes", type=float, default=DEFAULT_MINUTES, help="for all targets together")
-    parser.add_argument("--list", action="store_true", help="name the targets")
-    parser.add_argument("--again", type=Path, metavar="FILE", help="give these bytes to their target")
+    parser.add_argument("names", nargs="*", metavar="TARGET", help="default: all targets")
+    parser.add_argument("--minutes", type=float, default=DEFAULT_MINUTES, help="total time for all targets")
+    parser.add_argument("--list", action="store_true", help="list the targets")
+    parser.add_argument("--again", type=Path, metavar="FILE", help="run the target on this file")
     options = parser.parse_args([each for each in arguments if each != "--"])
     if not 0 < options.minutes <= 24 * 60:
-        parser.error("--minutes is more than 0 and at most 1440")
+        parser.error("--minutes must be greater than 0 and at most 1440")
     if computer.platform != "linux":
-        raise Trouble("atheris has packages for Linux only; the tests in tests/fuzz run everywhere")
+        raise CommandError("atheris is available for Linux only; the tests in tests/fuzz run on all systems")
     python = environment(computer, sys.executable, folder / "environment", "fuzz")
     command = [str(python), str(ROOT / HARNESS)]
     if options.again is not None:
@@ -82,7 +82,7 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
         print("\n".join(weights), flush=True)
         return 0
     if unknown := [name for name in options.names if name not in weights]:
-        raise Trouble(f"there is no target '{unknown[0]}'; --list names them")
+        raise CommandError(f"there is no target '{unknown[0]}'; --list prints all targets")
     selected = {name: weights[name] for name in options.names or weights}
     findings_folder = folder / "findings"
     shutil.rmtree(findings_folder, ignore_errors=True)
@@ -93,11 +93,11 @@ def fuzz(computer: Computer, arguments: Sequence[str], folder: Path = FOLDER) ->
 
 
 def _targets(computer: Computer, command: Sequence[str]) -> dict[str, int]:
-    # With their relative slowness.
+    # Weights by target: its relative duration.
     try:
         weights: dict[str, int] = json.loads(computer.ask([*command, "--list"]))
     except ValueError:
-        raise Trouble(f"the targets cannot be imported; '{' '.join(command)} --list' says why") from None
+        raise CommandError(f"the targets cannot be imported; see '{' '.join(command)} --list'") from None
     return weights
 
 
@@ -110,7 +110,7 @@ def _report_findings(folder: Path) -> int:
         print(
             report_path.read_text(encoding="utf-8")
             if report_path.is_file()
-            else "it takes too long, or too much memory"
+            else "the input takes too long or too much memory"
         )
     print(f"· {len(findings)} findings in {folder}", flush=True)
     return 1 if findings else 0

@@ -55,14 +55,14 @@ def row(*widgets: QWidget) -> QWidget:
 
 
 def _buttons(theme: Theme) -> list[QWidget]:
-    run = RunButton(theme, "Run", "play", widest="Resume")
+    run = RunButton(theme, "Run", "play", longest_text="Resume")
     run.set_filled(True)
     idle = RunButton(theme, "Pause", "pause")
     idle.setEnabled(False)
     stopping = StopButton(theme)
-    stopping.show_state("Stopping", ring=True)
+    stopping.show_state("Stopping", has_ring=True)
     outlined = StopButton(theme, "appBar")
-    outlined.show_state("Stop", filled=False)
+    outlined.show_state("Stop", is_filled=False)
     stop_again = StopButton(theme, "toolBar")
     stop_again.show_state("Stop again")
     return [
@@ -115,7 +115,7 @@ def _status_widgets(theme: Theme) -> list[QWidget]:
     bar.setFixedWidth(200)
     banner = Banner(theme)
     banner.show_text(
-        "error", "The camera of Pepper has been silent for 4 s.", "The behaviour waits.", "Look", 2
+        "error", "The camera of Pepper has been silent for 4 s.", "The behaviour is waiting.", "Show", 2
     )
     card = Card(theme)
     layout = QVBoxLayout(card)

@@ -159,46 +159,46 @@ class GuidePictures(SelfDrive):
             return lambda: runs.view().state == "running" and id in runs.running_blocks
 
         return [
-            Step("the theme", lambda: run(f"theme.{self._theme}"), window.isVisible),
+            Step("set the theme", lambda: run(f"theme.{self._theme}"), window.isVisible),
             Step("the start page", lambda: window.resize(WHOLE), window.isVisible, picture="start"),
-            Step("the virtual robot", lambda: run("robots.virtual"), self._is_robot_ready, 40, settle_s=2.0),
+            Step("start the robot", lambda: run("robots.virtual"), self._is_robot_ready, 40, settle_s=2.0),
             *self._open("Greeting"),
             Step("the window", lambda: None, self._is_page_ready, picture="window", settle_s=2.0),
-            Step("a usual size", lambda: window.resize(WINDOW), lambda: True, settle_s=1.0),
-            Step("it runs", lambda: run("run.run"), is_block_running(SWING), 30, "running", 0.5),
+            Step("resize the window", lambda: window.resize(WINDOW), lambda: True, settle_s=1.0),
+            Step("run", lambda: run("run.run"), is_block_running(SWING), 30, "running", 0.5),
             *self._stop(),
             *self._open("A dance"),
             *self._drag_from_toolbox(),
-            Step("a whole window", lambda: window.resize(WHOLE), lambda: True, settle_s=1.0),
+            Step("resize the window", lambda: window.resize(WHOLE), lambda: True, settle_s=1.0),
             *self._open("Reaction to touch"),
-            Step("its values", lambda: run("panel:variables"), lambda: True),
-            Step("a card", lambda: self._editor.edit_variable({"do": "watch", "id": "points"}), lambda: True),
-            Step("values come", lambda: run("run.run"), lambda: bool(runs.values), 20, "variables", 3.0),
+            Step("open the variables", lambda: run("panel:variables"), lambda: True),
+            Step("watch", lambda: self._editor.edit_variable({"do": "watch", "id": "points"}), lambda: True),
+            Step("show values", lambda: run("run.run"), lambda: bool(runs.values), 20, "variables", 3.0),
             *self._stop(),
             *self._open("A careful walk"),
             Step(
-                "what is wrong",
+                "show the problems",
                 lambda: run("panel:problems"),
                 self._is_page_ready,
                 picture="problems",
                 settle_s=2.5,
             ),
             *self._add_to_backpack(),
-            Step("a second robot", lambda: run("robots.turtle"), self._are_two_robots_ready, 40, "room", 3.0),
-            Step("the topics", lambda: run("layout.developer"), lambda: len(window.session.topics) > 3, 20),
-            Step("the list", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
+            Step("add a robot", lambda: run("robots.turtle"), self._are_two_robots_ready, 40, "room", 3.0),
+            Step("Developer", lambda: run("layout.developer"), lambda: len(window.session.topics) > 3, 20),
+            Step("open the topics", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
         ]
 
     def _open(self, name: str) -> list[Step]:
         path = write_behaviour(self._home, name)
         files, page = self._commands.files, self._is_page_ready
-        return [Step(f"the behaviour {name}", lambda: files.open_example(path), page, 30, settle_s=1.5)]
+        return [Step(f"open {name}", lambda: files.open_example(path), page, 30, settle_s=1.5)]
 
     def _stop(self) -> list[Step]:
         run, runs = self._commands.run, self._window.session.runs
-        stopped = Step("stopped", lambda: run("run.stop"), lambda: runs.view().state == "proven")
+        stopped = Step("stop", lambda: run("run.stop"), lambda: runs.view().state == "proven")
         world = self._window.session.fleet.change_world
-        return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._is_robot_ready)]
+        return [stopped, Step("reset", lambda: world("Pepper", {"reset": True}), self._is_robot_ready)]
 
     def _drag_from_toolbox(self) -> list[Step]:
         # Drags a block from the toolbox to the end of the script.
@@ -232,15 +232,15 @@ class GuidePictures(SelfDrive):
             return not self._mouse_path
 
         return [
-            Step("its categories", lambda: None, lambda: self._has_element(movement), 20),
+            Step("wait for the toolbox", lambda: None, lambda: self._has_element(movement), 20),
             Step(
-                "a category",
+                "open a category",
                 open_category,
                 lambda: self._has_element(turn_block) and self._has_element(last),
                 20,
             ),
-            Step("a block in the hand", start_drag, move, 10, "toolbox", 1.0),
-            Step("it is let go", self._release_mouse, lambda: True, settle_s=1.0),
+            Step("drag a block", start_drag, move, 10, "toolbox", 1.0),
+            Step("drop the block", self._release_mouse, lambda: True, settle_s=1.0),
         ]
 
     def _release_mouse(self) -> None:
@@ -266,12 +266,10 @@ class GuidePictures(SelfDrive):
             QTest.mouseClick(self._target, Qt.MouseButton.LeftButton, pos=position)
 
         return [
-            Step(
-                "the blocks", lambda: None, lambda: self._has_element(first) and self._has_element(button), 20
-            ),
-            Step("one is chosen", choose, lambda: True),
-            Step("it is packed", pack, lambda: True),
-            Step("the backpack", open_backpack, lambda: self._has_element(sheet), 10, "backpack", 8.0),
+            Step("loading", lambda: None, lambda: self._has_element(first) and self._has_element(button), 20),
+            Step("select a stack", choose, lambda: True),
+            Step("add it to the backpack", pack, lambda: True),
+            Step("open the backpack", open_backpack, lambda: self._has_element(sheet), 10, "backpack", 8.0),
         ]
 
     def _is_robot_ready(self) -> bool:
@@ -284,7 +282,7 @@ class GuidePictures(SelfDrive):
     def _editor(self) -> BlocklyView:
         editor = getattr(self._window.editor(), "editor", None)
         if not isinstance(editor, BlocklyView):
-            raise TypeError("the editor is not there yet")
+            raise TypeError("the editor isn't loaded yet")
         return editor
 
     @property
@@ -293,7 +291,7 @@ class GuidePictures(SelfDrive):
         web = self._editor.web
         target = web.keyboard_target() if web is not None else None
         if not isinstance(target, QWidget):
-            raise TypeError("the page of the blocks is not there yet")
+            raise TypeError("the editor's page isn't loaded yet")
         return target
 
     def _is_page_ready(self) -> bool:
@@ -308,7 +306,7 @@ class GuidePictures(SelfDrive):
         # The last known position.
         rect = self._element_rects[element]
         if not isinstance(rect, list):
-            raise TypeError(f"{element} is not there")
+            raise TypeError(f"the page has no element {element}")
         return QRect(*(round(each) for each in rect))
 
     def _query_rect(self, element: str) -> None:
@@ -326,7 +324,7 @@ class GuidePictures(SelfDrive):
     def _panel_rect(self, panel: str) -> QRect:
         bench = self._window.bench
         if bench is None:
-            raise TypeError("no panels show")
+            raise TypeError("no panels are open")
         dock = bench.docks[panel]
         return QRect(dock.mapTo(self._window, QPoint()), dock.size())
 
@@ -344,7 +342,7 @@ class GuidePictures(SelfDrive):
         if picture.save(str(path)):
             self.pictures.append(path)
         else:
-            sys.stderr.write(f"the picture {path} can't be written\n")
+            sys.stderr.write(f"the image {path} can't be written\n")
 
 
 def paint_mouse(picture: QPixmap, tip: QPoint) -> None:
@@ -392,7 +390,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Create the images that the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
-    parser.add_argument("--theme", choices=THEMES, help="only these colours, in the language of now")
+    parser.add_argument("--theme", choices=THEMES, help="only this theme, in the current language")
     options = parser.parse_args(arguments)
     return take_screenshots(options.folder, options.theme) if options.theme else take_all(options.folder)
 

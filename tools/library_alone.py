@@ -44,12 +44,12 @@ def check_imports() -> list[str]:
     """Check that all modules of nep, including back ends, can be imported; return the failures."""
     faults = []
     for module_info in pkgutil.walk_packages(nep.__path__, "nep."):
-        if module_info.name == "nep.__main__":  # this runs the command itself
+        if module_info.name == "nep.__main__":  # runs the command when imported
             continue
         try:
             importlib.import_module(module_info.name)
         except ImportError as error:
-            faults.append(f"{module_info.name} is not imported: {error}")
+            faults.append(f"{module_info.name} can't be imported: {error}")
     return faults
 
 
@@ -63,14 +63,14 @@ def check_messages(master: str | None) -> list[str]:
     faults = []
     with (
         nep.node("talker", backend, master=master) as talker,
-        nep.node("hearer", backend, master=master) as two,
+        nep.node("listener", backend, master=master) as listener,
     ):
         for msg_type, sent in MESSAGES.items():
-            subscriber = two.new_sub(msg_type, msg_type)
+            subscriber = listener.new_sub(msg_type, msg_type)
             talker.new_pub(msg_type, msg_type).publish(sent)
             message = subscriber.receive(WAIT_S)
             if message is None or message.payload != sent:
-                faults.append(f"{backend}: {sent!r} came as {message!r}")
+                faults.append(f"{backend}: published {sent!r}, received {message!r}")
     return faults
 
 
@@ -80,10 +80,10 @@ def _sum(request: Any) -> dict[str, int]:  # noqa: ANN401 - whatever JSON a clie
 
 def check_services(master: str) -> list[str]:
     """Check a service whose server runs in a separate thread; return the failures."""
-    with nep.node("server", master=master) as server, nep.node("caller", master=master) as two:
+    with nep.node("server", master=master) as server, nep.node("caller", master=master) as caller:
         server.new_server("sum", _sum, threads=1)
-        reply = two.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
-    return [] if reply == {"sum": 6} else [f"the service answered {reply!r}"]
+        reply = caller.new_client("sum", timeout_s=WAIT_S).call({"of": [1, 2, 3]})
+    return [] if reply == {"sum": 6} else [f"the service replied {reply!r}"]
 
 
 def check_missing_extras(master: str) -> list[str]:
@@ -92,17 +92,17 @@ def check_missing_extras(master: str) -> list[str]:
     with nep.node("painter", master=master) as node:
         try:
             node.new_pub("picture", "image").publish(object())
-            faults.append("a picture needs no extra")
+            faults.append("publishing an image needs no extra")
         except nep.EncodeError as error:
             if "nep-studio[image]" not in str(error):
-                faults.append(f"a picture does not name its extra: {error}")
+                faults.append(f"the error for an image doesn't name its extra: {error}")
     for backend, extra in EXTRAS.items():
         try:
             nep.node("other", backend).close()
             faults.append(f"{backend} needs no extra")
         except nep.NepError as error:
             if f"nep-studio[{extra}]" not in str(error):
-                faults.append(f"{backend} does not name its extra: {error}")
+                faults.append(f"the error for {backend} doesn't name its extra: {error}")
     return faults
 
 
@@ -111,14 +111,14 @@ def check_command_line(master: str) -> list[str]:
     faults = []
     for arguments in (["--help"], ["--master", master, "topic", "list"], ["--master", master, "doctor"]):
         completed = _run_nep(arguments)
-        # The doctor may find a problem of this computer.
+        # 1: the doctor found a problem of this computer.
         allowed = {0, 1} if "doctor" in arguments else {0}
         if "Traceback" in completed.stderr or completed.returncode not in allowed:
             faults.append(
-                f"nep {' '.join(arguments)} ended with {completed.returncode}: {completed.stderr[-500:]}"
+                f"nep {' '.join(arguments)} exited with {completed.returncode}: {completed.stderr[-500:]}"
             )
     if _run_nep(["--help"], "es").stdout == _run_nep(["--help"]).stdout:
-        faults.append("nep --help says the same in Spanish and in English: its translations are missing")
+        faults.append("nep --help is the same in Spanish and English: the translations are missing")
     return faults
 
 
@@ -152,7 +152,7 @@ def main() -> int:
         print(f"library alone: {fault}", file=sys.stderr)
     if not faults:
         version = "{}.{}.{}".format(*sys.version_info[:3])
-        print(f"· nep {nep.__version__} alone on Python {version}: messages, services and commands are well")
+        print(f"· nep {nep.__version__} on Python {version}: messages, services and commands work")
     return 1 if faults else 0
 
 

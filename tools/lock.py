@@ -60,11 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--upgrade", action="store_true", help="take the newest versions that are allowed")
+    parser.add_argument("--upgrade", action="store_true", help="pin the newest allowed versions")
     options = parser.parse_args(arguments)
     uv = shutil.which("uv")
     if uv is None:
-        print("lock: uv is missing; install it by 'pip install uv'", file=sys.stderr)
+        print("lock: uv is missing; install it with 'pip install uv'", file=sys.stderr)
         return 2
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     builds = "\n".join((*project["build-system"]["requires"], *EDITABLE))

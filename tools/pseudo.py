@@ -34,7 +34,7 @@ def pseudo(english: str) -> str:
 
 def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
     """Yield (context, English text, file) for the block definitions, whose texts are not passed to `_`."""
-    # imported here because catalogues are also compiled with only the build requirements installed
+    # imported here because builds compile catalogues with only the build requirements installed
     from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
     from app.blocks.toolbox.catalogue import english_categories, is_translatable  # noqa: PLC0415
     from app.blocks.toolbox.help import EXAMPLES, english_slot_name  # noqa: PLC0415

@@ -26,7 +26,7 @@ import griffe
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "api"
 WIDTH = 118
-MADE_BY = "Made from the docstrings by `python3 dev.py reference`; do not write here."
+GENERATED_BY = "Generated from the docstrings by `python3 dev.py reference`; don't edit."
 
 
 @dataclass(frozen=True)
@@ -35,35 +35,34 @@ class PageSpec:
 
     Attributes:
         title: Heading of the page.
-        words: Introduction.
-        homes: Modules whose public names are on the page.
+        introduction: Text below the heading.
+        modules: Modules whose public names are on the page.
     """
 
     title: str
-    words: str
-    homes: tuple[str, ...]
+    introduction: str
+    modules: tuple[str, ...]
 
 
 PAGES: Mapping[str, PageSpec] = {
     "nodes": PageSpec(
         "Nodes, publishers and subscribers",
-        'Begin with `nep.node("name")`; docs/first-programs.md shows how.',
+        'Start with `nep.node("name")`; see docs/first-programs.md.',
         ("nep.nodes.node", "nep.nodes", "nep.backends.connection"),
     ),
     "messages": PageSpec(
         "Messages",
-        "What a subscriber gets, and what can be published beside plain values; see docs/types.md and "
-        "docs/latency.md.",
+        "Received messages, and payloads other than plain values; see docs/types.md and docs/latency.md.",
         ("nep.messages",),
     ),
     "types": PageSpec(
-        "Types of robots' messages",
+        "Types of robot messages",
         "Dataclasses in `nep.geometry` and `nep.sensor`, for `new_pub` and `new_sub`; see docs/types.md.",
         ("nep.geometry", "nep.sensor"),
     ),
     "services": PageSpec(
         "Services, surveys and parameters",
-        "Programs that answer each other; see docs/services.md and docs/patterns.md.",
+        "Requests and replies between programs; see docs/services.md and docs/patterns.md.",
         ("nep.patterns.services", "nep.patterns.parameters"),
     ),
     "blackboard": PageSpec(
@@ -73,14 +72,18 @@ PAGES: Mapping[str, PageSpec] = {
     ),
     "masters": PageSpec(
         "Masters and the graph",
-        "Who is there, and who talks to whom.",
+        "The nodes, topics and connections of a network.",
         ("nep.masters.master", "nep.masters", "nep.system", "nep.protocol"),
     ),
-    "errors": PageSpec("Errors", "All of them are `NepError`s, and say what to do next.", ("nep.errors",)),
+    "errors": PageSpec(
+        "Errors",
+        "All errors are subclasses of `NepError`; their messages say how to solve the problem.",
+        ("nep.errors",),
+    ),
 }
 OWN_PAGES = ("nep.geometry", "nep.sensor")
 """Public modules with pages that list every name in their `__all__`."""
-MADE_BY_HAND = frozenset(
+INSTANTIATED_BY_PROGRAMS = frozenset(
     {"Node", "Master", "FixedServer", "FixedClient", "Blackboard", "ImageFormat", "Encoded"}
 )
 """Classes that programs instantiate themselves, so that their constructor is documented.
@@ -227,8 +230,8 @@ class Reference:
         field = PAGES[name]
         parts = [
             f"# {field.title}",
-            f"{MADE_BY} [All pages](README.md).",
-            *self._filled(field.words),
+            f"{GENERATED_BY} [All pages](README.md).",
+            *self._filled(field.introduction),
         ]
         for entry_name in self._names_on(name):
             parts += self._entry(entry_name)
@@ -238,11 +241,15 @@ class Reference:
         """Return the Markdown text of the index page, README.md."""
         lines = [
             "# The reference",
-            MADE_BY,
+            GENERATED_BY,
         ]
         for page, field in PAGES.items():
             links = ", ".join(f"[{each}]({page}.md#{_anchor(each)})" for each in self._names_on(page))
-            lines += [f"## [{field.title}]({page}.md)", *self._filled(field.words), *self._filled(links)]
+            lines += [
+                f"## [{field.title}]({page}.md)",
+                *self._filled(field.introduction),
+                *self._filled(links),
+            ]
         return "\n\n".join(lines) + "\n"
 
     @property
@@ -252,11 +259,11 @@ class Reference:
         return {name: str(each.value) for name, each in members if not each.is_alias and each.is_attribute}
 
     def _names_on(self, page: str) -> list[str]:
-        homes = PAGES[page].homes
+        modules = PAGES[page].modules
         indexed = [
-            (next(number for number, home in enumerate(homes) if _lies_in(item.path, home)), name)
+            (next(number for number, module in enumerate(modules) if _is_in(item.path, module)), name)
             for name, item in self._public()
-            if any(_lies_in(item.path, home) for home in homes)
+            if any(_is_in(item.path, module) for module in modules)
         ]
         return [name for _, name in sorted(indexed, key=lambda each: each[0])]
 
@@ -265,8 +272,8 @@ class Reference:
         for name, member in public.members.items():
             if not name.startswith("_") and member.is_alias:
                 yield name, _target(member)
-        for home in OWN_PAGES:
-            module = self._package[home.removeprefix("nep.")]
+        for path in OWN_PAGES:
+            module = self._package[path.removeprefix("nep.")]
             for name in module.exports or ():
                 yield str(name), _target(module.members[str(name)])
 
@@ -306,8 +313,8 @@ class Reference:
         members = self.members(cls)
         attributes = [member for member in members if isinstance(member, griffe.Attribute)]
         constructor = cls.members.get("__init__") or cls.all_members.get("__init__")
-        is_made = name in MADE_BY_HAND or cls.module.path in OWN_PAGES
-        start = constructor if is_made and isinstance(constructor, griffe.Function) else None
+        has_constructor = name in INSTANTIATED_BY_PROGRAMS or cls.module.path in OWN_PAGES
+        start = constructor if has_constructor and isinstance(constructor, griffe.Function) else None
         arguments = [member.name for member in start.parameters if member.name != "self"] if start else []
         docs = parse_docstring(_docstring_of(cls), [*(member.name for member in attributes), *arguments])
         parts = [f"## {name}"]
@@ -315,15 +322,17 @@ class Reference:
             parts.append(_block(self._signature(start, name, has_result=False)))
         parts += self._prose(docs)
         parts += [
-            f"`nep.{short}` is the same." for short, full_name in self.spellings.items() if full_name == name
+            f"Also available as `nep.{short}`."
+            for short, full_name in self.spellings.items()
+            if full_name == name
         ]
-        if start is not None and name in MADE_BY_HAND:
+        if start is not None and name in INSTANTIATED_BY_PROGRAMS:
             parts += self._arguments(start, docs)
             attributes = [member for member in attributes if member.name not in arguments]
         kind = cls.members.get("MSG_TYPE")
         if isinstance(kind, griffe.Attribute):
             attributes = [member for member in attributes if member.name != "MSG_TYPE"]
-            parts.append(f"In the graph it is `{str(kind.value)[1:-1]}`.")
+            parts.append(f"Message type: `{str(kind.value)[1:-1]}`.")
         parts += self._attributes(
             attributes, docs, start if isinstance(start, griffe.Function) else constructor
         )
@@ -446,8 +455,8 @@ def _docstring_of(item: griffe.Object) -> str:
     return item.docstring.value if item.docstring else ""
 
 
-def _lies_in(path: str, home: str) -> bool:
-    return path == home or path.startswith(f"{home}.")
+def _is_in(path: str, module: str) -> bool:
+    return path == module or path.startswith(f"{module}.")
 
 
 def _is_call(value: griffe.Expr) -> bool:
@@ -530,16 +539,18 @@ def pages() -> dict[str, str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the pages; with ``--check``, write nothing and return 1 if they are out of date."""
     parser = argparse.ArgumentParser(description="Write the reference from the docstrings.")
-    parser.add_argument("--check", action="store_true", help="write nothing; 1 when a page is old")
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; exit with 1 if a page is out of date"
+    )
     options = parser.parse_args(arguments)
-    now = pages()
+    generated = pages()
     existing = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.md")}
     if options.check:
-        return 0 if existing == now else 1
+        return 0 if existing == generated else 1
     FOLDER.mkdir(exist_ok=True)
-    for name in existing.keys() - now.keys():
+    for name in existing.keys() - generated.keys():
         (FOLDER / name).unlink()
-    for name, page in now.items():
+    for name, page in generated.items():
         (FOLDER / name).write_text(page, encoding="utf-8")
     return 0
 

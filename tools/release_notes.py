@@ -36,7 +36,7 @@ def checked_version(tag: str, version: str = __version__) -> str:
         InvalidReleaseError: The tag doesn't match the version.
     """
     if tag.removeprefix("v") != version:
-        raise InvalidReleaseError(f"'{tag}' is not the version of nep/version.py, which says '{version}'")
+        raise InvalidReleaseError(f"the tag '{tag}' doesn't match nep/version.py, which has '{version}'")
     return version
 
 
@@ -54,11 +54,9 @@ def section(changelog: str, version: str) -> str:
     for heading, text in zip(parts[1::2], parts[2::2], strict=True):
         if heading.split()[0].strip("[]") == version:
             if not text.strip():
-                raise InvalidReleaseError(f"CHANGELOG.md says nothing of {version}")
+                raise InvalidReleaseError(f"the section '## {version}' of CHANGELOG.md is empty")
             return text.strip() + "\n"
-    raise InvalidReleaseError(
-        f"CHANGELOG.md has no section '## {version}'; write one, of what stands under 'Unreleased' now"
-    )
+    raise InvalidReleaseError(f"CHANGELOG.md has no section '## {version}'; rename its section 'Unreleased'")
 
 
 def with_links(text: str, address: str) -> str:
@@ -71,13 +69,13 @@ def main(arguments: Sequence[str] | None = None, changelog: Path = CHANGELOG) ->
     parser = argparse.ArgumentParser(
         prog="release_notes", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("tag", help="the tag, with or without its v")
-    parser.add_argument("--links", metavar="ADDRESS", help="where the files of the project can be read")
+    parser.add_argument("tag", help="the tag, with or without the v")
+    parser.add_argument("--links", metavar="ADDRESS", help="URL of the project's files")
     options = parser.parse_args(arguments)
     try:
         notes = section(changelog.read_text(encoding="utf-8"), checked_version(options.tag))
-    except InvalidReleaseError as refused:
-        print(f"release notes: {refused}", file=sys.stderr)
+    except InvalidReleaseError as error:
+        print(f"release notes: {error}", file=sys.stderr)
         return 1
     sys.stdout.buffer.write((with_links(notes, options.links) if options.links else notes).encode())
     return 0

@@ -116,7 +116,7 @@ def write_behaviour(path: Path) -> None:
         "format": "nep-behaviour",
         "version": 1,
         "name": "Greeting",
-        "workspace": {"blocks": {"languageVersion": 0, "blocks": scripts()}},
+        "workspace": {"separateScripts": True, "blocks": {"languageVersion": 0, "blocks": scripts()}},
         "robots": {**robots, "NAO": nao},
     }
     path.write_text(json.dumps(content, indent=1), encoding="utf-8")
@@ -133,21 +133,21 @@ class Pictures(SelfDrive):
         run, session = self._commands.run, self._window.session
         return [
             Step("the start page", self._show_start_page, self._window.isVisible, picture="start"),
-            Step("the virtual robot", self._start_demo, self._is_robot_ready, 40, settle_s=2.5),
+            Step("start the virtual robot", self._start_demo, self._is_robot_ready, 40, settle_s=2.5),
             *self._run_to(TOUCH),
             *self._stop(),
             *self._run_to(TOUCH, "behaviour-light", settle_s=0.5),
             *self._stop("theme.dark", "behaviour-dark"),
-            Step("the topics", lambda: run("layout.developer"), lambda: len(session.topics) > 3, 20),
-            Step("a message", self._inspect, lambda: True, settle_s=1.0),
+            Step("Developer", lambda: run("layout.developer"), lambda: len(session.topics) > 3, 20),
+            Step("inspect a message", self._inspect, lambda: True, settle_s=1.0),
             *self._run_to(TURN, "developer-dark", settle_s=0.4),
             *self._stop(),
-            Step("the palette", self._search_palette, lambda: True, picture="palette", settle_s=1.0),
-            Step("the palette closed", lambda: run("palette.open"), lambda: True),
-            Step("light", lambda: run("theme.light"), lambda: True),
+            Step("open the palette", self._search_palette, lambda: True, picture="palette", settle_s=1.0),
+            Step("close the palette", lambda: run("palette.open"), lambda: True),
+            Step("set the light theme", lambda: run("theme.light"), lambda: True),
             *self._run_to(TURN, "developer-light", settle_s=0.4),
             *self._stop(),
-            Step("its actions", self._show_robots, self._is_robot_ready, picture="robots", settle_s=1.5),
+            Step("actions", self._show_robots, self._is_robot_ready, picture="robots", settle_s=1.5),
         ]
 
     def _run_to(self, block: str, picture: str = "", settle_s: float = 0.6) -> list[Step]:
@@ -158,9 +158,9 @@ class Pictures(SelfDrive):
             return runs.view().state == "running" and block in runs.running_blocks
 
         return [
-            Step("the robot back in its place", self._reset, self._is_robot_ready, settle_s=1.5),
+            Step("reset the robot", self._reset, self._is_robot_ready, settle_s=1.5),
             Step(
-                f"{block} runs",
+                f"run to {block}",
                 lambda: self._commands.run("run.run"),
                 is_block_running,
                 30,
@@ -172,7 +172,7 @@ class Pictures(SelfDrive):
     def _stop(self, next_command: str = "", picture: str = "") -> list[Step]:
         runs = self._window.session.runs
         stop = Step(
-            "every robot stopped",
+            "stop all robots",
             lambda: self._commands.run("run.stop"),
             lambda: runs.view().state == "proven",
         )

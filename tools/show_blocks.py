@@ -22,7 +22,7 @@ from app.ui.blockly.view import BlocklyView  # noqa: E402
 
 SAMPLE = ROOT / "tests" / "data" / "blockly"
 SETTLE_MS = 700
-ERROR_TEXT = "“turn left” needs a number. Put one into the gap."
+ERROR_TEXT = "“turn left” needs a number. Enter one in the empty slot."
 
 CLICK_CATEGORY_JS = """
 for (const label of document.querySelectorAll('.blocklyToolboxCategoryLabel'))
@@ -42,7 +42,7 @@ def parse_arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-class Photographer(QObject):
+class Screenshots(QObject):
     """Controller that saves three images of the block editor and then exits the program.
 
     The images are: light theme and running, dark theme and stopped, and with errors.
@@ -57,21 +57,21 @@ class Photographer(QObject):
         view.ready.connect(self._show_light_theme)
 
     def _show_light_theme(self) -> None:
-        self._view.set_theme(self._tokens, dark=False)
+        self._view.set_theme(self._tokens, is_dark=False)
         self._view.highlight(["say_touch"])
         self._decorate()
         QTimer.singleShot(SETTLE_MS, self, self._show_dark_theme)
 
     def _show_dark_theme(self) -> None:
         self._save("light")
-        self._view.set_theme(self._tokens, dark=True)
+        self._view.set_theme(self._tokens, is_dark=True)
         self._view.highlight([])
         self._view.mark_stopped(["say_touch"])
         QTimer.singleShot(SETTLE_MS, self, self._show_errors)
 
     def _show_errors(self) -> None:
         self._save("dark")
-        self._view.set_theme(self._tokens, dark=False)
+        self._view.set_theme(self._tokens, is_dark=False)
         self._view.mark_stopped([])
         self._view.set_errors({"b2": ERROR_TEXT, "wave": "NAO is not connected."})
         QTimer.singleShot(SETTLE_MS, self, self._finish)
@@ -103,10 +103,10 @@ def main() -> int:
     view.resize(*(int(each) for each in arguments.size.split("x")))
     view.set_definitions(json.loads(arguments.definitions.read_text("utf-8")))
     view.load(json.loads(arguments.workspace.read_text("utf-8")))
-    photographer = Photographer(view, arguments.folder, arguments.open)
+    screenshots = Screenshots(view, arguments.folder, arguments.open)
     view.show()
     code = application.exec()
-    del photographer
+    del screenshots
     return code
 
 

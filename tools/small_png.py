@@ -26,7 +26,7 @@ def shrink(path: Path, max_colours: int = COLOURS) -> int:
     """
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
-        raise OSError(f"{path} is no picture")
+        raise OSError(f"{path} isn't a readable image")
     height, width = picture.shape[:2]
     packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
     colours, inverse, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
@@ -47,20 +47,20 @@ def _channels(colours: np.ndarray) -> np.ndarray:
 def _colour_table(colours: np.ndarray, counts: np.ndarray, max_colours: int) -> np.ndarray:
     # The most frequent colours, and cluster centres of the others.
     order = np.argsort(counts)[::-1]
-    as_they_are = round(EXACT_SHARE * max_colours)
-    exact, rest, cluster_count = order[:as_they_are], order[as_they_are:], max_colours - as_they_are
+    exact_count = round(EXACT_SHARE * max_colours)
+    exact, others, cluster_count = order[:exact_count], order[exact_count:], max_colours - exact_count
     table = _channels(colours[exact])
-    if len(rest) <= cluster_count:
-        return np.vstack([table, _channels(colours[rest])])
-    chance = np.random.default_rng(7)  # fixed seed, for reproducible files
-    share = counts[rest] / counts[rest].sum()
-    sample = _channels(colours[chance.choice(rest, SAMPLE, p=share)])
+    if len(others) <= cluster_count:
+        return np.vstack([table, _channels(colours[others])])
+    rng = np.random.default_rng(7)  # fixed seed, for reproducible files
+    share = counts[others] / counts[others].sum()
+    sample = _channels(colours[rng.choice(others, SAMPLE, p=share)])
     cv2.setRNGSeed(7)
     criteria = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
-    _, _, middles = cv2.kmeans(
+    _, _, centres = cv2.kmeans(
         sample, cluster_count, np.zeros(0, np.int32), criteria, 1, cv2.KMEANS_PP_CENTERS
     )
-    return np.vstack([table, np.rint(middles)])
+    return np.vstack([table, np.rint(centres)])
 
 
 def _nearest(colours: np.ndarray, table: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from tools.computer import ROOT, Computer, Trouble, timed
+from tools.computer import ROOT, CommandError, Computer, timed
 
 # Names differ between releases of Debian and Ubuntu: the first available one is installed.
 QT_LIBRARIES = (
@@ -57,7 +57,7 @@ TEST_PACKAGES = {
 """Packages that some tests need, by subject. If they are missing, the tests are skipped."""
 
 
-def wanted_packages(computer: Computer) -> list[str]:
+def required_packages(computer: Computer) -> list[str]:
     """Return the required packages; ``a|b`` stands for a package with different names in some releases."""
     packages = list(QT_LIBRARIES)
     if not computer.has_screen:
@@ -68,8 +68,8 @@ def wanted_packages(computer: Computer) -> list[str]:
 
 
 def missing_packages(computer: Computer) -> list[str]:
-    """Return the entries of `wanted_packages` that are not installed under any of their names."""
-    required = wanted_packages(computer)
+    """Return the entries of `required_packages` that are not installed under any of their names."""
+    required = required_packages(computer)
     names = [name for entry in required for name in entry.split("|")]
     lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *names]).splitlines()
     installed = {line.split()[0] for line in lines if line.endswith(" installed")}
@@ -81,10 +81,10 @@ def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], li
 
     Args:
         computer: Computer to run on.
-        entries: Entries in the format of `wanted_packages`.
+        entries: Entries in the format of `required_packages`.
 
     Returns:
-        The first available name of each entry, and the entries of which apt knows no name.
+        The first available name of each entry, and the entries that apt doesn't know.
     """
     names = [name for entry in entries for name in entry.split("|")]
     installable: set[str] = set()
@@ -101,8 +101,8 @@ def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], li
     return [name for name in available_names if name], unknown
 
 
-def bring_system_packages(computer: Computer) -> None:
-    """Install missing packages if run as root; otherwise raise `Trouble` with the command to install them."""
+def install_system_packages(computer: Computer) -> None:
+    """Install missing packages if run as root; otherwise raise `CommandError` with the command for it."""
     if not computer.has_apt:
         return
     missing = missing_packages(computer)
@@ -111,15 +111,15 @@ def bring_system_packages(computer: Computer) -> None:
     names, unknown = available(computer, missing)
     if not computer.root:
         line = " ".join(sorted([*names, *(entry.split("|")[-1] for entry in unknown)]))
-        raise Trouble(
-            "some system libraries are missing; type this one line, then start me again:\n"
+        raise CommandError(
+            "system libraries are missing; install them with this command, then run dev.py again:\n"
             f"  sudo apt-get update && sudo apt-get install -y --no-install-recommends {line}"
         )
-    with timed(f"bringing {len(missing)} system packages with apt (the first time some 70 MB)"):
+    with timed(f"installing {len(missing)} system packages with apt (downloads about 70 MB the first time)"):
         apt_install(computer, missing, names, unknown)
 
 
-def bring_test_packages(computer: Computer) -> None:
+def install_test_packages(computer: Computer) -> None:
     """Install missing `TEST_PACKAGES` if run as root.
 
     Otherwise, and if apt fails, print which tests are skipped, and the command or the reason.
@@ -134,11 +134,11 @@ def bring_test_packages(computer: Computer) -> None:
             continue
         try:
             if not computer.root:
-                raise Trouble(f"sudo apt-get install -y --no-install-recommends {' '.join(missing)}")
-            with timed(f"bringing {len(missing)} packages with apt to test {tested}"):
+                raise CommandError(f"sudo apt-get install -y --no-install-recommends {' '.join(missing)}")
+            with timed(f"installing {len(missing)} packages with apt, for tests of {tested}"):
                 apt_install(computer, missing, *available(computer, missing))
-        except Trouble as trouble:
-            print(f"· Tests of {tested} are skipped: {trouble}")
+        except CommandError as error:
+            print(f"· tests of {tested} will be skipped: {error}")
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
@@ -148,12 +148,12 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
 
     Args:
         computer: Computer to run on.
-        missing: Missing entries in the format of `wanted_packages`.
+        missing: Missing entries in the format of `required_packages`.
         names: Available names of the entries, from `available`.
         unknown: Entries that apt doesn't know, from `available`.
 
     Raises:
-        Trouble: The installation failed; the message contains the last lines of apt's output.
+        CommandError: The installation failed; the message contains the last lines of apt's output.
     """
     log = ROOT / "build" / "apt.log"
     log.parent.mkdir(exist_ok=True)
@@ -163,24 +163,24 @@ def apt_install(computer: Computer, missing: Sequence[str], names: list[str], un
     install = [*apt, "install", "-y", "--no-install-recommends"]
     if not unknown and computer.do([*install, *names], environ, log) == 0:
         return
-    # Only after a failure: package lists are missing or outdated.
+    # The package lists may be missing or outdated.
     computer.do([*apt, "update"], environ, log)
     names, unknown = available(computer, missing)
     if unknown:
-        raise Trouble(
-            f"apt knows no package for {', '.join(unknown)}; is its list of servers complete? ('{log}')"
+        raise CommandError(
+            f"apt has no package for {', '.join(unknown)}; check its package sources (log: '{log}')"
         )
     if computer.do([*install, *names], environ, log) != 0:
         log_tail = "".join(log.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[-12:])
-        raise Trouble(f"apt could not install the system libraries ('{log}'); its last words:\n{log_tail}")
+        raise CommandError(f"apt could not install the system libraries; end of '{log}':\n{log_tail}")
 
 
 def main(computer: Computer | None = None) -> int:
     """Install missing packages; return 2 with a message if that is impossible."""
     try:
-        bring_system_packages(computer or Computer())
-    except Trouble as trouble:
-        print(f"system packages: {trouble}", file=sys.stderr)
+        install_system_packages(computer or Computer())
+    except CommandError as error:
+        print(f"system packages: {error}", file=sys.stderr)
         return 2
     return 0
 

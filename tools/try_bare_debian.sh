@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Tries the two commands in a bare Debian 12, in which there is nothing but python3 and git, from a fresh clone.
+# Tests the README's two commands from a fresh clone in a minimal Debian 12 with only python3 and git.
 #
 #   sudo tools/try_bare_debian.sh [--fresh] [--user] [DIR] [-- COMMAND ...]
 #
-#   DIR        where the bare system is made and kept (default /tmp/nep-bare, some 400 MB; with packages 1.5 GB)
-#   --fresh    throw the system in DIR away and make it again
-#   --user     run as an ordinary user (after the packages are there)
-#   COMMAND    instead of both: such as  -- python3 dev.py demo
+#   DIR        folder of the system, which is kept (default /tmp/nep-bare; 400 MB, with packages 1.5 GB)
+#   --fresh    delete the system in DIR and create it again
+#   --user     run as an ordinary user (the system packages must be installed already)
+#   COMMAND    run this command instead, for example  -- python3 dev.py demo
 set -euo pipefail
 . "$(dirname "$0")/bare_system.sh"
 

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Tries the Linux packages in dist/ as a person would who has no Python: in a bare Debian or Ubuntu, as an ordinary user.
+# Tests the Linux packages in dist/ in a minimal Debian or Ubuntu without Python, as an ordinary user.
 #
 #   sudo tools/try_linux_packages.sh [--fresh] [--suite SUITE] [--tar] [DIR]
 #
-#   DIR        where the bare systems are made and kept (default /tmp/nep-packages)
-#   --suite    which Debian, or Ubuntu's jammy or noble (default bookworm)
+#   DIR        folder of the systems, which are kept (default /tmp/nep-packages)
+#   --suite    a release of Debian, or Ubuntu's jammy or noble (default bookworm)
 #   --tar      unpack the .tar.xz in the user's home instead of installing the .deb
-#   --fresh    throw the system away and make it again
+#   --fresh    delete the system and create it again
 #
-# The package is installed, its self-test is run, the menu entry and the file type are looked for, and it is removed.
-# Then nothing may be left but what is the user's.
+# Installs the package, runs its self-test, removes it, and lists the files that are left. Only the user's own files
+# may be left.
 set -euo pipefail
 . "$(dirname "$0")/bare_system.sh"
 
@@ -37,17 +37,17 @@ ana() { enter "$system" $user "$home" "$home" sh -ec "$1"; }
 
 root "id $user >/dev/null 2>&1 || useradd --create-home --home-dir '$home' $user
       apt-get update -qq; apt-get install -y -qq --no-install-recommends xvfb xauth xz-utils >/dev/null"
-! root "command -v python3" || { echo "there is a Python in this system: the try would prove nothing" >&2; exit 1; }
+! root "command -v python3" || { echo "this system has a Python; the test needs one without" >&2; exit 1; }
 root "find / -xdev \( -path /proc -o -path /tmp -o -path /var -o -path /packages \) -prune -o -print | sort >/before"
 
 if [ $kind = deb ]; then
-    # An earlier try may have ended before its end.
+    # An earlier run may have been interrupted.
     root "apt-get purge -y -qq nep-studio >/dev/null 2>&1 || true; apt-get autoremove -y -qq --purge >/dev/null"
     root "DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends /packages/nep-studio_*.deb >/dev/null
           dpkg-query -W -f '\${Package} \${Version} \${Installed-Size} kB\n' nep-studio"
     program=nep-studio command=/opt/nep-studio/nep
 else
-    # What every desktop has and a bare system has not; the .deb asks for it by name.
+    # Libraries of every desktop that a minimal system lacks; the .deb declares them as dependencies.
     root "DEBIAN_FRONTEND=noninteractive apt-get satisfy -y -qq --no-install-recommends \
           \"\$(dpkg-deb -f /packages/nep-studio_*.deb Depends)\" >/dev/null"
     ana "tar -xf /packages/NEP-Studio-*.tar.xz && ./NEP-Studio-*/install.sh --command"
@@ -65,5 +65,5 @@ else
     ana "./NEP-Studio-*/install.sh --remove && rm -rf ./NEP-Studio-* out"
 fi
 root "find / -xdev \( -path /proc -o -path /tmp -o -path /var -o -path /packages \) -prune -o -print | sort >/after
-      echo 'left of the system: '; comm -13 /before /after | grep -v '^/before\|^/after\|^/home/' | grep -i nep || echo '  nothing'
-      echo 'left in the home:'; comm -13 /before /after | grep '^/home/' | cut -d/ -f1-5 | sort -u"
+      echo 'left in the system:'; comm -13 /before /after | grep -v '^/before\|^/after\|^/home/' | grep -i nep || echo '  nothing'
+      echo 'left in the home folder:'; comm -13 /before /after | grep '^/home/' | cut -d/ -f1-5 | sort -u"

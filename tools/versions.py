@@ -21,9 +21,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tools.computer import ROOT, Computer, Trouble, timed, venv_python
+from tools.computer import ROOT, CommandError, Computer, timed, venv_python
 
-PROMISED = ("3.10", "3.11", "3.12", "3.13")
+SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
 FOLDER = ROOT / "build" / "versions"
 TESTS = ("tests/nep", "tests/interop")
 VERSION_SCRIPT = (
@@ -56,16 +56,16 @@ def find_interpreters(computer: Computer, home: Path | None = None) -> dict[str,
 
     Searches the current interpreter, the PATH, the Windows launcher and pyenv, in this order.
     """
-    have: dict[str, str] = {}
-    for version in PROMISED:
+    interpreters: dict[str, str] = {}
+    for version in SUPPORTED:
         for command in _candidates(computer, version, home or Path.home()):
             match = re.fullmatch(
                 r"(\S+) cpython (.+)", computer.ask([*command, "-c", VERSION_SCRIPT]).strip()
             )
             if match and match[1] == version:
-                have[version] = match[2]
+                interpreters[version] = match[2]
                 break
-    return have
+    return interpreters
 
 
 def _candidates(computer: Computer, version: str, home: Path) -> list[list[str]]:
@@ -126,10 +126,10 @@ def environment(
             ],
             [*pip(interpreter), "--no-deps", "--no-index", "--find-links", wheels, *pinned],
         ]
-    with timed(f"making the environment {folder.name}"):
+    with timed(f"creating the environment {folder.name}"):
         for step in steps:
             if computer.do(step, computer.environ, None) != 0:
-                raise Trouble(f"{folder} could not be made; the words of Python or pip are above")
+                raise CommandError(f"{folder} could not be created; the output of Python or pip is above")
     stamp.write_text(_stamp(requirements), encoding="utf-8")
     return interpreter
 
@@ -175,31 +175,31 @@ def versions(
     parser = argparse.ArgumentParser(
         prog="dev.py versions", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--only", action="append", choices=PROMISED, help="this Python (may be given again)")
-    parser.add_argument("--plain", action="store_true", help="only the library without any extra, no tests")
+    parser.add_argument("--only", action="append", choices=SUPPORTED, help="test this version; repeatable")
+    parser.add_argument("--plain", action="store_true", help="only the library without extras, no tests")
     parser.add_argument(
-        "--install", metavar="FILE", help="this wheel or source distribution, not this folder"
+        "--install", metavar="FILE", help="test this wheel or source distribution instead of this folder"
     )
     parser.add_argument("pytest_arguments", nargs="*", help="arguments for pytest, after --")
     options = parser.parse_args(arguments)
-    selected = [each for each in PROMISED if each in (options.only or PROMISED)]
+    selected = [each for each in SUPPORTED if each in (options.only or SUPPORTED)]
     if options.install and not Path(options.install).is_file():
-        raise Trouble(
-            f"there is no file {options.install}; python -m build makes dist/*.whl and dist/*.tar.gz"
+        raise CommandError(
+            f"there is no file {options.install}; python -m build creates dist/*.whl and dist/*.tar.gz"
         )
     distribution = str(Path(options.install).resolve()) if options.install else "."
-    have = {
+    interpreters = {
         version: python
         for version, python in find_interpreters(computer, home).items()
         if version in selected
     }
-    absent = [version for version in selected if version not in have]
+    absent = [version for version in selected if version not in interpreters]
     if absent:
-        print(f"· not on this computer: Python {', '.join(absent)}", flush=True)
-    if not have:
-        raise Trouble("none of these Pythons is here; install one of them, by pyenv for example")
+        print(f"· not found on this computer: Python {', '.join(absent)}", flush=True)
+    if not interpreters:
+        raise CommandError("none of these Python versions was found; install one, for example with pyenv")
     outcomes = []
-    for version, python in have.items():
+    for version, python in interpreters.items():
         print(f"\n=== Python {version} ({python})", flush=True)
         failed = try_plain(computer, python, folder / f"{version}-plain", distribution)
         if not options.plain:

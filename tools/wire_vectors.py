@@ -60,9 +60,9 @@ def filters() -> list[dict[str, Any]]:
     ]
     levels: tuple[dict[str, bool], ...] = (
         {},
-        {"one_part": True},
+        {"reads_one_part": True},
         {"acknowledges_echoes": True},
-        {"batches": True},
+        {"reads_batches": True},
     )
     for level, options in enumerate(levels):
         for subscriber, topic in ((SUBSCRIBER, TOPIC), (1, "/a/b"), (2**63 - 1, "/größe")):
@@ -122,7 +122,7 @@ def malformed_filters() -> list[dict[str, Any]]:
 
 def notices() -> list[dict[str, Any]]:
     """Return the notices that a publisher sends in reply to a hello, and a message sent under a hello."""
-    hello = wire.hello_part(SUBSCRIBER, TOPIC, batches=True)
+    hello = wire.hello_part(SUBSCRIBER, TOPIC, reads_batches=True)
     kinds: list[tuple[str, str, wire.Header, bytes | None]] = [
         ("echo", "echo before the first message", wire.Header(1, 0, 0, STAMP_NS, PUBLISHER), None),
         ("echo", "echo", wire.Header(1, 0, 41, STAMP_NS, PUBLISHER), None),
@@ -350,13 +350,13 @@ class _Bytes:
 
 
 Parts = list[bytes]
-_GOOD_TOPIC = wire.topic_part(TOPIC)
+_TOPIC_PART = wire.topic_part(TOPIC)
 _EXTENSION = msgpack.packb({"frame_id": "base"})
-_NO_TOPIC = (
+_INVALID_IN_TOPICS = (
     *(chr(each) for each in (*range(1, 0x21), 0x7F, 0x80, 0x85, 0x9F, 0xA0)),
     *"\u061c\u1680\u2000\u200a\u200b\u200e\u200f\u2028\u2029\u202a\u202e\u202f\u205f\u2060\u2066\u206f\u3000\ufeff\ufff9{",
 )
-_NO_UTF8 = (
+_INVALID_UTF8 = (
     b"\xff",
     b"\xc3",
     b"\xc0\xaf",
@@ -379,15 +379,15 @@ def _part_count(rng: _Bytes) -> Parts:
         *rng.of(
             (
                 [],
-                [_GOOD_TOPIC],
-                [_GOOD_TOPIC + header[: rng.below(32)]],
+                [_TOPIC_PART],
+                [_TOPIC_PART + header[: rng.below(32)]],
                 [rng.bytes(rng.below(60)).replace(b"\0", b"a")],
-                [_GOOD_TOPIC, header],
-                [_GOOD_TOPIC, header, payload, _EXTENSION],
-                [_GOOD_TOPIC, header, payload, _EXTENSION, payload],
-                [_GOOD_TOPIC, _header(rng, flags=wire.EXTENSION), payload],
-                [_GOOD_TOPIC + _header(rng, flags=wire.EXTENSION) + payload],
-                [_GOOD_TOPIC, header, payload, payload, payload, payload],
+                [_TOPIC_PART, header],
+                [_TOPIC_PART, header, payload, _EXTENSION],
+                [_TOPIC_PART, header, payload, _EXTENSION, payload],
+                [_TOPIC_PART, _header(rng, flags=wire.EXTENSION), payload],
+                [_TOPIC_PART + _header(rng, flags=wire.EXTENSION) + payload],
+                [_TOPIC_PART, header, payload, payload, payload, payload],
             )
         )
     ]
@@ -399,8 +399,8 @@ def _topic_end(rng: _Bytes) -> Parts:
 
 
 def _topic(rng: _Bytes) -> Parts:
-    letter = rng.of(_NO_TOPIC).encode()
-    name = rng.of((b"%sa", b"a%sb", b"/robot/%s")) % rng.of((letter, letter, letter, rng.of(_NO_UTF8)))
+    letter = rng.of(_INVALID_IN_TOPICS).encode()
+    name = rng.of((b"%sa", b"a%sb", b"/robot/%s")) % rng.of((letter, letter, letter, rng.of(_INVALID_UTF8)))
     name = rng.of((name, name, name, name, b"", b"x" * 201, "ü".encode() * 101, b"a\0b"))
     tail = _header(rng), rng.bytes(rng.below(20))
     return [name + b"\0", *tail] if rng.below(2) or b"\0" in name else [name + b"\0" + b"".join(tail)]
@@ -410,14 +410,14 @@ def _header_size(rng: _Bytes) -> Parts:
     header = _header(rng) + bytes(8)
     size = rng.of((0, 1, 4, 16, 24, 31, 33, 40))
     tail: Parts = rng.of(([], [b"{}"], [b"{}", _EXTENSION], [b""]))
-    return [_GOOD_TOPIC, header[:size], *tail]
+    return [_TOPIC_PART, header[:size], *tail]
 
 
 def _version(rng: _Bytes) -> Parts:
     number = rng.of((0, 2, 3, 9, 128, 255))
     payload = rng.bytes(rng.below(20))
     header = _header(rng, rng.below(256), rng.below(2**16), rng.below(2**32), version=number)
-    return rng.of(([_GOOD_TOPIC, header, payload], [_GOOD_TOPIC + header + payload], [_GOOD_TOPIC, header]))  # type: ignore[no-any-return]
+    return rng.of(([_TOPIC_PART, header, payload], [_TOPIC_PART + header + payload], [_TOPIC_PART, header]))  # type: ignore[no-any-return]
 
 
 def _payload_size(rng: _Bytes) -> Parts:
@@ -428,9 +428,9 @@ def _payload_size(rng: _Bytes) -> Parts:
     extended = _header(rng, flags=wire.EXTENSION, size=claimed)
     return rng.of(  # type: ignore[no-any-return]
         (
-            [_GOOD_TOPIC, header, payload],
-            [_GOOD_TOPIC + header + payload],
-            [_GOOD_TOPIC, extended, payload, _EXTENSION],
+            [_TOPIC_PART, header, payload],
+            [_TOPIC_PART + header + payload],
+            [_TOPIC_PART, extended, payload, _EXTENSION],
         )
     )
 
@@ -451,7 +451,7 @@ def _extension(rng: _Bytes) -> Parts:
             b"\x81\xa1a\xdb\xff\xff\xff\xffabc",
         )
     )
-    return [_GOOD_TOPIC, _header(rng, flags=wire.EXTENSION), rng.bytes(rng.below(20)), part]
+    return [_TOPIC_PART, _header(rng, flags=wire.EXTENSION), rng.bytes(rng.below(20)), part]
 
 
 def _table(rng: _Bytes, count: int, sizes: Sequence[int]) -> bytes:
@@ -461,7 +461,7 @@ def _table(rng: _Bytes, count: int, sizes: Sequence[int]) -> bytes:
 
 def _batch(rng: _Bytes, body: bytes, flags: int = wire.BATCH, size: int | None = None) -> Parts:
     header = _header(rng, flags=flags, size=len(body) if size is None else size)
-    return [_GOOD_TOPIC + header + body]
+    return [_TOPIC_PART + header + body]
 
 
 def _whole(rng: _Bytes) -> bytes:
@@ -473,13 +473,13 @@ def _batch_form(rng: _Bytes) -> Parts:
     body = _whole(rng)
     other = rng.of((wire.LATCHED, wire.BYE, wire.SHARED, wire.OFFER, 64, 2**15))
     (frame,) = _batch(rng, body)
-    cut = len(_GOOD_TOPIC)
+    cut = len(_TOPIC_PART)
     return rng.of(  # type: ignore[no-any-return]
         (
             _batch(rng, body, wire.BATCH | other),
             _batch(rng, body, wire.BATCH | other, size=len(body) + 1),
             [frame[:cut], frame[cut : cut + 32], frame[cut + 32 :]],
-            [_GOOD_TOPIC, _header(rng, flags=wire.BATCH | wire.EXTENSION), body, _EXTENSION],
+            [_TOPIC_PART, _header(rng, flags=wire.BATCH | wire.EXTENSION), body, _EXTENSION],
         )
     )
 
@@ -518,9 +518,9 @@ def _codec(rng: _Bytes) -> Parts:
     batch = struct.pack("<IIQ", 1, len(payload), STAMP_NS) + payload
     return rng.of(  # type: ignore[no-any-return]
         (
-            [_GOOD_TOPIC, header, payload],
-            [_GOOD_TOPIC + header + payload],
-            [_GOOD_TOPIC + _header(rng, number, wire.BATCH, len(batch)) + batch],
+            [_TOPIC_PART, header, payload],
+            [_TOPIC_PART + header + payload],
+            [_TOPIC_PART + _header(rng, number, wire.BATCH, len(batch)) + batch],
         )
     )
 

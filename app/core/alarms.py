@@ -72,7 +72,7 @@ class _PendingSend:
     """Message to be sent by an alarm once the user confirms that the robot may move."""
 
     question: PermissionQuestion
-    done: DoneCallback
+    on_done: DoneCallback
 
 
 class SessionAlarms:
@@ -104,10 +104,10 @@ class SessionAlarms:
         self.on_event: Callable[[AlarmEvent], object] = _ignore_event
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
         self._watches: dict[str, Watch] = {}
-        self._removed: tuple[AlarmRule, int] | None = None
-        self._is_newer = False
+        self._last_removed: tuple[AlarmRule, int] | None = None
+        self._is_file_newer = False
         alarm_file = self._read(self.path)
-        carriers: dict[str, ActionStarter] = {
+        action_starters: dict[str, ActionStarter] = {
             "banner": _complete_with_alert,
             "console": self._log_to_console,
             "sound": self._play_sound,
@@ -117,8 +117,10 @@ class SessionAlarms:
             "send": self._send,
             "stop": self._stop,
         }
-        self.alarms = Alarms(alarm_file.rules, alarm_file.history, carriers, clock=clock, clock_s=clock_s)
-        self._written: object = self._state()
+        self.alarms = Alarms(
+            alarm_file.rules, alarm_file.history, action_starters, clock=clock, clock_s=clock_s
+        )
+        self._saved_state: object = self._state()
         self._view: GraphView | None = None
         self._active_ids: set[str] = set()
 
@@ -163,11 +165,11 @@ class SessionAlarms:
 
         If the list is full, an alert is raised instead.
         """
-        if self.alarms.rule(rule.id) is not None or self._has_room():
+        if self.alarms.rule(rule.id) is not None or self._check_capacity():
             self.alarms.set_rule(rule)
             self._update_watches()
 
-    def _has_room(self) -> bool:
+    def _check_capacity(self) -> bool:
         if len(self.rules) < MAX_ALARMS:
             return True
         text = _("You have {count} alarms, the maximum.").format(count=MAX_ALARMS)
@@ -181,7 +183,7 @@ class SessionAlarms:
         """Remove an alarm and return it; None if the id is unknown. Undo with `restore`."""
         rule = self.alarms.rule(rule_id)
         if rule is not None:
-            self._removed = (rule, self.rules.index(rule))
+            self._last_removed = (rule, self.rules.index(rule))
             self.alarms.remove(rule_id)
             self._session.alerts.resolve("alarms:most")
             self._update_watches()
@@ -189,8 +191,8 @@ class SessionAlarms:
 
     def restore(self) -> None:
         """Restore the last removed alarm at its position; if the list is full, an alert is raised instead."""
-        if self._removed is not None and self._has_room():
-            (rule, index), self._removed = self._removed, None
+        if self._last_removed is not None and self._check_capacity():
+            (rule, index), self._last_removed = self._last_removed, None
             rules = [*self.rules]
             rules.insert(index, rule)
             self.alarms.set_rules(rules)
@@ -229,9 +231,9 @@ class SessionAlarms:
         pending = self._pending_send
         if pending is not None and self._session.fleet.permission.question is not pending.question:
             self._pending_send = None
-            pending.done(
+            pending.on_done(
                 False,
-                _("not sent: {robots} isn't allowed to move").format(
+                _("not sent: no permission to move {robots}").format(
                     robots=format_list(pending.question.names)
                 ),
             )
@@ -246,12 +248,14 @@ class SessionAlarms:
             if self._worker.pop_result(FILE_NAME):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
-            self._written = None  # retried at the next check
+            self._saved_state = None  # retried at the next check
             self._session.alerts.raise_alert(
                 "alarms:kept",
                 "warn",
                 _("Alarms can't be saved."),
-                _("Alarms stay active until Studio closes: {reason}.").format(reason=error.strerror or error),
+                _("Reason: {reason}. The alarms stay active until Studio closes.").format(
+                    reason=error.strerror or error
+                ),
                 count=0,
             )
 
@@ -297,8 +301,8 @@ class SessionAlarms:
         if condition.kind == "silent" and isinstance(value, int | float) and value >= 1:
             template = _("{topic} has been silent for {time}")
             alert_text = template.format(topic=subject_text(condition), time=duration_text(round(value)))
-        details = [deed.text for deed in record.action_results] if record is not None else []
-        now = self.alarms.evaluator.state(rule).count
+        details = [result.text for result in record.action_results] if record is not None else []
+        total_count = self.alarms.evaluator.state(rule).count
         previous_count = next(
             (each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0
         )
@@ -309,7 +313,7 @@ class SessionAlarms:
             ". ".join([*(each[:1].upper() + each[1:] for each in details), ""]).strip(),
             button=_("Show the alarm"),
             action=SHOW_COMMAND,
-            count=max(count, now - previous_count) if previous_count else max(1, count),
+            count=max(count, total_count - previous_count) if previous_count else max(1, count),
         )
 
     # ---- actions
@@ -325,7 +329,7 @@ class SessionAlarms:
             on_done(False, _("sound isn't available"))
             return
         speaker.play(SOUND, VOLUME)
-        on_done(True, _("sound"))
+        on_done(True, _("sound played"))
 
     def _save_recording(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         if self.save_flight_recorder is None:
@@ -336,9 +340,9 @@ class SessionAlarms:
     def _run(self, _event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
         error_text = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
         if error_text:
-            on_done(False, _("“{name}” wasn't run: {reason}").format(name=action.name, reason=error_text))
+            on_done(False, _("“{name}” wasn't started: {reason}").format(name=action.name, reason=error_text))
         else:
-            on_done(True, _("ran “{name}”").format(name=action.name))
+            on_done(True, _("started “{name}”").format(name=action.name))
 
     def _stop(self, _event: AlarmEvent, _action: AlarmAction, on_done: DoneCallback) -> None:
         self._session.runs.stop()
@@ -352,14 +356,14 @@ class SessionAlarms:
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=event_text(event.rule.condition, event.value)
         )
-        go_on = partial(self._resume_send, event, action, on_done)
-        if not fleet.gate.request_permission(topic, go_on, msg_type, reason=reason):
+        resume = partial(self._resume_send, event, action, on_done)
+        if not fleet.gate.request_permission(topic, resume, msg_type, reason=reason):
             question = fleet.permission.question
             self._pending_send = None if question is None else _PendingSend(question, on_done)
             return
-        moved = fleet.gate.robots_moved_by(topic, msg_type)
-        if moved:
-            self.on_moved(moved, "alarm")
+        moved_robots = fleet.gate.robots_moved_by(topic, msg_type)
+        if moved_robots:
+            self.on_moved(moved_robots, "alarm")
         self._submit_command(event, action, on_done)
 
     def _resume_send(self, event: AlarmEvent, action: AlarmAction, on_done: DoneCallback) -> None:
@@ -384,9 +388,9 @@ class SessionAlarms:
 
     def _write(self) -> None:
         path, state = self.path, self._state()
-        if path is None or self._is_newer or state == self._written:
+        if path is None or self._is_file_newer or state == self._saved_state:
             return
-        self._written = state
+        self._saved_state = state
         # an incomplete rule could not be read back
         rules = [rule for rule in self.rules if problem_of(rule) is None]
         history = AlarmHistory([replace(record) for record in self.history.records])
@@ -403,7 +407,7 @@ class SessionAlarms:
             return alarm_file, next(iter(alarm_file.problems), "")
 
         stored = read_stored(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
-        self._is_newer = stored.is_newer
+        self._is_file_newer = stored.is_newer
         if stored.problem:
             is_partial = stored.value is not None
             title = _("Some alarms couldn't be read.") if is_partial else _("The alarms couldn't be read.")

@@ -51,10 +51,10 @@ class Console:
     def __init__(self, clock: Callable[[], float] = time.time, capacity: int = CAPACITY) -> None:
         self._clock = clock
         self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
-        self._unread = 0
+        self._pending_count = 0
         self._ignored_pids: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
-        self._errors = log_handler.NewErrorFilter()
-        self._count = 0
+        self._error_filter = log_handler.NewErrorFilter()
+        self._last_number = 0
         self.dropped_count = 0
         """Number of records from the network that were dropped because too many arrived at once."""
         self.revision = 0
@@ -99,7 +99,7 @@ class Console:
     def clear(self) -> None:
         """Remove all records."""
         self._lines.clear()
-        self._unread = 0
+        self._pending_count = 0
         self.revision += 1
 
     def reset(self) -> None:
@@ -107,29 +107,29 @@ class Console:
 
         Called when a replay seeks, because the records are then sent again.
         """
-        self._errors = log_handler.NewErrorFilter()
+        self._error_filter = log_handler.NewErrorFilter()
         self.clear()
 
     def _append(self, lines: Sequence[ConsoleRecord | Message]) -> None:
         self._lines.extend(lines)
-        self._unread = min(self._unread + len(lines), len(self._lines))
+        self._pending_count = min(self._pending_count + len(lines), len(self._lines))
         self.revision += 1
 
     def _decode_pending(self) -> None:
-        unread = [self._lines.pop() for _unread in range(self._unread)]
-        self._unread = 0
-        for line in reversed(unread):
+        pending = [self._lines.pop() for _index in range(self._pending_count)]
+        self._pending_count = 0
+        for line in reversed(pending):
             for record in self._decode_records(line) if isinstance(line, Message) else (line,):
-                self._count += 1
-                self._lines.append(replace(record, number=self._count))
+                self._last_number += 1
+                self._lines.append(replace(record, number=self._last_number))
 
     def _decode_records(self, message: Message) -> Sequence[ConsoleRecord]:
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
-                records = self._errors.new_records(message.payload)
+                records = self._error_filter.new_records(message.payload)
             else:
                 record = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
-                records = [record] if self._errors.is_new(record) else []
+                records = [record] if self._error_filter.is_new(record) else []
         except NepError:
             return ()  # an alert reports it, as for every topic
         return [

@@ -148,10 +148,10 @@ class LogFile(RotatingFileHandler):
     def _open(self) -> io.TextIOWrapper:
         path = Path(self.baseFilename)
         path.parent.mkdir(0o700, parents=True, exist_ok=True)
-        number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-        stream = os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
-        begins = logging.LogRecord("studio", logging.INFO, "", 0, VERSION_MESSAGE, (__version__,), None)
-        stream.write(f"{self.format(begins)}{self.terminator}")
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        stream = os.fdopen(descriptor, "a", encoding="utf-8", errors="backslashreplace")
+        first_record = logging.LogRecord("studio", logging.INFO, "", 0, VERSION_MESSAGE, (__version__,), None)
+        stream.write(f"{self.format(first_record)}{self.terminator}")
         return stream
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
@@ -172,23 +172,23 @@ def _log_uncaught(kind: type[BaseException], error: BaseException, trace: Traceb
     _log.error("uncaught exception: %s", error_text(error), exc_info=(kind, error, trace))
 
 
-def _log_uncaught_in_thread(raised: threading.ExceptHookArgs) -> None:
-    error = raised.exc_value
+def _log_uncaught_in_thread(hook_args: threading.ExceptHookArgs) -> None:
+    error = hook_args.exc_value
     if error is None or isinstance(error, SystemExit):
         return
-    name = raised.thread.name if raised.thread is not None else "a thread"
+    name = hook_args.thread.name if hook_args.thread is not None else "a thread"
     _log.error(
         "uncaught exception in thread '%s': %s",
         name,
         error_text(error),
-        exc_info=(type(error), error, raised.exc_traceback),
+        exc_info=(type(error), error, hook_args.exc_traceback),
     )
 
 
-def _log_unraisable(raised: sys.UnraisableHookArgs) -> None:
-    error = raised.exc_value
+def _log_unraisable(hook_args: sys.UnraisableHookArgs) -> None:
+    error = hook_args.exc_value
     if error is not None:
-        trace = raised.exc_traceback
+        trace = hook_args.exc_traceback
         _log.error(
             "exception ignored in a finalizer: %s", error_text(error), exc_info=(type(error), error, trace)
         )
@@ -223,17 +223,20 @@ class FaultAlerts:
         self._faults: dict[str, _Fault] = {}
 
     @contextmanager
-    def guarded(self, operation: str, **holes: object) -> Iterator[None]:
+    def guarded(self, operation: str, **placeholder_values: object) -> Iterator[None]:
         """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
             operation: Translatable phrase that completes "can't ..."; mark it with `lazy`.
-            holes: Values for the placeholders in ``operation``.
+            placeholder_values: Values for the placeholders in ``operation``.
         """
         try:
             yield
         except Exception as error:  # noqa: BLE001  the following steps must run after any error
-            english, translated = operation.format(**holes), _(operation).format(**holes)
+            english, translated = (
+                operation.format(**placeholder_values),
+                _(operation).format(**placeholder_values),
+            )
             _log.exception("can't %s", english)
             self._record_failure(
                 english, _("Studio can't {what}: {error}").format(what=translated, error=error_text(error))

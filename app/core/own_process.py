@@ -42,25 +42,25 @@ class OwnProgram:
 
     def __init__(self, file: Path | None = None) -> None:
         # By default the executable of a frozen build; without one, nothing is checked.
-        frozen = bool(getattr(sys, "frozen", False))
-        self._file = file if file is not None or not frozen else Path(sys.executable)
-        self._initial = self._signature()
+        is_frozen = bool(getattr(sys, "frozen", False))
+        self._file = file if file is not None or not is_frozen else Path(sys.executable)
+        self._initial_signature = self._signature()
 
     def executable_state(self) -> ExecutableState:
         """Return the state of the executable file: "" (unchanged), "replaced" (by an update), or "gone".
 
         The state is always "" if Studio is not a frozen build.
         """
-        now = self._signature()
-        if now == self._initial:
+        signature = self._signature()
+        if signature == self._initial_signature:
             return ""
-        return "replaced" if now is not None else "gone"
+        return "replaced" if signature is not None else "gone"
 
     def _signature(self) -> tuple[int, ...] | None:
         if self._file is None:
             return None
         try:
-            about = self._file.stat()
+            file_stat = self._file.stat()
         except OSError:
             return None
-        return about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+        return file_stat.st_dev, file_stat.st_ino, file_stat.st_size, file_stat.st_mtime_ns

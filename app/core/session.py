@@ -116,28 +116,28 @@ class Session:
         self._faults = FaultAlerts(self.alerts, clock)
         self._mailbox, self._checks = Mailbox(), DecodeChecker()
         self._watches = Watches(self._start_watch, self._stop_watch, self._on_unwatched)
-        self._add_network(source if source is not None else partial(LiveSource, always=LOG_TOPICS))
+        self._add_network(source if source is not None else partial(LiveSource, permanent_topics=LOG_TOPICS))
         self._add_robots()
         self._add_programs(journal_folder)
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.alarms = SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
         self.acting = SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
         recorder = self.settings, self.alerts, self.address, self._mailbox.post_event
-        self.recordings = SessionRecordings(*recorder, clock=clock, reads_apart=start_processes)
+        self.recordings = SessionRecordings(*recorder, clock=clock, uses_reader_process=start_processes)
         self._connect_parts()
-        self._program, self.tick_ms = OwnProgram(), 0.0
+        self._own_program, self.tick_ms = OwnProgram(), 0.0
         self._robots_revision = self._topics_revision = -1
-        self._reachable: tuple[StopTarget, ...] = ()
-        self._retries_stop_connections, self._next_check, self._closing_replays = False, 0.0, []
+        self._stop_targets: tuple[StopTarget, ...] = ()
+        self._retries_stop_connections, self._next_check_s, self._closing_replays = False, 0.0, []
 
-    def _add_network(self, make_source: SourceFactory) -> None:
+    def _add_network(self, create_source: SourceFactory) -> None:
         self.topics, self.nodes = Topics(), Nodes()
         self.traffic = Traffic(self.topics)
         self.images = Images(self.watch, self._clock)
         self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_capacity)
         post_event = self._mailbox.post_event
         sinks = [self._checks.check, self._mailbox.post, self._offer_images, self._evaluate_alarms]
-        self.source: Source = make_source(self.address, sinks, post_event)
+        self.source: Source = create_source(self.address, sinks, post_event)
         self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
         self.parameters = ParameterSetter(self.source.submit)
         self.graph: GraphView | None = None
@@ -178,7 +178,7 @@ class Session:
             self.recordings.events.on_alarm,
         )
         self.alarms.on_moved = self.acting.on_moved = self.fleet.moved.record_command
-        self._bridged = BridgedCommands(self.fleet.moved.record_command)
+        self._bridged_commands = BridgedCommands(self.fleet.moved.record_command)
 
     def _offer_images(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live
@@ -217,14 +217,14 @@ class Session:
         self._end_replay()
         self._live = live
         opener = self.recordings.new_opener()
-        opened = self.replay = replay_module.Replay(
+        replay = self.replay = replay_module.Replay(
             path, self.settings, self.alerts, clock=self._clock, acting=self.acting, opener=opener
         )
-        self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
-        self.images, self.series, self.graph = opened.images, opened.series, None
+        self.topics, self.nodes, self.networks = replay.topics, replay.nodes, replay.networks
+        self.images, self.series, self.graph = replay.images, replay.series, None
         self.source_revision += 1
-        opened.start()
-        return opened
+        replay.start()
+        return replay
 
     def return_to_live(self) -> None:
         """Close the recording and show the live network."""
@@ -239,10 +239,10 @@ class Session:
 
     def _end_replay(self) -> None:
         if self.replay is not None:
-            ended, self.replay = self.replay, None
+            replay, self.replay = self.replay, None
             self._closing_replays = [each for each in self._closing_replays if not each.has_ended]
-            self._closing_replays.append(ended)
-            ended.request_stop()
+            self._closing_replays.append(replay)
+            replay.request_stop()
 
     @property
     def starting_robots(self) -> tuple[str, ...]:
@@ -298,11 +298,11 @@ class Session:
     def tick(self) -> None:
         """Apply the events and messages that threads have posted since the last tick."""
         now, now_ns = self._clock(), self._clock_ns()
-        drained = self._mailbox.drain()
-        for event in drained.events:
+        drain_result = self._mailbox.drain()
+        for event in drain_result.events:
             with self.guarded(lazy("handle {event}"), event=type(event).__name__):
                 self._on_event(event, now)
-        self._on_messages(drained, now)
+        self._on_messages(drain_result, now)
         with self.guarded(lazy("update the ages of topics and nodes")):
             live = self.live
             live.topics.update_ages(now, now_ns)
@@ -329,26 +329,26 @@ class Session:
         with self.guarded(lazy("update the run")):
             self.runs.tick()
             self.recordings.events.update_run(self.runs.state)
-        if now >= self._next_check:
-            self._next_check = now + CHECK_INTERVAL_S
+        if now >= self._next_check_s:
+            self._next_check_s = now + CHECK_INTERVAL_S
             self._check(now)
         self.tick_ms = (self._clock() - now) * 1000
 
     def _tick_replay(self, replay: replay_module.Replay, now: float) -> None:
-        was_open = replay.opened is not None
+        was_open = replay.opened_recording is not None
         replay.tick(now)
         self.graph = replay.graph
-        if not was_open and replay.opened is not None:
+        if not was_open and replay.opened_recording is not None:
             self.source_revision += 1  # its topics and start time are available from now on
 
-    def guarded(self, phrase: str, **holes: object) -> AbstractContextManager[None]:
+    def guarded(self, phrase: str, **placeholder_values: object) -> AbstractContextManager[None]:
         """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
             phrase: Translatable phrase that completes "can't ..."; mark it with `lazy`.
-            holes: Values for the placeholders in ``phrase``.
+            placeholder_values: Values for the placeholders in ``phrase``.
         """
-        return self._faults.guarded(phrase, **holes)
+        return self._faults.guarded(phrase, **placeholder_values)
 
     def _check(self, now: float) -> None:
         self._faults.check()
@@ -366,9 +366,9 @@ class Session:
                 self.launcher.ensure_master_with_backoff()
             self.web_pages.check()
         with self.guarded(lazy("count lost messages")):
-            missed = self.source.lost_counts()
+            lost_counts = self.source.lost_counts()
             self.traffic.count_lost(
-                {t: count for t, count in missed.items() if self._watches.is_watched(t)}, now
+                {topic: count for topic, count in lost_counts.items() if self._watches.is_watched(topic)}, now
             )
         with self.guarded(lazy("report problems with Stop")):
             self._check_stop_connections()
@@ -377,7 +377,7 @@ class Session:
             self.documents.retry_journals()
             self._health.report_journal_problem(self.documents.journal_error)
             self._health.report_settings_problem(self.settings.write_error)
-            self._health.report_executable_state(self._program.executable_state())
+            self._health.report_executable_state(self._own_program.executable_state())
 
     def _close_replays(self) -> None:
         self.return_to_live()
@@ -391,28 +391,28 @@ class Session:
         steps: list[tuple[str, Callable[[], object]]] = [
             ("stop the program", self.runs.close),
             ("stop sending by hand", self.acting.close),
-            ("save the tabs", lambda: self.tabs.save(ended_well=True)),
+            ("save the tabs", lambda: self.tabs.save(has_ended_normally=True)),
             ("save the robots", partial(self.last_robots.save, self.launcher)),
             ("save the alarms", self.alarms.close),
             ("close the behaviours", self.documents.close_all),
             ("silence the robots", self.voices.close),
-            ("end the robots", self.fleet.close),
-            ("keep the room", self.room.close),
-            *([("end the stopper", self.stopper.close)] if self.stopper is not None else []),
-            ("end the pictures", live.images.close),
-            ("end the doctor", self.doctor.close),
+            ("close the connections to the robots", self.fleet.close),
+            ("save the room", self.room.close),
+            *([("close the stopper", self.stopper.close)] if self.stopper is not None else []),
+            ("stop the image streams", live.images.close),
+            ("stop the doctor", self.doctor.close),
             ("stop the recorder", self.recordings.close),  # before the master, which the recorder may need
             ("close the recording", self._close_replays),
             ("leave the network", self.source.close),
             ("leave other networks", live.networks.close),
-            ("end setting parameters", self.parameters.close),
-            ("end what was started here", self.launcher.close),
-            ("end the reach", self.remote_access.close),
-            ("end the web server", self.web_pages.close),
+            ("stop setting parameters", self.parameters.close),
+            ("stop the child processes", self.launcher.close),
+            ("close remote access", self.remote_access.close),
+            ("stop the web server", self.web_pages.close),
         ]
-        for description, end in steps:
+        for description, close_part in steps:
             with log_errors(description):
-                end()
+                close_part()
 
     # -- private ---------------------------------------------------------------------------------------------
 
@@ -439,16 +439,16 @@ class Session:
     def _create_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)
 
-    def _on_messages(self, drained: DrainResult, now: float) -> None:
-        batches, others = split_by_network(drained.batches)
+    def _on_messages(self, drain_result: DrainResult, now: float) -> None:
+        batches, other_batches = split_by_network(drain_result.batches)
         for topic, batch in batches.items():
             with self.guarded(lazy("receive messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
-        for key, batch in others.items():
+        for key, batch in other_batches.items():
             with self.guarded(lazy("receive messages of {topic}"), topic=key):
                 self.live.networks.add(key, batch, now)
         with self.guarded(lazy("update the plots")):
-            self.live.series.dispatch(drained.batches)
+            self.live.series.dispatch(drain_result.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
         with self.guarded(lazy("update the robots")):
@@ -461,17 +461,17 @@ class Session:
             self._health.update(
                 {topic: result for topic, result in results.items() if self._watches.is_watched(topic)}
             )
-        if drained.lost_event_count:
+        if drain_result.lost_event_count:
             self.alerts.raise_alert(
                 "mailbox",
                 "warn",
                 ngettext(
                     "{count} event was lost because the window was busy.",
                     "{count} events were lost because the window was busy.",
-                    drained.lost_event_count,
-                ).format(count=drained.lost_event_count),
+                    drain_result.lost_event_count,
+                ).format(count=drain_result.lost_event_count),
                 _("Panels may be up to a second out of date."),
-                count=drained.lost_event_count,
+                count=drain_result.lost_event_count,
             )
 
     def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
@@ -505,14 +505,14 @@ class Session:
                     "error",
                     event.message,
                     event.detail.splitlines()[-1] if event.detail else "",
-                    button=_("Restart it") if event.is_robot else _(OPEN_DOCTOR_LABEL),
+                    button=_("Restart the robot") if event.is_robot else _(OPEN_DOCTOR_LABEL),
                     action=f"connect:{event.name}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
                 self.alerts.raise_alert(
                     f"watch:{event.topic}",
                     "warn",
-                    _("{topic} can't be decoded.").format(topic=event.topic),
+                    _("Can't subscribe to {topic}.").format(topic=event.topic),
                     event.message,
                 )
             case (
@@ -547,9 +547,9 @@ class Session:
         if self._master_change_detector.is_incomplete(self.live.graph, view, now):
             return
         live = self.live
-        before = live.graph
-        if before is not None and (before.epoch, before.revision) != (view.epoch, view.revision):
-            for line in change_messages(before, view):
+        previous = live.graph
+        if previous is not None and (previous.epoch, previous.revision) != (view.epoch, view.revision):
+            for line in change_messages(previous, view):
                 self.console.add("info", "master", line)
         if self._live is None:
             self.graph = view
@@ -558,26 +558,26 @@ class Session:
         live.topics.update(view, now)
         live.nodes.update(view, now)
         self.fleet.update(view)
-        self._bridged.update(view, (link.robot for link in self.fleet.links if not link.is_virtual))
+        self._bridged_commands.update(view, (link.robot for link in self.fleet.links if not link.is_virtual))
         self.room.update(view)
-        for note in self.fleet.take_notices():
-            self.console.add("warn", "robots", note)
+        for notice in self.fleet.take_notices():
+            self.console.add("warn", "robots", notice)
         if self.stopper is not None:
             self.stopper.update_graph(view)
         self.traffic.update_graph(view, now)
         self._health.update_graph_alerts(view)
 
     def _on_master_lost(self, event: MasterLost) -> None:
-        was_there = self.master.kind == "connected"
+        was_connected = self.master.kind == "connected"
         self.master = MasterState("none", event.address, event.message)
         self.alarms.update_graph(None)
-        if was_there:
+        if was_connected:
             self.console.add("error", "master", event.message)
             self.alerts.raise_alert(
                 "master",
                 "warn",
-                _("Lost the connection to the master; starting a new one."),
-                _("Connected programs keep running; new ones can't join until it is back."),
+                _("Lost the connection to the master."),
+                _("Connected programs keep running. New programs can't join until a master responds."),
                 button=_(OPEN_DOCTOR_LABEL),
                 action="help.doctor",
             )
@@ -611,7 +611,7 @@ class Session:
                 link.is_reachable = self.stopper.is_reachable(link.name)
         targets = self.fleet.stop_targets
         stopper = self.stopper
-        if stopper is not None and (targets != self._reachable or self._retries_stop_connections):
-            self._reachable, self._retries_stop_connections = targets, False
+        if stopper is not None and (targets != self._stop_targets or self._retries_stop_connections):
+            self._stop_targets, self._retries_stop_connections = targets, False
             stopper.set_expected(targets)
             self.source.submit(MONITORING_FAILED_MESSAGE, lambda _node: stopper.set_robots(targets))

@@ -147,11 +147,11 @@ class DiffDrive:
     @drives("go to x %x m y %y m", "map-pin", "goes to %x, %y m", unit="m", title="go to")
     def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
         """Turn to a position and move there in a straight line. The robot doesn't avoid obstacles."""
-        here_x, here_y, facing = self.wheels.pose()
-        distance_m = math.hypot(x - here_x, y - here_y)
+        current_x, current_y, current_theta_deg = self.wheels.pose()
+        distance_m = math.hypot(x - current_x, y - current_y)
         if distance_m < MIN_DISTANCE_M:
             return
-        turn_deg = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
+        turn_deg = math.degrees(math.atan2(y - current_y, x - current_x)) - current_theta_deg
         self._turn_on_spot(
             call, (turn_deg + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(distance_m, 2)}
         )
@@ -166,7 +166,7 @@ class DiffDrive:
         on_busy="replace",
         cancellable=False,
     )
-    def light(self, call: Call, colour: Colour = "#35c26b") -> None:  # noqa: ARG002 - it needs no call
+    def light(self, call: Call, colour: Colour = "#35c26b") -> None:  # noqa: ARG002 - every action receives its call
         """Set the colour of the light."""
         self.wheels.set_light(colour)
 
@@ -175,11 +175,11 @@ class DiffDrive:
         """Brake and return when the robot stands still. Raises Failed if the wheels still turn after 1 s."""
         with self._steering:  # running actions are canceled and don't steer any more
             self.wheels.drive(0.0, 0.0)
-        waited = threading.Event()
-        for _turn in range(round(STANDSTILL_TIMEOUT_S / 0.005)):
+        never_set = threading.Event()
+        for _attempt in range(round(STANDSTILL_TIMEOUT_S / 0.005)):
             if self.wheels.is_still():
                 return
-            waited.wait(0.005)
+            never_set.wait(0.005)
         raise Failed(_("its wheels keep turning"))
 
     # ---- steering ---------------------------------------------------------------------------------
@@ -222,14 +222,14 @@ class DiffDrive:
     def _turn_on_spot(
         self, call: Call, angle: float, create_feedback: Callable[[float], dict[str, object]]
     ) -> None:
-        last = [self.wheels.pose()[2]]
-        turned = [0.0]
+        last_theta_deg = [self.wheels.pose()[2]]
+        total_deg = [0.0]
 
         def turned_deg() -> float:
-            now = self.wheels.pose()[2]
-            turned[0] += (now - last[0] + 180.0) % 360.0 - 180.0
-            last[0] = now
-            return abs(turned[0])
+            theta_deg = self.wheels.pose()[2]
+            total_deg[0] += (theta_deg - last_theta_deg[0] + 180.0) % 360.0 - 180.0
+            last_theta_deg[0] = theta_deg
+            return abs(total_deg[0])
 
         def steer(remaining: float) -> None:
             speed = min(TURN_SPEED, max(MIN_TURN_SPEED, math.sqrt(2 * TURN_DECELERATION * remaining)))

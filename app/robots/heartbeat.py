@@ -21,29 +21,29 @@ class Heartbeat:
 
     Args:
         sender: Id of this program in the messages.
-        thread: Name of the thread.
+        thread_name: Name of the thread.
     """
 
-    def __init__(self, sender: str, thread: str) -> None:
-        self._sender, self._name = sender, thread
+    def __init__(self, sender: str, thread_name: str) -> None:
+        self._sender, self._thread_name = sender, thread_name
         self._lock = threading.Lock()
         self._robots: dict[str, Publish] = {}
         self._changed = threading.Event()
-        self._closing = False
+        self._is_closing = False
         self._thread: threading.Thread | None = None
-        self._errors = SuppressedErrors(_log, thread)
+        self._errors = SuppressedErrors(_log, thread_name)
 
     def start(self, robot: str, publish: Publish) -> None:
         """Send heartbeats to a robot until `stop`.
 
         Args:
             robot: Name of the robot.
-            publish: Publishes on the robot's command topic.
+            publish: Function that publishes on the robot's command topic.
         """
         with self._lock:
             self._robots[robot] = publish
-            if self._thread is None and not self._closing:
-                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            if self._thread is None and not self._is_closing:
+                self._thread = threading.Thread(target=self._run, name=self._thread_name, daemon=True)
                 self._thread.start()
         self._changed.set()
 
@@ -54,7 +54,7 @@ class Heartbeat:
 
     def close(self) -> None:
         """Stop the thread."""
-        self._closing = True
+        self._is_closing = True
         self._changed.set()
         if self._thread is not None:
             self._thread.join(timeout=2)
@@ -62,12 +62,12 @@ class Heartbeat:
     def _run(self) -> None:
         while True:
             self._changed.clear()
-            if self._closing:
+            if self._is_closing:
                 return
             with self._lock:
                 robots = list(self._robots.values())
             for publish in robots:
-                with self._errors:  # the other robots must still get theirs
+                with self._errors:  # an error for one robot must not stop the heartbeats to the others
                     self._publish(publish)
             self._changed.wait(HEARTBEAT_INTERVAL_S if robots else None)
 

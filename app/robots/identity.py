@@ -56,7 +56,7 @@ class Identity:
 
 
 def identity_of(view: GraphView, node_id: str) -> Identity:
-    """Return the identity of a node in the graph; only with its id if it is not in the graph."""
+    """Return the identity of a node in the graph; it contains only the id if the node isn't in the graph."""
     node = view.nodes.get(node_id)
     return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
 
@@ -157,8 +157,8 @@ def stop_error_text(name: str, error: object) -> str:
         error: Error in the robot's reply, of any type.
     """
     message = "".join(
-        sign if sign.isprintable() else " "
-        for sign in bounded_str(error or _("the stop command failed"), MAX_ERROR_LENGTH)
+        character if character.isprintable() else " "
+        for character in bounded_str(error or _("the stop command failed"), MAX_ERROR_LENGTH)
     )
     message = " ".join(message[:MAX_STOP_ERROR_LENGTH].split()).rstrip(".")
     return (
@@ -174,16 +174,16 @@ def is_may_move_error(name: str, message: str) -> bool:
     )
 
 
-def topic_conflict(robot: Robot, others: Iterable[Robot]) -> str | None:
+def topic_conflict(robot: Robot, robots: Iterable[Robot]) -> str | None:
     """Return an error message if a topic of a robot belongs to another robot, else None.
 
     ``/NAME/...`` belongs to the robot with that name; other topics belong to the first robot that uses them.
 
     Args:
         robot: Robot to check.
-        others: All known robots.
+        robots: All known robots; `robot` itself is ignored.
     """
-    other_robots = [other for other in others if other.name != robot.name]
+    other_robots = [other for other in robots if other.name != robot.name]
     for topic in set(reserved_topics(robot)) - SHARED_TOPICS:
         if is_own_topic(robot.name, topic):
             continue

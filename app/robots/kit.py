@@ -1,7 +1,7 @@
 """Driver kit: everything a module needs to drive a robot (docs/robots.md has a complete example).
 
 A robot is declared as a class; its description, blocks, forms and input checks are generated from the typed
-methods. The :class:`Driver` adds cancelling, timeouts, busy policies, the heartbeat watchdog, the confirmed
+methods. The :class:`Driver` adds cancellation, timeouts, busy policies, the heartbeat watchdog, the confirmed
 stop and RIZE's dialect.
 
 Example:

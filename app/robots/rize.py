@@ -1,7 +1,7 @@
 """Robots of RIZE: their primitives, and conversion of ``robot_action`` messages in both directions.
 
 Robots of RIZE don't describe themselves; all are assumed to have the primitives of RIZE's drivers. They don't
-reply to a stop: `SafeStop.confirmed` is False, and the user is informed that the stop can't be confirmed.
+reply to a stop: `SafeStop.can_confirm` is False, and the user is informed that the stop can't be confirmed.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from app.robots.driver.common_actions import drives, moves
 from app.robots.driver.declare import Kind, action, safe_stop
 from app.robots.driver.process import main as drive
 from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Words
-from app.robots.virtual.body import START_PITCH
+from app.robots.virtual.body import START_PITCH_DEG
 from app.robots.virtual.robot import FEEDBACK_INTERVAL_S, SimulatedRobot
 from app.robots.virtual.room import Room
 from app.robots.virtual.sounds import SOUNDS, Notes, SoundName
@@ -50,8 +50,8 @@ def _rize_walk(rize_input: str, options: Mapping[str, object]) -> Mapping[str, o
 
 
 def _rize_light(rize_input: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    parts = [to_number(options.get(name)) for name in "RGB"]
-    colour = "".join(f"{min(255, max(0, int(part or 0))):02x}" for part in parts)
+    components = [to_number(options.get(name)) for name in "RGB"]
+    colour = "".join(f"{min(255, max(0, int(component or 0))):02x}" for component in components)
     return {"where": "eyes" if rize_input == "eyes" else "both", "colour": f"#{colour}"}
 
 
@@ -154,8 +154,8 @@ class VirtualPepper(SimulatedRobot):
         speed: Annotated[float, Range(5, 90, 5, "deg/s")] = 40.0,
     ) -> None:
         """Turn on the spot."""
-        signed = angle if direction == "left" else -angle
-        self._run_motion(call, lambda body: body.turn(signed, speed))
+        signed_angle = angle if direction == "left" else -angle
+        self._run_motion(call, lambda body: body.turn(signed_angle, speed))
 
     @drives(
         "walk %distance m",
@@ -199,7 +199,7 @@ class VirtualPepper(SimulatedRobot):
         self,
         call: Call,
         yaw: Annotated[float, Range(-119, 119, 5, "deg", "angle"), Title("to the left")] = 0.0,
-        pitch: Annotated[float, Range(-40, 36, 2, "deg", "angle"), Title("down")] = START_PITCH,
+        pitch: Annotated[float, Range(-40, 36, 2, "deg", "angle"), Title("down")] = START_PITCH_DEG,
     ) -> None:
         """Turn the head; right and up are negative."""
         self._turn_head(call, yaw, pitch)
@@ -260,7 +260,7 @@ class VirtualPepper(SimulatedRobot):
     )
     def light(
         self,
-        call: Call,  # noqa: ARG002 - every action is given its call
+        call: Call,  # noqa: ARG002 - every action receives its call
         where: Literal["eyes", "shoulders", "both"] = "eyes",
         colour: Colour = "#35b0fa",
     ) -> None:
@@ -318,9 +318,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
-    options, others = parser.parse_known_args(arguments)
+    options, driver_arguments = parser.parse_known_args(arguments)
     body = type("VirtualPepper", (VirtualPepper,), {"start_room": create_room(options.seed)})
-    return drive(replace(ROBOT, body=body), others)
+    return drive(replace(ROBOT, body=body), driver_arguments)
 
 
 if __name__ == "__main__":

@@ -28,8 +28,8 @@ from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
 _STATE_PERIOD_STEPS, _SLOW_PERIOD_STEPS, _BATTERY_PERIOD_STEPS = 2, 6, 60
 _MAX_STEP_S = 0.25
-_EYE_HEIGHT = 0.22
-_EYE_PITCH = -6.0
+_EYE_HEIGHT_M = 0.22
+_EYE_PITCH_DEG = -6.0
 _JOIN_TIMEOUT_S = 2.0
 
 
@@ -50,9 +50,9 @@ class VirtualWheels:
         self._ended = threading.Event()
         self._camera = Camera(self.body.room)
         self._visible_colours: set[str] = set()
-        like = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
-        self._shared = SharedRoom(link, clock, self.body, self._lock, like)
-        self._stepped_s = clock.now()
+        appearance = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
+        self._shared = SharedRoom(link, clock, self.body, self._lock, appearance)
+        self._last_step_s = clock.now()
         self._threads = [
             threading.Thread(target=self._run_body, name=f"{link.name} wheels", daemon=True),
             threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
@@ -108,15 +108,15 @@ class VirtualWheels:
 
     def _run_body(self) -> None:
         with self._lock:
-            self._stepped_s = self._clock.now()
+            self._last_step_s = self._clock.now()
         for step, _ in enumerate(Ticker(self._clock, self._ended, 1 / BODY_HZ)):
             with self._lock:
                 self._advance_locked()
-                happenings = list(self.body.events)
+                events = list(self.body.events)
                 self.body.events.clear()
                 state, distance = self._drawing_state(), self.body.distance
-            for happening in happenings:
-                self._link.happen(happening.event, **happening.data)
+            for event in events:
+                self._link.happen(event.name, **event.data)
             if step % _STATE_PERIOD_STEPS == 0:
                 self._shared.publish_changes()
                 self._link.publish_value("state", state)
@@ -131,9 +131,9 @@ class VirtualWheels:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.update_body()
-        self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
+        self.body.step(min(max(0.0, now - self._last_step_s), _MAX_STEP_S))
         self._shared.update_map()
-        self._stepped_s = now
+        self._last_step_s = now
 
     def _drawing_state(self) -> dict[str, object]:
         body = self.body
@@ -157,7 +157,7 @@ class VirtualWheels:
                 continue
             with self._lock:
                 body = self.body
-                room, lens = body.room, Lens((body.x, body.y, _EYE_HEIGHT), body.theta_deg, _EYE_PITCH)
+                room, lens = body.room, Lens((body.x, body.y, _EYE_HEIGHT_M), body.theta_deg, _EYE_PITCH_DEG)
             image = self._camera.picture(room, lens)
             if is_watched:
                 self._link.sense("camera", image)
@@ -172,15 +172,15 @@ class VirtualWheels:
         Args:
             change: Payload of a message on ``/<name>/world``: move, hold, reset, start, or a simulated event.
         """
-        moved, x, y = change.get("move"), finite_float(change.get("x")), finite_float(change.get("y"))
+        moved_name, x, y = change.get("move"), finite_float(change.get("x")), finite_float(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
                 self.body.set_lifted(is_lifted=change["hold"] is True)
-            if isinstance(moved, str) and x is not None and y is not None:
-                if moved == ROBOT_ITSELF:
+            if isinstance(moved_name, str) and x is not None and y is not None:
+                if moved_name == ROBOT_ITSELF:
                     self.body.carry(x, y)
                 else:
-                    self._shared.move(moved, x, y)
+                    self._shared.move(moved_name, x, y)
             if change.get("reset") is True:
                 self.body.reset(self._shared.reset())
             if "start" in change:

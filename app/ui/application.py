@@ -65,20 +65,20 @@ class Options:
 
     Attributes:
         files: Files to open.
-        demo: Open the first example and start a virtual robot.
+        starts_demo: True to open the first example and start a virtual robot.
         theme: Theme to use instead of the saved one: "light", "dark" or "system".
         self_drive: Folder for the screenshots of an unattended run, or None for normal use.
-        new_window: Open a window even if Studio is already running.
+        opens_new_window: True to open a window even if Studio is already running.
     """
 
     files: tuple[Path, ...] = ()
-    demo: bool = False
+    starts_demo: bool = False
     theme: str | None = None
     self_drive: Path | None = None
-    new_window: bool = False
+    opens_new_window: bool = False
     make_driver: Callable[[MainWindow], SelfDrive] | None = None
     """Factory of the `SelfDrive` that operates the window; called before the window is shown."""
-    web: bool = True
+    loads_web_view: bool = True
     """True to load the block editor's web page; False avoids the start of the web engine."""
 
     @property
@@ -87,7 +87,7 @@ class Options:
 
         Such a window doesn't receive start requests of other processes and doesn't save its tabs.
         """
-        return self.new_window or self.self_drive is not None or self.make_driver is not None
+        return self.opens_new_window or self.self_drive is not None or self.make_driver is not None
 
 
 def make_application() -> QApplication:
@@ -104,9 +104,11 @@ def make_application() -> QApplication:
     application.setApplicationDisplayName("NEP Studio")
     application.setDesktopFileName("nep-studio")
     translate_qt(application)
-    refused = fonts.load()
-    if refused:
-        message = _("Qt can't load the fonts {fonts}; using fallback fonts").format(fonts=", ".join(refused))
+    failed_fonts = fonts.load()
+    if failed_fonts:
+        message = _("Qt can't load the fonts {fonts}; using fallback fonts").format(
+            fonts=", ".join(failed_fonts)
+        )
         sys.stderr.write(f"{message}\n")
     return application
 
@@ -127,17 +129,17 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
     return translator
 
 
-def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
+def deferred_steps(window: MainWindow, *, loads_web_view: bool = True) -> list[Callable[[], object]]:
     """Return the startup steps to run after the first paint.
 
     The steps create panels, import modules and load the block editor.
 
     Args:
-        web: True to load the block editor.
+        loads_web_view: True to load the block editor.
     """
     panels = window.panels.import_steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in PRELOADED_MODULES)
-    view = (partial(import_web_view, window.session.alerts),) if web else ()
+    view = (partial(import_web_view, window.session.alerts),) if loads_web_view else ()
     return [*panels, *modules, *view, *window.preload_steps()]
 
 
@@ -214,7 +216,10 @@ def save_version(window: MainWindow, now_s: float) -> None:
 
 
 def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
-    """Close the window on SIGINT, SIGTERM and SIGHUP, and when the desktop session ends."""
+    """Close the window on SIGINT, SIGTERM and SIGHUP.
+
+    An exit because of these signals or the end of the desktop session isn't recorded as a crash.
+    """
 
     def close(_number: int, _frame: FrameType | None) -> None:
         this_run.expect_exit()
@@ -240,7 +245,7 @@ def handle_start_request(window: MainWindow, request: StartRequest) -> None:
     """
     if request.files:
         window.commands.files.open_all(request.files)
-    elif request.demo:
+    elif request.starts_demo:
         window.commands.behaviours.start_demo()
     if window.isVisible():
         window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
@@ -289,11 +294,11 @@ def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], o
     With a self-drive, the session is started immediately and there are no steps.
     """
     layout = "" if options.is_standalone else last_layout(window)
-    has_request = bool(options.files or options.demo)
+    has_request = bool(options.files or options.starts_demo)
     if options.self_drive is not None:
         window.start_session()
         # The self-drive starts the demonstration itself.
-        handle_start_request(window, StartRequest(options.files, demo=False))
+        handle_start_request(window, StartRequest(options.files, starts_demo=False))
         return []
     offer_first_steps(window, has_request=has_request)
     if not has_request and not layout:
@@ -301,7 +306,7 @@ def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], o
 
     def show() -> None:
         if has_request:
-            handle_start_request(window, StartRequest(options.files, options.demo))
+            handle_start_request(window, StartRequest(options.files, options.starts_demo))
         else:
             window.commands.view.show_layout(layout)
         if window.bench is None:  # the file can't be opened, which an alert explains
@@ -311,13 +316,13 @@ def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], o
     return [window.start_session, show]
 
 
-def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str:
+def startup_problem(environ: Mapping[str, str], platform: str, user_id: int) -> str:
     """Return the reason why the window can't be opened, with a remedy; "" if it can be opened.
 
     Args:
         environ: Environment variables.
         platform: Value of `sys.platform`.
-        user: Id of the user; 0 is root.
+        user_id: Id of the user; 0 is root.
     """
     if not platform.startswith("linux"):
         return ""
@@ -326,7 +331,7 @@ def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str
             "no screen found (DISPLAY and WAYLAND_DISPLAY aren't set). Start Studio on a desktop, or "
             "run a behaviour without a window: nep-studio run FILE"
         )
-    if user == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
+    if user_id == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
         return _(
             "The block editor's browser can't run as root with its sandbox. Start Studio as another "
             "user or, if there is no other way, set QTWEBENGINE_DISABLE_SANDBOX=1"
@@ -344,32 +349,34 @@ def run(options: Options) -> int:
         `RESTART_EXIT_CODE`.
     """
     move_old_versions()
-    meeting_place = single_instance.socket_name(home())
+    instance_socket = single_instance.socket_name(home())
     start_lock = FileLock(home() / "starting")
     if not options.is_standalone and single_instance.pass_to_running(
-        meeting_place, StartRequest(options.files, options.demo), start_lock
+        instance_socket, StartRequest(options.files, options.starts_demo), start_lock
     ):
         return 0
-    refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
-    if refused:
-        sys.stderr.write(f"nep-studio: {refused}\n")
+    problem = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    if problem:
+        sys.stderr.write(f"nep-studio: {problem}\n")
         return 2
-    log = qt_log.install_handlers()
+    console_handler = qt_log.install_handlers()
     qt_log.quiet_chromium(os.environ)
     trial = sandbox.start_trial(os.environ, sys.platform)
     portal.use_portal(os.environ, sys.platform)
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
     with StudioRun() as this_run:
-        return _run_window(application, options, log, this_run, (meeting_place, start_lock), trial)
+        return _run_window(
+            application, options, console_handler, this_run, (instance_socket, start_lock), trial
+        )
 
 
 def _run_window(
     application: QApplication,
     options: Options,
-    log: qt_log.ConsoleHandler,
+    console_handler: qt_log.ConsoleHandler,
     this_run: StudioRun,
-    single: tuple[str, FileLock],
+    socket_and_lock: tuple[str, FileLock],
     trial: sandbox.SandboxTrial | None,
 ) -> int:
     # Returns the exit code.
@@ -379,28 +386,28 @@ def _run_window(
     window.on_closed = lambda: QTimer.singleShot(0, application.quit)
     window.can_restart = not options.is_standalone  # other windows don't restore their tabs
     close_on_signals(window, this_run)
-    hearing = QTimer(window)
-    hearing.timeout.connect(lambda: log.drain(session.console.add))
-    hearing.start(LOG_INTERVAL_MS)
+    log_timer = QTimer(window)
+    log_timer.timeout.connect(lambda: console_handler.drain(session.console.add))
+    log_timer.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
-    deferred = DeferredSteps(window, deferred_steps(window, web=options.web))
+    deferred = DeferredSteps(window, deferred_steps(window, loads_web_view=options.loads_web_view))
     driver = options.make_driver(window) if options.make_driver is not None else None
     window.show()
     window.activateWindow()  # without a window manager the window would get no focus
-    first = show_first_page(window, options)
+    startup_steps = show_first_page(window, options)
     if options.self_drive is None:
-        first.append(partial(report_crashes, session, this_run))
+        startup_steps.append(partial(report_crashes, session, this_run))
     if not options.is_standalone:
-        meeting_place, start_lock = single
-        first.append(partial(save_version, window, time.time()))
-        first.append(
+        instance_socket, start_lock = socket_and_lock
+        startup_steps.append(partial(save_version, window, time.time()))
+        startup_steps.append(
             lambda: single_instance.SingleInstanceServer(
-                meeting_place, partial(handle_start_request, window), window
+                instance_socket, partial(handle_start_request, window), window
             )
         )
-        first.append(start_lock.release)
-        first.append(partial(session.last_robots.start, session.launcher))
-    deferred.prepend(first)
+        startup_steps.append(start_lock.release)
+        startup_steps.append(partial(session.last_robots.start, session.launcher))
+    deferred.prepend(startup_steps)
     FileDropFilter(window, window.commands.files.open_all)
     if isinstance(application, Application):
         application.set_file_opener(window.commands.files.open_all)

@@ -31,7 +31,7 @@ NEUTRAL_RESULTS: dict[str, Callable[[], object]] = {
     "showPopup": RETURN_NONE,
     "scrollContentsBy": RETURN_NONE,
     "highlightBlock": RETURN_NONE,
-    # block editor page; the override of interceptRequest itself blocks requests it can't judge
+    # block editor page; the override of interceptRequest itself blocks requests that it can't check
     "acceptNavigationRequest": bool,
     "javaScriptConsoleMessage": RETURN_NONE,
     "interceptRequest": RETURN_NONE,
@@ -75,7 +75,7 @@ Failed event handlers (``...Event``) return None.
 def guard(cls: type) -> type:
     """Wrap the Qt overrides that a class defines, and return the class.
 
-    The class is modified in place and can be decorated with this function.
+    The class is modified in place; the function can be used as a decorator.
     """
     for name, method in list(vars(cls).items()):
         result_factory = NEUTRAL_RESULTS.get(name, RETURN_NONE if name.endswith("Event") else None)
@@ -113,8 +113,8 @@ def guard_function(
 def guard_all() -> None:
     """Guard all QObject subclasses that are defined after this call, including those of plug-ins."""
 
-    def init_subclass(cls: type, /, **more: object) -> None:
-        super(QObject, cls).__init_subclass__(**more)  # type: ignore[misc]  # cls is below QObject
+    def init_subclass(cls: type, /, **kwargs: object) -> None:
+        super(QObject, cls).__init_subclass__(**kwargs)  # type: ignore[misc]  # cls is below QObject
         guard(cls)
 
     QObject.__init_subclass__ = classmethod(init_subclass)  # type: ignore[assignment, method-assign]  # ADR 0018

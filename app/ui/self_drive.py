@@ -60,11 +60,11 @@ class Listener(Protocol):
     def step_finished(self, step: Step) -> None:
         """Called after the result of a step was visible and its screenshot was saved."""
 
-    def run_finished(self, succeeded: bool, message: str) -> None:
+    def run_finished(self, has_succeeded: bool, message: str) -> None:
         """Called at the end of the run, before the window closes.
 
         Args:
-            succeeded: True if all steps succeeded.
+            has_succeeded: True if all steps succeeded.
             message: Summary of the run, or description of the failure.
         """
 
@@ -78,9 +78,9 @@ class ResultPrinter:
     def step_finished(self, step: Step) -> None:
         """Ignore the result of a step."""
 
-    def run_finished(self, succeeded: bool, message: str) -> None:
+    def run_finished(self, has_succeeded: bool, message: str) -> None:
         """Print the result to stdout, or a failure to stderr."""
-        (sys.stdout if succeeded else sys.stderr).write(message + "\n")
+        (sys.stdout if has_succeeded else sys.stderr).write(message + "\n")
 
 
 class SelfDrive(QObject):
@@ -137,18 +137,31 @@ class SelfDrive(QObject):
 
         return [
             Step("the start page", self._show_start_page, window.isVisible, picture="start-light"),
-            Step("its dark colours", lambda: run("theme.dark"), window.isVisible, picture="start-dark"),
+            Step(
+                "the start page in dark colours",
+                lambda: run("theme.dark"),
+                window.isVisible,
+                picture="start-dark",
+            ),
             Step("the virtual robot", self._start_demo, has_robot, 40, settle_s=2.5),
             Step(
                 "the program runs", lambda: run("run.run"), is_block_highlighted, 30, "behaviour-light", 1.5
             ),
-            Step("dark while it runs", lambda: run("theme.dark"), lambda: True, 5, "behaviour-dark"),
+            Step(
+                "the running program in dark colours",
+                lambda: run("theme.dark"),
+                lambda: True,
+                5,
+                "behaviour-dark",
+            ),
             Step("every robot stopped", lambda: run("run.stop"), has_run_state("proven"), 5, "stopped-dark"),
             Step("the topics", lambda: run("layout.developer"), self._has_demo_topics, 20),
             Step("a message", self._inspect, has_inspected_topic, 20, "developer-dark", 2.5),
-            Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
+            Step(
+                "the topics in light colours", lambda: run("theme.light"), lambda: True, 5, "developer-light"
+            ),
             Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
-            Step("its actions", lambda: run("panel:robots"), lambda: True, 5, "robots-light"),
+            Step("the robot's actions", lambda: run("panel:robots"), lambda: True, 5, "robots-light"),
         ]
 
     def _show_start_page(self) -> None:
@@ -176,7 +189,7 @@ class SelfDrive(QObject):
         self._visible_since_s = None
         self._step_started_s = time.monotonic()
         if self._step is None:
-            self._finish(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
+            self._finish(True, f"all steps succeeded; {len(self.pictures)} pictures are in {self._folder}")
             return
         self._listener.step_started(self._step)
         try:
@@ -228,12 +241,12 @@ class SelfDrive(QObject):
         else:
             sys.stderr.write(f"the picture {path} can't be written\n")
 
-    def _finish(self, succeeded: bool, message: str) -> None:
-        self.has_succeeded = succeeded
+    def _finish(self, has_succeeded: bool, message: str) -> None:
+        self.has_succeeded = has_succeeded
         self._timer.stop()
         self._step = None
         try:
-            self._listener.run_finished(succeeded, message)
+            self._listener.run_finished(has_succeeded, message)
         finally:  # the window must close even if the listener fails
             for widget in QApplication.topLevelWidgets():
                 if widget is self._window:

@@ -41,10 +41,10 @@ MIN_COLOURS = 24
 class FirstPaint(QObject):
     """Event filter that calls a function once, after the first paint of a window."""
 
-    def __init__(self, window: MainWindow, done: Callable[[], object]) -> None:
-        # `done` is called in the event loop iteration after the paint event.
+    def __init__(self, window: MainWindow, callback: Callable[[], object]) -> None:
+        # `callback` is called in the event loop iteration after the paint event.
         super().__init__(window)
-        self._window, self._callback = window, done
+        self._window, self._callback = window, callback
         window.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -57,10 +57,15 @@ class FirstPaint(QObject):
 class WindowSteps:
     """Steps of the self-test, with their actions and checks."""
 
-    def __init__(self, window: MainWindow, test: SelfTest, *, web: bool) -> None:
-        # `web`: the page of the block editor is loaded.
-        self._window, self._session, self._test, self._web = window, window.session, test, web
-        self._painted = False
+    def __init__(self, window: MainWindow, test: SelfTest, *, loads_web_view: bool) -> None:
+        # `loads_web_view`: the page of the block editor is loaded.
+        self._window, self._session, self._test, self._loads_web_view = (
+            window,
+            window.session,
+            test,
+            loads_web_view,
+        )
+        self._is_painted = False
         self._drawing = b""
         self._is_drawing_requested = False
         self._is_watching_state = False
@@ -72,16 +77,21 @@ class WindowSteps:
     def all(self) -> list[Step]:
         """Return all steps in the order of execution."""
         steps = [
-            self._step("window", _("the window"), lambda: None, lambda: self._painted),
+            self._step("window", _("the window"), lambda: None, lambda: self._is_painted),
             self._step("master", _("the master"), lambda: None, self._has_master, self._master_problem),
             self._step(
                 "robot", _("the virtual robot"), self._start_robot, self._has_robot, self._robot_problem
             ),
             self._step("behaviour", _("the program of the greeting"), lambda: None, self._has_program),
         ]
-        if self._web:
+        if self._loads_web_view:
             steps.append(
-                self._step("editor", _("its blocks in the block editor"), lambda: None, self._has_blocks)
+                self._step(
+                    "editor",
+                    _("the blocks of the greeting in the block editor"),
+                    lambda: None,
+                    self._has_blocks,
+                )
             )
         return [
             *steps,
@@ -142,7 +152,7 @@ class WindowSteps:
         return ""
 
     def _on_painted(self) -> None:
-        self._painted = True
+        self._is_painted = True
         self._test.report.record_time("first_paint")
 
     def _has_master(self) -> bool:
@@ -152,7 +162,7 @@ class WindowSteps:
         return self._alert_text("companion:master")
 
     def _start_robot(self) -> None:
-        if self._web:
+        if self._loads_web_view:
             self._window.commands.behaviours.start_demo()
             return
         self._session.launcher.start_virtual_robot(ROBOT)
@@ -203,14 +213,14 @@ class WindowSteps:
 
     def _has_moved(self) -> bool:
         state = self._state()
-        turned = (
+        moved_joints = (
             name
             for name in state
             if name.startswith(JOINT_PREFIXES) and state[name] != self._initial_state.get(name)
         )
         self._speech = self._speech or str(state.get("speech") or "")
         self._movement = self._movement or next(
-            (f"{name} {self._initial_state.get(name)} → {state[name]}" for name in turned), ""
+            (f"{name} {self._initial_state.get(name)} → {state[name]}" for name in moved_joints), ""
         )
         return bool(self._speech and self._movement)
 
@@ -221,8 +231,8 @@ class WindowSteps:
     def _has_stopped(self) -> bool:
         view, state = self._session.runs.view(), self._state()
         is_idle = state.get("moving") is False and not state.get("speech")
-        proven = view.state == "proven" and bool(view.result) and view.result_status == "ok"
-        return proven and is_idle and self._newest_message() is not self._message_before_stop
+        is_confirmed = view.state == "proven" and bool(view.result) and view.result_status == "ok"
+        return is_confirmed and is_idle and self._newest_message() is not self._message_before_stop
 
     def _newest_message(self) -> object:
         topic = self._session.topics.get(STATE_TOPIC)
@@ -260,18 +270,19 @@ class SelfTestListener:
         else:
             self._test.record_success(_("{count} colours").format(count=colours))
 
-    def run_finished(self, succeeded: bool, message: str) -> None:
-        """Add the console's warnings and errors to the report, record a failure, and start the last step.
+    def run_finished(self, has_succeeded: bool, message: str) -> None:
+        """Add the console's warnings and errors to the report, record any failure, and start the last step.
 
         The last step is the closing of the window.
         """
-        complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
+        reported_records = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer_info(
             console=[
-                f"{each.level} {each.origin}: {each.text}" for each in complaints[-MAX_REPORTED_RECORDS:]
+                f"{each.level} {each.origin}: {each.text}"
+                for each in reported_records[-MAX_REPORTED_RECORDS:]
             ]
         )
-        if not succeeded:
+        if not has_succeeded:
             self._test.fail(message)
         self._test.start_step("close", _("the window closes; the robot and the program stop"))
 
@@ -283,19 +294,19 @@ def colour_count(picture: QImage) -> int:
     )
 
 
-def run_window_steps(test: SelfTest, *, web: bool) -> int:
+def run_window_steps(test: SelfTest, *, loads_web_view: bool) -> int:
     """Show the window and run the steps of the self-test in it.
 
     Args:
         test: Self-test that records the results.
-        web: True to load the page of the block editor.
+        loads_web_view: True to load the page of the block editor.
 
     Returns:
         The exit code of the window; 0 if no window can be opened, which is recorded as a failure.
     """
-    refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
-    if refused:
-        test.fail(refused)
+    problem = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    if problem:
+        test.fail(problem)
         return 0
 
     def make_driver(window: MainWindow) -> SelfDrive:
@@ -303,8 +314,8 @@ def run_window_steps(test: SelfTest, *, web: bool) -> int:
         test.report.add_computer_info(
             qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
         )
-        steps = WindowSteps(window, test, web=web).all()
+        steps = WindowSteps(window, test, loads_web_view=loads_web_view).all()
         listener, picture = SelfTestListener(test, window.session), PICTURE.removesuffix(".png")
         return SelfDrive(window, test.environment.folder, steps, listener, picture)
 
-    return run(Options(make_driver=make_driver, web=web))
+    return run(Options(make_driver=make_driver, loads_web_view=loads_web_view))

@@ -76,9 +76,9 @@ def try_voice() -> int:
     Returns:
         Exit code 0. A faulty engine can end the process with any other code or a signal.
     """
-    with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+    with Path(os.devnull).open("w", encoding="utf-8") as null_file:
         # ends the process even if its parent is gone
-        faulthandler.dump_traceback_later(TRIAL_TIMEOUT_S, exit=True, file=nowhere)
+        faulthandler.dump_traceback_later(TRIAL_TIMEOUT_S, exit=True, file=null_file)
         return _run_voice_trial()
 
 
@@ -151,11 +151,11 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
     for hz, seconds in notes:
         count = max(1, round(seconds * rate_hz))
         wave = np.sin(np.arange(count) * (2 * math.pi * hz / rate_hz)) if hz else np.zeros(count)
-        edge = min(count // 2, round(FADE_S * rate_hz))
-        if edge:
-            rise = np.linspace(0.0, 1.0, edge)
-            wave[:edge] *= rise
-            wave[-edge:] *= rise[::-1]
+        fade_length = min(count // 2, round(FADE_S * rate_hz))
+        if fade_length:
+            fade_in = np.linspace(0.0, 1.0, fade_length)
+            wave[:fade_length] *= fade_in
+            wave[-fade_length:] *= fade_in[::-1]
         waves.append(wave)
     waveform = np.concatenate(waves) if waves else np.zeros(0)
     return (waveform * (LOUDNESS * min(1.0, max(0.0, volume)) * 32767)).astype("<i2").tobytes()
@@ -164,14 +164,14 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
 class Engine(Protocol):
     """Interface of a speech and audio engine, which is used in one thread with a Qt event loop."""
 
-    def speak(self, text: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start to speak a text.
+    def speak(self, text: str, language: str, volume: float, on_ended: Callable[[], None]) -> str:
+        """Start speaking a text.
 
         Args:
             text: Text.
             language: Language code, such as "en".
             volume: Volume from 0 to 1.
-            ended: Called once when the text was spoken or speaking has failed; not called if this
+            on_ended: Called once when the text has been spoken or speaking has failed; not called if this
                 method returns an error, or after `stop_voice`.
 
         Returns:
@@ -179,7 +179,7 @@ class Engine(Protocol):
         """
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones; return an error message, or "" if they are played.
+        """Start playing tones; return an error message, or "" on success.
 
         Args:
             notes: Frequency in Hz (0 for a pause) and duration in s of each tone.
@@ -198,13 +198,13 @@ class QtEngine:
 
     def __init__(self) -> None:
         self._voice: QTextToSpeech | None = None
-        self._voice_tried = False
-        self._ended: Callable[[], None] | None = None
+        self._has_tried_voice = False
+        self._ended_callback: Callable[[], None] | None = None
         self._sinks: list[tuple[QAudioSink, QBuffer]] = []
 
     def _get_voice(self) -> QTextToSpeech | None:
-        if not self._voice_tried:
-            self._voice_tried = True
+        if not self._has_tried_voice:
+            self._has_tried_voice = True
             if has_voice_engine() and passes_trial():
                 from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy)
 
@@ -217,14 +217,14 @@ class QtEngine:
 
     def _on_state_changed(self) -> None:
         voice = self._voice
-        if voice is None or self._ended is None:
+        if voice is None or self._ended_callback is None:
             return
         if voice.state() in {voice.State.Ready, voice.State.Error}:
-            ended, self._ended = self._ended, None
-            ended()
+            callback, self._ended_callback = self._ended_callback, None
+            callback()
 
-    def speak(self, text: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start to speak a text; return "", or an error message if no voice can speak the language."""
+    def speak(self, text: str, language: str, volume: float, on_ended: Callable[[], None]) -> str:
+        """Start speaking a text; return "", or an error message if no voice can speak the language."""
         voice = self._get_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
@@ -236,11 +236,11 @@ class QtEngine:
         voice.say(text)
         if voice.state() == voice.State.Error:
             return no_voice_message(language)
-        self._ended = ended
+        self._ended_callback = on_ended
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones on the default audio output; return an error message or "".
+        """Start playing tones on the default audio output; return an error message or "".
 
         There is an error if the computer has no audio output or the output doesn't support the format.
         The oldest tones are stopped if `MAX_TONES` are being played.
@@ -251,25 +251,25 @@ class QtEngine:
             _log.info("no audio output: %s", error)
             return _(NO_SOUND_TEXT)
         device = QMediaDevices.defaultAudioOutput()
-        shape = QAudioFormat()
-        shape.setSampleRate(RATE_HZ)
-        shape.setChannelCount(1)
-        shape.setSampleFormat(QAudioFormat.SampleFormat.Int16)
-        if device.isNull() or not device.isFormatSupported(shape):
+        audio_format = QAudioFormat()
+        audio_format.setSampleRate(RATE_HZ)
+        audio_format.setChannelCount(1)
+        audio_format.setSampleFormat(QAudioFormat.SampleFormat.Int16)
+        if device.isNull() or not device.isFormatSupported(audio_format):
             return _(NO_SOUND_TEXT)
         while len(self._sinks) >= MAX_TONES:
             self._sinks.pop(0)[0].stop()
         buffer = QBuffer()
         buffer.setData(QByteArray(samples(notes, volume)))
         buffer.open(QBuffer.OpenModeFlag.ReadOnly)
-        sink = QAudioSink(device, shape)
+        sink = QAudioSink(device, audio_format)
         sink.start(buffer)
         self._sinks.append((sink, buffer))
         return ""
 
     def stop_voice(self) -> None:
         """Stop speaking immediately, even within a word."""
-        self._ended = None
+        self._ended_callback = None
         if self._voice is not None:
             self._voice.stop(self._voice.BoundaryHint.Immediate)
 
@@ -283,16 +283,18 @@ class QtEngine:
 class _SpeechWorker(QObject):
     """Worker that executes requests in the engine's thread, skipping those that a stop has cancelled."""
 
-    woken = Signal()
+    wake_requested = Signal()
     ended = Signal(int)
-    reported = Signal(str, str)  # kind of output; error sentence or ""
+    reported = Signal(str, str)  # kind of output, error message or ""
 
-    def __init__(self, make: Callable[[], Engine], orders: deque[Request], speaker: QtSpeaker) -> None:
+    def __init__(
+        self, engine_factory: Callable[[], Engine], requests: deque[Request], speaker: QtSpeaker
+    ) -> None:
         super().__init__()
-        self._make, self._requests, self._speaker = make, orders, speaker
+        self._engine_factory, self._requests, self._speaker = engine_factory, requests, speaker
         self._engine: Engine | None = None
         self.loop = QEventLoop()
-        self.woken.connect(self.process, Qt.ConnectionType.QueuedConnection)
+        self.wake_requested.connect(self.process, Qt.ConnectionType.QueuedConnection)
 
     def process(self) -> None:
         while self._requests:
@@ -318,7 +320,7 @@ class _SpeechWorker(QObject):
         first, *others = args
         try:
             if self._engine is None:
-                self._engine = self._make()
+                self._engine = self._engine_factory()
             if not self._speaker.is_valid(kind, generation):  # Stop was called in the meantime
                 return
             if kind == "say":
@@ -336,22 +338,24 @@ class _SpeechWorker(QObject):
 class QtSpeaker(QObject):
     """Speech and audio output of a window. Requests are queued for a worker thread and never block."""
 
-    def __init__(self, make: Callable[[], Engine] = QtEngine, parent: QObject | None = None) -> None:
-        # `make` creates the engine, in its thread, on first use.
+    def __init__(
+        self, engine_factory: Callable[[], Engine] = QtEngine, parent: QObject | None = None
+    ) -> None:
+        # `engine_factory` creates the engine, in its thread, on first use.
         super().__init__(parent)
-        self._make = make
+        self._engine_factory = engine_factory
         self._requests: deque[Request] = deque()
         self._worker: _SpeechWorker | None = None
         self._thread: threading.Thread | None = None
         self._generations: dict[str, int] = {"say": 0, "play": 0}
-        self._busy = False
+        self._is_busy = False
         self._problems: dict[str, str] = {}
-        self._closed = False
+        self._is_closed = False
 
     @property
     def is_busy(self) -> bool:
         """True while a text is spoken or waits to be spoken."""
-        return self._busy
+        return self._is_busy
 
     @property
     def problem(self) -> str:
@@ -365,7 +369,7 @@ class QtSpeaker(QObject):
             kind: Kind of the request, "say" or "play".
             generation: Counter of its kind when the request was queued.
         """
-        return not self._closed and generation >= self._generations[kind]
+        return not self._is_closed and generation >= self._generations[kind]
 
     def speak(self, text: str, language: str, volume: float) -> None:
         """Queue a text to be spoken; an earlier text is cancelled.
@@ -376,7 +380,7 @@ class QtSpeaker(QObject):
             volume: Volume from 0 to 1.
         """
         self._generations["say"] += 1
-        self._busy = True
+        self._is_busy = True
         self._enqueue("say", text, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
@@ -402,7 +406,7 @@ class QtSpeaker(QObject):
     def _stop(self, which: str) -> None:
         if which != "tones":
             self._generations["say"] += 1
-            self._busy = False
+            self._is_busy = False
         if which != "voice":
             self._generations["play"] += 1
         if self._thread is not None:
@@ -414,30 +418,30 @@ class QtSpeaker(QObject):
         if self._thread is not None:
             self._enqueue("end")
             self._thread.join(JOIN_TIMEOUT_S)
-        self._closed = True
+        self._is_closed = True
 
     def _enqueue(self, kind: str, *args: object) -> None:
-        if self._closed:
+        if self._is_closed:
             return
         self._requests.append((kind, args, self._generations.get(kind, 0)))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run_thread, name="robots' voice", daemon=True)
             self._thread.start()
         elif self._worker is not None:
-            self._worker.woken.emit()
+            self._worker.wake_requested.emit()
 
     def _run_thread(self) -> None:
-        desk = _SpeechWorker(self._make, self._requests, self)
-        desk.ended.connect(self._on_ended, Qt.ConnectionType.QueuedConnection)
-        desk.reported.connect(self._on_reported, Qt.ConnectionType.QueuedConnection)
-        self._worker = desk
-        desk.woken.emit()
-        desk.loop.exec()
+        worker = _SpeechWorker(self._engine_factory, self._requests, self)
+        worker.ended.connect(self._on_ended, Qt.ConnectionType.QueuedConnection)
+        worker.reported.connect(self._on_reported, Qt.ConnectionType.QueuedConnection)
+        self._worker = worker
+        worker.wake_requested.emit()
+        worker.loop.exec()
         self._worker = None
 
     def _on_ended(self, generation: int) -> None:
         if generation == self._generations["say"]:
-            self._busy = False
+            self._is_busy = False
 
     def _on_reported(self, kind: str, problem: str) -> None:
         self._problems[kind] = problem

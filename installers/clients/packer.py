@@ -40,7 +40,7 @@ def pack_javascript(source: Path, target: Path) -> list[Path]:
     """Build the npm package and return [`nep-js-VERSION.tgz`], or an empty list without npm."""
     npm = shutil.which("npm")
     if npm is None:
-        print("· nep-js is skipped: it needs npm, which is part of Node.js", flush=True)
+        print("· nep-js is skipped: npm, which is part of Node.js, is not installed", flush=True)
         return []
     if not (source / "node_modules" / "typescript").is_dir():
         _run([npm, "ci", "--no-audit", "--no-fund", "--silent"], source)
@@ -59,7 +59,7 @@ def pack_nuget(source: Path, target: Path) -> list[Path]:
     """Build the NuGet package and return [`Nep.VERSION.nupkg`], or an empty list without the .NET SDK."""
     dotnet = shutil.which("dotnet")
     if dotnet is None:
-        print("· Nep for NuGet is skipped: it needs the .NET SDK", flush=True)
+        print("· Nep for NuGet is skipped: the .NET SDK is not installed", flush=True)
         return []
     for old in target.glob("Nep.*.nupkg"):
         old.unlink()

@@ -3,7 +3,7 @@
 import os
 
 os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
-    "0"  # packages don't contain it: installers/linux/film_libraries.py
+    "0"  # packages don't contain FFmpeg: installers/linux/film_libraries.py
 )
 
 import sys

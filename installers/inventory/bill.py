@@ -64,9 +64,7 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
         for each in crates
     }
     texts = sorted({name for each in crates for name in standard_texts(each)})
-    content = (
-        "Crates of Rust, compiled into what is named below each. The texts of their licences follow.\n\n"
-    )
+    content = "Rust crates, with the packages that they are compiled into. The licence texts follow.\n\n"
     content += "".join(sorted(lines))
     for name in texts:
         content += f"\n---- {name} ----\n\n{(LICENCES / f'{name}.txt').read_text('utf-8').strip()}\n"

@@ -52,7 +52,7 @@ class Library(NamedTuple):
 _X = "X11"
 _EXTENSION = r"(?:\.so(?:\.[\d.]+)?|(?:\.[\d.]+)?\.dylib|\.dll)"
 LIBRARIES = (
-    # in wheels
+    # bundled in wheels
     Library(r"libzmq(?:-[\w.-]+?)?", "MPL-2.0", "libzmq"),
     Library(r"libsodium(?:-[\w.-]+?)?", "ISC", "libsodium"),
     Library(r"libscipy_openblas\w*(?:-\w+)?", "BSD-3-Clause", "openblas"),
@@ -78,7 +78,7 @@ LIBRARIES = (
         "Copyright (c) 2020 Netflix, Inc.",
         ("BSD-2-Clause-Patent",),
     ),
-    # in Qt's wheels
+    # bundled in the wheels of Qt
     Library(r"libicu(?:data|i18n|uc)", "Unicode-3.0", "icu", "", ("Unicode-3.0",), r"\.so\.(\d+)"),
     Library(r"(?:lib)?(?:pyside6(?:qml)?|shiboken6)\.abi3(?:\.[\d.]+)?", "LGPL-3.0-only", "qt"),
     Library(
@@ -86,17 +86,17 @@ LIBRARIES = (
         "MIT",
         "mesa",
         "Copyright (C) 1999-2007  Brian Paul   All Rights Reserved.\n"
-        "And of LLVM, under the Apache License with LLVM's exception: https://llvm.org/LICENSE.txt",
+        "Includes LLVM, under the Apache License with LLVM exceptions: https://llvm.org/LICENSE.txt",
         ("MIT", "Apache-2.0"),
     ),
-    # of Python and of Windows; on Linux of the system
+    # part of Python and Windows; on Linux from system packages
     Library(r"(?:lib)?python3[\d.]*t?", "PSF-2.0", "cpython"),
     Library(
         r"(?:msvcp|vcruntime|concrt|vcamp|vccorlib|vcomp)140[\w-]*|ucrtbase|api-ms-win-[\w-]+",
         "Microsoft Visual C++ Redistributable",
         "microsoft-visual-cpp-runtime",
         "Copyright (c) Microsoft Corporation. All rights reserved.\n\n"
-        "These files may be given away with programs that need them, unchanged:\n"
+        "These files may be redistributed unchanged with programs that need them:\n"
         "https://learn.microsoft.com/cpp/windows/redistributing-visual-cpp-files",
     ),
     Library(
@@ -142,8 +142,8 @@ LIBRARIES = (
         r"liblzma",
         "0BSD",
         "xz",
-        "liblzma of XZ Utils, under the BSD Zero Clause License: it may be used, copied, changed and "
-        "given away for any purpose; it is provided as it is, without any warranty.",
+        "liblzma of XZ Utils, under the BSD Zero Clause License: it may be used, copied, modified and "
+        "distributed for any purpose; it is provided as is, without any warranty.",
         is_of_system=True,
     ),
     Library(
@@ -163,7 +163,7 @@ LIBRARIES = (
         ("MIT",),
         is_of_system=True,
     ),
-    # of Linux: the licence text is in the system package
+    # Linux: the system packages contain the licence texts
     Library(r"libX(?:composite|damage|i|inerama|randr|tst|cursor|ss)|libxkbfile|libxshmfence", _X),
     Library(r"libxcb(?:-[a-z0-9]+)*", _X),
     Library(r"libxkbcommon(?:-x11)?|libwayland-\w+", "MIT"),
@@ -231,7 +231,7 @@ def parts_in_folder(folder: Path, known_parts: Sequence[Part]) -> Iterator[Part]
             if library.of not in names:
                 libraries[path.name] = library
         elif not _is_known_file(path, wheel_names):
-            problems.append(f"'{path.relative_to(folder)}' is of nothing that is told: put it into LIBRARIES")
+            problems.append(f"'{path.relative_to(folder)}' has no known origin: add it to LIBRARIES")
     parts_by_name = dict[str, Part]()
     packages = _debian_packages(
         name for name, library in libraries.items() if library.is_of_system or not library.of
@@ -239,7 +239,7 @@ def parts_in_folder(folder: Path, known_parts: Sequence[Part]) -> Iterator[Part]
     for name, library in libraries.items():
         part = packages[name].part(library) if name in packages else _part_of_library(name, library)
         if part is None:
-            problems.append(f"'{name}' is of no package of this computer, so its licence text is missing")
+            problems.append(f"'{name}' belongs to no package of this system, so its licence text is missing")
         else:
             parts_by_name.setdefault(part.name, part)
     if problems:

@@ -88,10 +88,10 @@ def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
         project: Name of the distribution.
         extra: Extra whose dependencies are included.
     """
-    waiting, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
+    pending, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
     yielded = set[str]()
-    while waiting:
-        requirement = waiting.pop(0)
+    while pending:
+        requirement = pending.pop(0)
         name = canonicalize_name(requirement.name)
         if (name, frozenset(requirement.extras)) in seen:
             continue
@@ -102,7 +102,7 @@ def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
             if needed.marker is None or any(
                 needed.marker.evaluate({"extra": each}) for each in ("", *requirement.extras)
             ):
-                waiting.append(needed)
+                pending.append(needed)
         if name not in yielded:
             yielded.add(name)
             licence = _licence(distribution)
@@ -145,8 +145,8 @@ def _texts(distribution: metadata.Distribution) -> Iterator[tuple[str, Path]]:
     for file in distribution.files or ():
         path = Path(str(distribution.locate_file(file)))
         is_text = TEXT_SUFFIX.fullmatch(file.suffix) is not None
-        is_beside = ".dist-info" in file.parts[0] or len(file.parts) <= 2
-        if is_text and is_beside and LICENCE_FILE.search("/".join(file.parts[-2:])) and path.is_file():
+        is_top_level = ".dist-info" in file.parts[0] or len(file.parts) <= 2
+        if is_text and is_top_level and LICENCE_FILE.search("/".join(file.parts[-2:])) and path.is_file():
             yield "-".join(each for each in file.parts[1:] if each != "licenses"), path
 
 

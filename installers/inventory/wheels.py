@@ -208,7 +208,7 @@ def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
             licence_entry: Mapping[str, Any] = next(iter(component.get("licenses", ())), {})
             licence = licence_entry.get("expression") or licence_entry.get("license", {}).get("id", "")
             if not licence:
-                raise InventoryError(f"the crate '{component['name']}' in {within} tells no licence")
+                raise InventoryError(f"the crate '{component['name']}' in {within} has no licence")
             authors = str(component.get("author", ""))
             yield Part(component["name"], component["version"], licence, (), "cargo", within, authors)
 
@@ -230,7 +230,7 @@ def parts_of_build(build_info: str, licence_texts: Texts) -> Iterator[Part]:
     ]
     for name in dict.fromkeys(names):
         if name not in IN_OPENCV:
-            raise InventoryError(f"OpenCV has '{name}' inside: put it with its licence into IN_OPENCV")
+            raise InventoryError(f"OpenCV contains '{name}': add it with its licence to IN_OPENCV")
         library = IN_OPENCV[name]
         if library is not None:
             match = re.search(library.version, build_info) if library.version else None
@@ -257,7 +257,9 @@ def _licence_text(distribution: metadata.Distribution, name: str) -> Texts:
         file for file in distribution.files or () if file.name == name and ".dist-info" in file.parts[0]
     ]
     if not candidates:
-        raise InventoryError(f"{distribution.metadata['Name']} has no '{name}' any more: look for the text")
+        raise InventoryError(
+            f"{distribution.metadata['Name']} no longer contains '{name}': find the new licence file"
+        )
     file = min(candidates, key=lambda each: len(each.parts))
     return ((name, Path(str(distribution.locate_file(file)))),)
 
@@ -277,9 +279,7 @@ def _parts_in_iceoryx2(distribution: metadata.Distribution) -> Iterator[Part]:
     crates = {pair for path in _compiled_files(distribution) for pair in CRATE.findall(path.read_bytes())}
     for name, version in sorted((name.decode(), version.decode()) for name, version in crates):
         if name not in CRATES:
-            raise InventoryError(
-                f"iceoryx2 has the crate '{name}' inside: put it with its licence into CRATES"
-            )
+            raise InventoryError(f"iceoryx2 contains the crate '{name}': add it with its licence to CRATES")
         yield Part(name, version, CRATES[name], (), "cargo", "iceoryx2")
 
 
@@ -289,7 +289,7 @@ def _parts_in_numpy(distribution: metadata.Distribution) -> Iterator[Part]:
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]["version"]
     components = NUMPY_PART.findall(Path(text[0][1]).read_text("utf-8"))
     if "OpenBLAS" not in {name for name, _licence in components}:
-        raise InventoryError("numpy tells in another way what is inside: see NUMPY_PART")
+        raise InventoryError("numpy lists its bundled libraries in another format: update NUMPY_PART")
     for name, licence in components:
         version = str(blas) if name == "OpenBLAS" else ""
         texts = [*text]
@@ -308,7 +308,7 @@ def _parts_in_opencv(distribution: metadata.Distribution) -> Iterator[Part]:
         b"",
     )
     if not build_info:
-        raise InventoryError("OpenCV's library does not tell any more what was built into it")
+        raise InventoryError("OpenCV's library no longer contains its build information")
     yield from parts_of_build(
         build_info.decode("utf-8", "replace"), _licence_text(distribution, "LICENSE-3RD-PARTY.txt")
     )
@@ -351,12 +351,12 @@ def _parts_in_pyzmq(distribution: metadata.Distribution) -> Iterator[Part]:
     )
 
 
-def _parts_in_lz4(_found: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_lz4(_distribution: metadata.Distribution) -> Iterator[Part]:
     text = own_text("Copyright (C) 2011-2023, Yann Collet.", "BSD-2-Clause")
     yield Part("lz4-library", lz4.library_version_string(), "BSD-2-Clause", text, "generic", "lz4")
 
 
-def _parts_in_zstandard(_found: metadata.Distribution) -> Iterator[Part]:
+def _parts_in_zstandard(_distribution: metadata.Distribution) -> Iterator[Part]:
     version = ".".join(map(str, zstandard.ZSTD_VERSION))
     text = own_text("Copyright (c) Meta Platforms, Inc. and affiliates. All rights reserved.", "BSD-3-Clause")
     yield Part("zstd", version, "BSD-3-Clause", text, "generic", "zstandard")

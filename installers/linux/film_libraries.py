@@ -37,10 +37,10 @@ def remove_ffmpeg(context: Context) -> int:
         raise PackageError(f"'{missing[0]}' is missing; try: apt-get install gcc binutils")
     before = size_of(folder)
     users = [internal / "cv2" / "cv2.abi3.so"]
-    films = [path for path in sorted(folder.iterdir()) if FFMPEG_LIBRARIES.match(path.name)]
+    ffmpeg = [path for path in sorted(folder.iterdir()) if FFMPEG_LIBRARIES.match(path.name)]
     imported = _imported_by(users)
     needed = {name for user in users for name in _needed_by(user)}
-    for path in films:
+    for path in ffmpeg:
         if path.name not in needed:
             path.unlink()
             continue

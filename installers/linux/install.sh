@@ -1,8 +1,8 @@
 #!/bin/sh
-# Puts NEP Studio into your menu, and opens .nepb files with it; for you alone, without an administrator.
-#   ./install.sh             menu, files and icons
-#   ./install.sh --command   the command nep as well, in ~/.local/bin
-#   ./install.sh --remove    take all of that back; your work stays
+# Adds NEP Studio to the menu of the current user and associates .nepb files with it. Needs no administrator rights.
+#   ./install.sh             add menu entry, file type and icons
+#   ./install.sh --command   also add the command nep to ~/.local/bin
+#   ./install.sh --remove    remove all of them; your files are kept
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 data=${XDG_DATA_HOME:-$HOME/.local/share}
@@ -27,11 +27,11 @@ remove() {
 
 if [ "${1:-}" = --remove ]; then
     remove
-    echo "NEP Studio is no longer in your menu. Delete the folder $here to remove the program; your work stays."
+    echo "NEP Studio is no longer in your menu. Delete the folder $here to remove the program; your files are kept."
     exit 0
 fi
 mkdir -p "$data/applications" "$data/mime/packages"
-# Exec quotes as the desktop entry specification says: \ " ` $ get a backslash, and % is doubled.
+# Quoting rules of the desktop entry specification: \ " ` $ are escaped with a backslash, and % is doubled.
 quoted=$(printf '%s' "$here/nep-studio" | sed -e 's/[\\"`$]/\\&/g' -e 's/%/%%/g' -e 's/\\/\\\\/g')
 escaped=$(printf '%s' "$quoted" | sed -e 's/[\\&|]/\\&/g')
 sed -e "s|^Exec=nep-studio|Exec=\"$escaped\"|" "$here/share/applications/nep-studio.desktop" >"$menu"
@@ -41,9 +41,9 @@ icons | while read -r icon; do
     cp "$here/share/icons/$icon" "$data/icons/$icon"
 done
 refresh
-echo "NEP Studio is in your menu now, and opens .nepb files."
+echo "NEP Studio is now in your menu and opens .nepb files."
 if [ "${1:-}" = --command ]; then
     mkdir -p "$(dirname "$command")"
     ln -sfn "$here/nep" "$command"
-    echo "The command nep is in $(dirname "$command")."
+    echo "The command nep was added to $(dirname "$command")."
 fi

@@ -26,9 +26,10 @@ PREFIX = Path("opt") / NAME
 ARCHITECTURES = {"x86_64": "amd64", "arm64": "arm64"}
 RECOMMENDED = ("fonts-noto-color-emoji", "xdg-desktop-portal")
 """Recommended packages, for emoji and for the desktop's file dialogs."""
-DESCRIPTION = """see what robots say, and tell them what to do
- Watch the messages of robots and programs live, compose behaviours out of blocks,
- rehearse them on a virtual robot and run them on a real one.
+DESCRIPTION = """watch the messages of robots and program their behaviour
+ NEP Studio shows the live messages of robots and programs, records them, and
+ has a block editor for robot behaviours, which run on a virtual robot and on
+ real robots.
 """
 
 
@@ -55,7 +56,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     packages = [debian_package(context), archive(context), bill]
     tool = shutil.which("appimagetool")
     if tool is None:
-        print("· no AppImage: appimagetool is not on this computer", flush=True)
+        print("· the AppImage is skipped: appimagetool is not installed", flush=True)
         return packages
     return [*packages, app_image(context, tool)]
 
@@ -124,7 +125,7 @@ def debian_package(context: Context) -> Path:
         PackageError: dpkg-deb isn't installed or has failed.
     """
     if shutil.which("dpkg-deb") is None:
-        raise PackageError("dpkg-deb is not on this computer; the .deb is made on Debian and Ubuntu")
+        raise PackageError("dpkg-deb is not installed; the .deb can only be built on Debian and Ubuntu")
     root = context.work / "deb"
     shutil.rmtree(root, ignore_errors=True)
     program = root / PREFIX
@@ -187,8 +188,8 @@ def _set_modes(root: Path) -> None:
     # Readable and executable for everybody, writable only for root.
     for path in [root, *root.rglob("*")]:
         if not path.is_symlink():
-            is_run = path.is_dir() or os.access(path, os.X_OK)
-            path.chmod(0o755 if is_run else 0o644)
+            is_executable = path.is_dir() or os.access(path, os.X_OK)
+            path.chmod(0o755 if is_executable else 0o644)
 
 
 def _set_times(root: Path, epoch: int) -> None:

@@ -70,7 +70,7 @@ def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
         for name in _NEEDED.findall(_readelf(path)):
             if name not in included and not _LIBC_LIBRARY.match(name):
                 if name not in PACKAGES:
-                    raise PackageError(f"'{path.name}' needs '{name}': put it into PACKAGES, or inside")
+                    raise PackageError(f"'{path.name}' needs '{name}': add it to PACKAGES or bundle it")
                 (optional if "plugins" in path.parts else needed).add(PACKAGES[name])
     return sorted({*needed, *ALWAYS_REQUIRED}), sorted(optional - needed)
 

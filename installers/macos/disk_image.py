@@ -44,14 +44,14 @@ def dmg(target: Path, app: Path, background: Path, icon: Path) -> Path:
         PackageError: The image couldn't be created.
     """
     if this_system() != "macos":
-        raise PackageError("a .dmg can be made on a Mac only: it needs hdiutil")
-    import dmgbuild  # noqa: PLC0415  asks at once which macOS this is, and fails where it is none
+        raise PackageError("a .dmg can be built on a Mac only: it needs hdiutil")
+    import dmgbuild  # noqa: PLC0415  its import fails on other systems
 
     target.unlink(missing_ok=True)
     try:
         dmgbuild.build_dmg(str(target), VOLUME, settings=settings(app, background, icon))
     except dmgbuild.DMGError as error:
-        raise PackageError(f"the disk image could not be made: {error}") from error
+        raise PackageError(f"the disk image could not be created: {error}") from error
     return target
 
 
@@ -64,7 +64,7 @@ def hfs_image(context: Context, target: Path, app: Path, background: Path, icon:
     Raises:
         PackageError: The image couldn't be created.
     """
-    from ds_store import DSStore  # noqa: PLC0415  comes with dmgbuild, which is installed for packaging only
+    from ds_store import DSStore  # noqa: PLC0415  part of dmgbuild, which is installed for packaging only
 
     image_folder = context.work / "image"
     shutil.rmtree(image_folder, ignore_errors=True)

@@ -55,8 +55,8 @@ Source: QtWebEngineProcess.app/Contents/Resources/QtWebEngineProcess.entitlement
 
 WEB_PROCESS: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "V8 compiles the block editor's JavaScript",
-    "com.apple.security.cs.allow-unsigned-executable-memory": "Qt's own list has it",
-    "com.apple.security.cs.disable-executable-page-protection": "without it pages stay empty on Intel",
+    "com.apple.security.cs.allow-unsigned-executable-memory": "included in Qt's own entitlements",
+    "com.apple.security.cs.disable-executable-page-protection": "without it, pages stay empty on Intel",
 }
 """Entitlements of QtWebEngineProcess with the reason for each: Qt's list without one entry.
 
@@ -65,8 +65,8 @@ same identity.
 """
 
 STUDIO: Mapping[str, str] = {
-    "com.apple.security.cs.allow-jit": "Qt draws web pages in Studio's own process",
-    "com.apple.security.cs.allow-unsigned-executable-memory": "importing ctypes makes a callback",
+    "com.apple.security.cs.allow-jit": "Qt renders web pages in Studio's own process",
+    "com.apple.security.cs.allow-unsigned-executable-memory": "importing ctypes creates a callback",
 }
 """Entitlements of Studio and the command `nep`.
 
@@ -93,7 +93,7 @@ def problems(entitlements: Mapping[str, object]) -> list[str]:
     """Return a sentence for each entry that Apple doesn't document or that isn't true."""
     messages = [f"Apple documents no '{key}'" for key in entitlements if key not in DOCUMENTED]
     messages += [
-        f"'{key}' must be true or left out" for key, value in entitlements.items() if value is not True
+        f"'{key}' must be true or omitted" for key, value in entitlements.items() if value is not True
     ]
     return messages
 

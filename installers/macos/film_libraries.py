@@ -31,17 +31,17 @@ def remove_ffmpeg(context: Context, app: Path) -> int:
         PackageError: A step has failed or the compiler is missing. If FFmpeg remained in the package,
             the whole package would have to be under FFmpeg's licence.
     """
-    films = [path for path in binaries(app) if FFMPEG_LIBRARIES.match(path.name)]
-    if not films:
+    ffmpeg = [path for path in binaries(app) if FFMPEG_LIBRARIES.match(path.name)]
+    if not ffmpeg:
         return 0
-    folder = films[0].parent
+    folder = ffmpeg[0].parent
     user = folder.parent / "cv2.abi3.so"
-    if {path.parent for path in films} != {folder} or not user.is_file():
-        raise PackageError(f"FFmpeg is not where OpenCV brings it, but in '{folder}'")
+    if {path.parent for path in ffmpeg} != {folder} or not user.is_file():
+        raise PackageError(f"FFmpeg is in an unexpected folder: '{folder}'")
     before = size_of(folder)
     imported = _imported_by(user)
     needed = _needed_by(user)
-    for path in films:
+    for path in ffmpeg:
         if path.name in needed:
             _make_empty(context, path, imported.get(path.name.split(".")[0], set()))
         else:
@@ -61,7 +61,7 @@ def _imported_by(path: Path) -> Mapping[str, set[str]]:
     try:
         output = subprocess.run([tool, "-m", "-u", path], capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
-        raise PackageError(f"'{tool}' can't tell what '{path.name}' imports: {error}") from error
+        raise PackageError(f"'{tool}' can't list the imports of '{path.name}': {error}") from error
     names_by_library: dict[str, set[str]] = {}
     for name, library in _IMPORTED.findall(output):
         names_by_library.setdefault(library, set()).add(name)

@@ -125,7 +125,7 @@ def apple_version(version: str) -> str:
     """
     match = re.match(r"\d+(?:\.\d+){0,2}", version)
     if match is None:
-        raise ValueError(f"no version '{version}'")
+        raise ValueError(f"invalid version '{version}'")
     return match.group()
 
 

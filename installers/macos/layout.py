@@ -44,9 +44,9 @@ def check(app: Path, version: str, machine: str) -> list[str]:
         OSError: A file can't be read.
     """
     contents = app / "Contents"
-    problems = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
+    problems = [f"{name} is next to Contents" for name in _names(app) if name != "Contents"]
     problems += [
-        f"{name} has no place in Contents" for name in _names(contents) if name not in _CONTENTS_ENTRIES
+        f"{name} is not allowed in Contents" for name in _names(contents) if name not in _CONTENTS_ENTRIES
     ]
     problems += _check_information(contents, version, machine)
     problems += _check_links(app)
@@ -60,7 +60,7 @@ def check(app: Path, version: str, machine: str) -> list[str]:
         machines = {each.machine for each in read(path)}
         if machine not in machines:
             problems.append(
-                f"{_relative_path(path, app)} is made for {' and '.join(sorted(machines))}, not for {machine}"
+                f"{_relative_path(path, app)} is built for {' and '.join(sorted(machines))}, not {machine}"
             )
     return problems
 
@@ -108,7 +108,7 @@ def _check_information(contents: Path, version: str, machine: str) -> Iterator[s
     if not program.is_file() or not any(each.is_program for each in read(program)):
         yield f"Contents/MacOS has no program '{program.name}'"
     elif not os.access(program, os.X_OK):
-        yield f"Contents/MacOS/{program.name} may not be started"
+        yield f"Contents/MacOS/{program.name} is not executable"
     yield from _check_resources(contents / "Resources", info)
 
 
@@ -123,7 +123,7 @@ def _check_resources(resources: Path, info: Mapping[str, object]) -> Iterator[st
             yield f"Contents/Resources has no icon '{icon}'"
     for language in LANGUAGES:
         if not (resources / f"{language}.lproj" / "InfoPlist.strings").is_file():
-            yield f"Contents/Resources has no words for '{language}'"
+            yield f"Contents/Resources has no texts for '{language}'"
 
 
 def _check_links(app: Path) -> Iterator[str]:
@@ -134,18 +134,18 @@ def _check_links(app: Path) -> Iterator[str]:
                 continue
             target = path.readlink()
             if target.is_absolute():
-                yield f"{_relative_path(path, app)} is a link to the absolute '{target}'"
+                yield f"{_relative_path(path, app)} is a link to the absolute path '{target}'"
             elif not path.resolve().is_relative_to(root):
-                yield f"{_relative_path(path, app)} leads out of the application"
+                yield f"{_relative_path(path, app)} is a link out of the application"
             elif not path.exists():
-                yield f"{_relative_path(path, app)} leads nowhere"
+                yield f"{_relative_path(path, app)} is a broken link"
 
 
 def _check_places(contents: Path) -> Iterator[str]:
     # Only code belongs into MacOS and Frameworks, whose subfolders must have no dots.
     app = contents.parent
     for path in binaries(contents / "Resources"):
-        yield f"{_relative_path(path, app)} is code among the resources, which codesign does not sign"
+        yield f"{_relative_path(path, app)} is code in Resources, which codesign does not sign"
     for name in _CODE_FOLDERS:
         for folder, folders, names in os.walk(contents / name):
             subfolders = [Path(folder, each) for each in folders]
@@ -153,13 +153,13 @@ def _check_places(contents: Path) -> Iterator[str]:
             for path in subfolders:
                 if "." in path.name and not path.is_symlink() and not is_bundle(path):
                     yield (
-                        f"{_relative_path(path, app)} has a dot in its name, so codesign takes it for "
+                        f"{_relative_path(path, app)} has a dot in its name, so codesign treats it as "
                         "a bundle"
                     )
             for path in (Path(folder, each) for each in sorted(names)):
                 if not path.is_symlink() and not read(path):
                     yield (
-                        f"{_relative_path(path, app)} is no code, so its signature would be lost when it "
+                        f"{_relative_path(path, app)} is not code, so its signature would be lost when it "
                         "is copied"
                     )
 
@@ -174,14 +174,14 @@ def _check_linked_libraries(contents: Path) -> Iterator[str]:
             else:
                 is_available = name.rpartition("/")[2] in file_names
             if not is_available:
-                yield f"{_relative_path(path, contents.parent)} is linked with '{name}', which is not there"
+                yield f"{_relative_path(path, contents.parent)} is linked with '{name}', which is missing"
 
 
 def _check_framework(framework: Path, app: Path) -> Iterator[str]:
     name = framework.stem
     for path in sorted(framework.iterdir()):
         if path.name != "Versions" and not path.is_symlink():
-            yield f"{_relative_path(path, app)} is beside Versions and no link into it"
+            yield f"{_relative_path(path, app)} is next to Versions and not a link into it"
     current = framework / "Versions" / "Current"
     if not current.is_symlink():
         yield f"{_relative_path(framework, app)} has no link Versions/Current"
@@ -201,7 +201,7 @@ def _check_web(contents: Path) -> Iterator[str]:
     if not process.is_file() or not read(process):
         yield f"{_relative_path(frameworks[0], contents.parent)} has no Helpers/{WEB_PROCESS}"
     elif not os.access(process, os.X_OK):
-        yield f"{_relative_path(process, contents.parent)} may not be started"
+        yield f"{_relative_path(process, contents.parent)} is not executable"
     for name in _WEB_FILES:
         if not (frameworks[0] / "Resources" / name).is_file():
             yield f"{_relative_path(frameworks[0], contents.parent)} has no Resources/{name}"

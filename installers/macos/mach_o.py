@@ -68,7 +68,7 @@ def _slice(file: BinaryIO, start: int) -> Slice:
     (magic,) = struct.unpack(">I", file.read(4))
     order = _THIN.get(magic)
     if order is None:
-        raise struct.error("no Mach-O at the place that the fat header tells")
+        raise struct.error("no Mach-O data at the offset in the fat header")
     cpu, _sub, kind, count, _size, _flags = struct.unpack(f"{order}6I", file.read(24))
     if magic in _WIDE:
         file.read(4)

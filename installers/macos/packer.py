@@ -55,8 +55,8 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
     """
     if this_system() != "macos":
         raise PackageError(
-            "the package for macOS can be made on a Mac only: "
-            "PyInstaller freezes for the computer that it runs on"
+            "the package for macOS can be built on a Mac only: "
+            "PyInstaller freezes for the system that it runs on"
         )
     return pack(context, signing.identity_of(os.environ), disk_image.dmg, keep_frozen=keep_frozen)
 
@@ -107,11 +107,11 @@ def finish(context: Context, app: Path, identity: signing.Identity) -> None:
     shutil.copyfile(_pictures(context) / DOCUMENT_ICON, resources / DOCUMENT_ICON)
     write_localised_texts(resources)
     if problems := layout.check(app, context.version, context.machine):
-        raise PackageError(f"'{app.name}' is not as macOS wants it:\n  " + "\n  ".join(problems))
+        raise PackageError(f"'{app.name}' violates rules of macOS:\n  " + "\n  ".join(problems))
     newer = layout.binaries_for_newer_macos(app, context.machine)
     if newer:
         _print_step(
-            f"made for macOS {max(newer.values())}: {len(newer)} libraries; try this on the oldest macOS"
+            f"{len(newer)} libraries are built for macOS {max(newer.values())}; test on the oldest macOS"
         )
     signing.sign(context, app, identity)
     signing.verify(context, app)
@@ -119,11 +119,9 @@ def finish(context: Context, app: Path, identity: signing.Identity) -> None:
         signing.notarise(context, app, identity)
         signing.assess(context, app)
     elif identity.is_known:
-        _print_step("notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)")
+        _print_step("notarisation skipped: NEP_MACOS_NOTARY_PROFILE is not set (installers/README.md)")
     else:
-        _print_step(
-            "signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)"
-        )
+        _print_step("signing and notarisation skipped: NEP_MACOS_IDENTITY is not set (installers/README.md)")
 
 
 def _pictures(context: Context) -> Path:

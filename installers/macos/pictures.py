@@ -53,8 +53,8 @@ def paint_background(painter: QPainter, scale: float, theme: Theme) -> None:
     """Paint a light background with an arrow from the application to the folder, without text."""
     painter.scale(scale, scale)
     painter.fillRect(QRectF(0, 0, *WINDOW), QColor("#f4f5f7"))
-    room = ICON_SIDE / 2 + 26
-    start, end = APP_AT[0] + room, APPLICATIONS_AT[0] - room
+    gap = ICON_SIDE / 2 + 26
+    start, end = APP_AT[0] + gap, APPLICATIONS_AT[0] - gap
     line = QPen(theme.colour("accent"), 7)
     line.setCapStyle(Qt.PenCapStyle.RoundCap)
     line.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
@@ -94,7 +94,7 @@ def _encode_png(image: QImage) -> bytes:
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     # The stubs of PySide require str, the method itself bytes.
     if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
-        raise OSError("Qt can write no PNG")
+        raise OSError("Qt can't encode PNG")
     return bytes(buffer.data().data())
 
 

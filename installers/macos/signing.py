@@ -76,10 +76,10 @@ def identity_of(environ: Mapping[str, str]) -> Identity:
     key_parts = [part for part in _KEY_PARTS if environ.get(part)]
     if key_parts and len(key_parts) < len(_KEY_PARTS):
         missing = ", ".join(part for part in _KEY_PARTS if part not in key_parts)
-        raise PackageError(f"to notarise with a key, give also {missing}")
+        raise PackageError(f"to notarise with a key, set also {missing}")
     if not name:
         if profile or key_parts:
-            raise PackageError("what is not signed can't be notarised; give also NEP_MACOS_IDENTITY")
+            raise PackageError("an unsigned package can't be notarised; set also NEP_MACOS_IDENTITY")
         return Identity(AD_HOC)
     if profile:
         return Identity(name, ("--keychain-profile", profile))
@@ -93,11 +93,11 @@ def pieces(app: Path) -> list[Piece]:
     """Return all files and bundles to be signed; the contents of a bundle come before the bundle."""
     programs = {app / "Contents" / "MacOS"}
     bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
-    mains = {_main_binary(bundle) for bundle in (app, *bundles)}
+    main_binaries = {_main_binary(bundle) for bundle in (app, *bundles)}
     inner_pieces = [
         Piece(path, "studio" if path.parent in programs and _is_program(path) else "")
         for path in binaries(app)
-        if path not in mains
+        if path not in main_binaries
     ]
     inner_pieces += [
         Piece(_signed_path(bundle), "web" if bundle.name == WEB_PROCESS else "") for bundle in bundles
@@ -144,19 +144,19 @@ def notarise(context: Context, path: Path, identity: Identity) -> None:
         PackageError: A command has failed, or Apple rejected the file; the text then contains Apple's
             findings.
     """
-    sent = path
+    submitted = path
     if path.suffix == ".app":
-        sent = context.work / f"{path.stem}.zip"
-        context.run("ditto", "-c", "-k", "--keepParent", path, sent)
-    submit = ("xcrun", "notarytool", "submit", str(sent), *identity.notary)
+        submitted = context.work / f"{path.stem}.zip"
+        context.run("ditto", "-c", "-k", "--keepParent", path, submitted)
+    submit = ("xcrun", "notarytool", "submit", str(submitted), *identity.notary)
     output = _output_of(context, *submit, "--wait", "--output-format", "json")
     try:
         result = json.loads(output)
     except ValueError:
-        raise PackageError(f"notarytool answered what can't be read: {output.strip()}") from None
+        raise PackageError(f"notarytool returned invalid JSON: {output.strip()}") from None
     if result.get("status") != "Accepted":
         log = _output_of(context, "xcrun", "notarytool", "log", str(result.get("id", "")), *identity.notary)
-        raise PackageError(f"Apple did not notarise '{path.name}' ({result.get('status')}): {log.strip()}")
+        raise PackageError(f"Apple rejected '{path.name}' ({result.get('status')}): {log.strip()}")
     context.run("xcrun", "stapler", "staple", path)
     context.run("xcrun", "stapler", "validate", path)
 
@@ -168,8 +168,10 @@ def verify(context: Context, app: Path) -> None:
 
 def assess(context: Context, path: Path) -> None:
     """Check that Gatekeeper accepts a notarised file; raises `PackageError`."""
-    how = ("execute",) if path.suffix == ".app" else ("open", "--context", "context:primary-signature")
-    context.run("spctl", "--assess", "--type", *how, "--verbose=2", path)
+    type_options = (
+        ("execute",) if path.suffix == ".app" else ("open", "--context", "context:primary-signature")
+    )
+    context.run("spctl", "--assess", "--type", *type_options, "--verbose=2", path)
 
 
 def _codesign_options(identity: Identity) -> Iterator[str]:
@@ -187,7 +189,7 @@ def _output_of(context: Context, *command: str) -> str:
         raise PackageError(f"'{command[0]}' can't be run: {error.strerror}") from error
     if completed.returncode != 0:
         raise PackageError(
-            f"'{' '.join(command[:3])}' ended with {completed.returncode}: {completed.stderr.strip()}"
+            f"'{' '.join(command[:3])}' exited with {completed.returncode}: {completed.stderr.strip()}"
         )
     return completed.stdout
 
@@ -203,7 +205,7 @@ def _main_binary(bundle: Path) -> Path:
     try:
         info = plistlib.loads((bundle / "Contents" / "Info.plist").read_bytes())
     except (OSError, ValueError, plistlib.InvalidFileException) as error:
-        raise PackageError(f"'{bundle.name}' has no Info.plist that can be read: {error}") from error
+        raise PackageError(f"the Info.plist of '{bundle.name}' can't be read: {error}") from error
     return bundle / "Contents" / "MacOS" / str(info.get("CFBundleExecutable", bundle.stem))
 
 

@@ -51,7 +51,7 @@ def entry_macros(frozen: Path) -> str:
         if path.parent != folder:
             folder = path.parent
             unpack.append(f"SetOutPath {quoted(PureWindowsPath(folder.relative_to(frozen)), '$NewFolder')}")
-        unpack.append(f'File "{path}"')  # a path of this computer, in which NSIS expands no variables
+        unpack.append(f'File "{path}"')  # a local path; NSIS doesn't expand variables in it
     names = [*sorted(path.name for path in frozen.iterdir()), UNINSTALLER]
     return (
         _macro("UnpackEntries", unpack)
@@ -75,7 +75,7 @@ def association_macros(reg_file: str) -> str:
     removed from it. Studio's own keys are removed completely.
     """
     values = list(_values(reg_file))
-    put = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
+    registration = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
     removal: list[str] = []
     for key, name, text in values:
         if _root(key).startswith("."):
@@ -96,7 +96,7 @@ def association_macros(reg_file: str) -> str:
             ]
         elif key == f"{CLASSES}{_root(key)}":
             removal.append(f"DeleteRegKey HKCU {quoted(key)}")
-    return _macro("Associate", put) + _macro("Dissociate", removal)
+    return _macro("Associate", registration) + _macro("Dissociate", removal)
 
 
 def _root(key: str) -> str:
@@ -166,8 +166,8 @@ def _makensis() -> Path:
     path = shutil.which("makensis") or (str(usual) if usual.is_file() else None)
     if path is None:
         raise PackageError(
-            "the setup program is made by NSIS, which is not here: 'sudo apt-get install nsis' on Debian and "
-            "Ubuntu, https://nsis.sourceforge.io on Windows"
+            "NSIS, which builds the installer, is missing: install it with 'sudo apt-get install nsis' "
+            "(Debian, Ubuntu) or from https://nsis.sourceforge.io (Windows)"
         )
     return Path(path).resolve()
 

@@ -70,7 +70,7 @@ def reject_wine_files(frozen: Path) -> None:
         if path.suffix.lower() in {".dll", ".exe"} and _is_wine_file(path)
     ]
     if names:
-        raise PackageError(f"the package would hold files of Wine: {', '.join(sorted(names))}")
+        raise PackageError(f"the package would contain files of Wine: {', '.join(sorted(names))}")
 
 
 def _is_wine_file(path: Path) -> bool:

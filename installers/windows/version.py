@@ -26,7 +26,7 @@ def version_numbers(version: str) -> tuple[int, int, int, int]:
     """
     match = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
     if match is None:
-        raise ValueError(f"no version: '{version}'")
+        raise ValueError(f"invalid version '{version}'")
     major, minor, patch = (int(each or 0) for each in match.groups())
     return major, minor, patch, 0
 

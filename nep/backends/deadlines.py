@@ -25,7 +25,7 @@ class Deadlines:
         self._name = f"nep-calls-{node_name}"
         self._changed = threading.Condition(threading.Lock())
         self._clients: tuple[ExpiringClient, ...] = ()
-        self._due = math.inf
+        self._next_deadline = math.inf
         self._is_closing = False
         self._thread: threading.Thread | None = None
 
@@ -45,18 +45,18 @@ class Deadlines:
     def add(self, deadline: float) -> None:
         """Schedule a check for expired calls at `deadline` (`time.monotonic`) or earlier."""
         with self._changed:
-            if deadline < self._due:
-                self._due = deadline
+            if deadline < self._next_deadline:
+                self._next_deadline = deadline
                 self._changed.notify()
 
     def _run(self) -> None:
         while True:
             with self._changed:
-                while not self._is_closing and (remaining_s := self._due - time.monotonic()) > 0.0:
+                while not self._is_closing and (remaining_s := self._next_deadline - time.monotonic()) > 0.0:
                     self._changed.wait(min(remaining_s, threading.TIMEOUT_MAX))
                 if self._is_closing:
                     return
-                self._due = math.inf
+                self._next_deadline = math.inf
                 clients = self._clients
             for client in clients:
                 self.add(client.expire(time.monotonic()))

@@ -121,7 +121,7 @@ class CallQueue:
         self._changed = threading.Condition(threading.Lock())
         self._calls: deque[IncomingCall] = deque()
         self._bytes = 0
-        self._wakes: list[Callable[[], None]] = []
+        self._wake_callbacks: list[Callable[[], None]] = []
         self._is_closed = False
 
     @property
@@ -138,8 +138,8 @@ class CallQueue:
             self._calls.append(call)
             self._bytes += size
             self._changed.notify()
-            wakes = tuple(self._wakes)
-        for wake in wakes:
+            wake_callbacks = tuple(self._wake_callbacks)
+        for wake in wake_callbacks:
             wake()
         return True
 
@@ -162,14 +162,14 @@ class CallQueue:
         with self._changed:
             if self._calls:
                 return False
-            self._wakes.append(wake)
+            self._wake_callbacks.append(wake)
             return True
 
     def leave_wait(self, wake: Callable[[], None]) -> None:
         """Unregister a function registered by `enter_wait`."""
         with self._changed:
-            if wake in self._wakes:  # not registered if the process was forked in between
-                self._wakes.remove(wake)
+            if wake in self._wake_callbacks:  # not registered if the process was forked in between
+                self._wake_callbacks.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
         """Reject new calls, wake all waiting threads, and return the calls that are still queued."""
@@ -185,7 +185,7 @@ class CallQueue:
         """Mark the queue as closed and empty in a forked child process, without acquiring a lock."""
         self._changed = threading.Condition(threading.Lock())
         self._calls = deque()
-        self._wakes = []
+        self._wake_callbacks = []
         self._is_closed = True
 
 

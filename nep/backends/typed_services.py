@@ -114,7 +114,7 @@ class TypedService:
     # ---- for servers
 
     def decode_call(self, body: bytes) -> DecodedCall:
-        """Parse a request body. Raises `DecodeError`.
+        """Decode a request body. Raises `DecodeError`.
 
         A request of a ROS type is converted to msgpack, which supports bytes and NaN.
         """

@@ -15,7 +15,7 @@ class WakingSubscriber(ABC):
 
     def __init__(self, changed: threading.Condition) -> None:
         self._changed = changed
-        self._waiting: tuple[Wakeable, ...] = ()
+        self._wakers: tuple[Wakeable, ...] = ()
 
     @property
     @abstractmethod
@@ -30,16 +30,16 @@ class WakingSubscriber(ABC):
         with self._changed:
             if self.has_input:
                 return False
-            self._waiting = (*self._waiting, waker)
+            self._wakers = (*self._wakers, waker)
             return True
 
     def leave_wait(self, waker: Wakeable) -> None:
         """Unregister `waker`."""
         with self._changed:
-            self._waiting = tuple(each for each in self._waiting if each is not waker)
+            self._wakers = tuple(each for each in self._wakers if each is not waker)
 
     def notify_waiting(self) -> None:
         """Wake all waiting threads. Call with `changed` held."""
         self._changed.notify_all()
-        for waiter in self._waiting:
-            waiter.wake()
+        for waker in self._wakers:
+            waker.wake()

@@ -13,7 +13,7 @@ from nep.protocol.graph_view import Alert, GraphView
 from nep.system.terminal import Terminal
 from nep.text import escaped
 
-_LIBRARY = "nep"
+_LIBRARY_LOGGER = "nep"
 
 
 class AlertTracker:
@@ -24,11 +24,11 @@ class AlertTracker:
 
     def update(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
         """Return (new or changed alerts, resolved alerts) since the previous call."""
-        now = {alert.id: alert for alert in view.alerts}
+        current = {alert.id: alert for alert in view.alerts}
         resolved = [
-            self._alerts.pop(id) for id in [alert_id for alert_id in self._alerts if alert_id not in now]
+            self._alerts.pop(id) for id in [alert_id for alert_id in self._alerts if alert_id not in current]
         ]
-        new = [alert for id, alert in now.items() if self._alerts.get(id) != alert]
+        new = [alert for id, alert in current.items() if self._alerts.get(id) != alert]
         self._alerts.update({alert.id: alert for alert in new})
         return new, resolved
 
@@ -72,7 +72,7 @@ class AlertLog:
         """Create the node and forward log records of the library to it."""
         self._node = Node("master", master=master.address, wait_s=3.0)
         self._node.log.propagate = False  # AlertPrinter already prints the alerts
-        logging.getLogger(_LIBRARY).addHandler(self._node.log_handler)
+        logging.getLogger(_LIBRARY_LOGGER).addHandler(self._node.log_handler)
 
     def changed(self, view: GraphView) -> None:
         """Log the alerts that are new, changed or resolved in `view`."""
@@ -88,5 +88,5 @@ class AlertLog:
         """Close the node and remove its log handler."""
         node, self._node = self._node, None
         if node is not None:
-            logging.getLogger(_LIBRARY).removeHandler(node.log_handler)
+            logging.getLogger(_LIBRARY_LOGGER).removeHandler(node.log_handler)
             node.close(0.5)

@@ -71,8 +71,8 @@ _COMMANDS: Mapping[str, Callable[[], object]] = {
 """Loaders of commands and command groups by name, in the order of the help text."""
 
 
-def _show_version(is_wanted: bool) -> None:
-    if is_wanted:
+def _show_version(is_requested: bool) -> None:
+    if is_requested:
         write(f"nep {__version__}\n")
         raise typer.Exit
 
@@ -81,12 +81,12 @@ class _LazyCommands(Mapping[str, Any]):
     """Lazy mapping of command names to click commands. A command is imported and built on first access."""
 
     def __init__(self) -> None:
-        self._built: dict[str, Any] = {}
+        self._commands: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - typer's types are not public
-        if name not in self._built:
-            self._built[name] = get_group(_build_command(name)).commands[name]
-        return self._built[name]
+        if name not in self._commands:
+            self._commands[name] = get_group(_build_command(name)).commands[name]
+        return self._commands[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(_COMMANDS)
@@ -135,11 +135,12 @@ def common(
 
 @cache
 def _build_command(name: str) -> typer.Typer:
-    group, loaded = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
-    if isinstance(loaded, typer.Typer):
-        group.add_typer(loaded, name=name)
-    elif callable(loaded):
-        group.command(name)(loaded)
+    group = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False)
+    entry = _COMMANDS[name]()
+    if isinstance(entry, typer.Typer):
+        group.add_typer(entry, name=name)
+    elif callable(entry):
+        group.command(name)(entry)
     for command, english in _docstrings(group):
         command.help = _(english)
         command.cls = TranslatedCommand
@@ -166,7 +167,7 @@ def run() -> int:
     Errors are printed to stderr as one sentence. If the reader of the output has exited (`| head`), the
     command ends silently with code 1.
     """
-    raised: OSError | None = None
+    output_error: OSError | None = None
     try:
         code = _run_root_command()
     except NepError as error:
@@ -175,8 +176,8 @@ def run() -> int:
     except OSError as error:
         if output_problem(error) is None:
             raise
-        raised, code = error, 1
-    problem = output_problem(raised)
+        output_error, code = error, 1
+    problem = output_problem(output_error)
     if problem:
         print_error_message(_("can't write the output: {problem}").format(problem=problem))
     return code if problem is None else code or 1

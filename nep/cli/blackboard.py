@@ -15,7 +15,7 @@ from nep.cli.screen import UNKNOWN, TextColumn, format_rounded_duration, print_s
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import format_payload
 from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
-from nep.i18n import _, lazy
+from nep.i18n import _, lazy, ngettext
 from nep.nodes.node import Node
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
@@ -38,7 +38,7 @@ _COLUMNS = (
     TextColumn(lazy("key"), style="bold", is_folded_last=True),
     TextColumn(lazy("value"), style="green"),
     TextColumn(lazy("age"), "right"),
-    TextColumn(lazy("by")),
+    TextColumn(lazy("based on")),
     TextColumn(lazy("from"), style="cyan"),
     TextColumn(lazy("robot"), style="cyan"),
 )
@@ -153,7 +153,7 @@ def show(
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Print the values of a blackboard with their ages, by publisher time stamp or arrival."""
+    """Print the values of a blackboard with their ages, based on time stamps or on times of arrival."""
     with Node(f"nep-blackboard-show-{os.getpid()}", master=master) as node:
         client = node.new_client(servers.service_name(name, "get"), timeout_s=timeout_s)
         try:
@@ -170,9 +170,10 @@ def show(
         show_table(_COLUMNS, [_row(each) for each in entries])
     else:
         print_status(_("no matching values"))
-    more = reply.get("more") if isinstance(reply, Mapping) else 0
-    if more:
-        print_status(_("and {count} more values").format(count=more))
+    hidden_count = reply.get("more") if isinstance(reply, Mapping) else 0
+    if isinstance(hidden_count, int) and hidden_count:
+        template = ngettext("and {count} more value", "and {count} more values", hidden_count)
+        print_status(template.format(count=hidden_count))
 
 
 def _topic_and_key(argument: str) -> tuple[str, str | None]:

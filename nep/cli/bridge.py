@@ -30,7 +30,7 @@ from nep.cli.screen import (
     write,
 )
 from nep.errors import NepError
-from nep.i18n import _, lazy
+from nep.i18n import _, lazy, ngettext
 from nep.masters.rates import TrafficMeter
 from nep.programs.bridges.bridge import Bridge, check_installed
 from nep.programs.bridges.configuration import (
@@ -127,13 +127,13 @@ def bridge(
     allowed = allow_moving or ()
     _check_types(configuration, allowed)
     with (
-        _print_warnings() as notes,
-        Bridge(configuration, allow_moving=allowed) as running,
-        _publish_log(running),
+        _print_warnings() as warning_handler,
+        Bridge(configuration, allow_moving=allowed) as running_bridge,
+        _publish_log(running_bridge),
     ):
-        for reason in running.denial_reasons(_ROBOT_DISCOVERY_S):
+        for reason in running_bridge.denial_reasons(_ROBOT_DISCOVERY_S):
             raise typer.BadParameter(reason)
-        report = _report_for(running, notes, as_json=as_json)
+        report = _report_for(running_bridge, warning_handler, as_json=as_json)
         if not as_json:
             template = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
             print_status(
@@ -224,18 +224,18 @@ class _WarningHandler(logging.Handler):
 
 @contextmanager
 def _print_warnings() -> Iterator[_WarningHandler]:
-    notes, logger = _WarningHandler(), logging.getLogger("nep")
-    logger.addHandler(notes)
+    warning_handler, logger = _WarningHandler(), logging.getLogger("nep")
+    logger.addHandler(warning_handler)
     try:
-        yield notes
+        yield warning_handler
     finally:
-        logger.removeHandler(notes)
+        logger.removeHandler(warning_handler)
 
 
 @contextmanager
-def _publish_log(running: Bridge) -> Iterator[None]:
+def _publish_log(running_bridge: Bridge) -> Iterator[None]:
     logger = logging.getLogger("nep")
-    handlers = [side.node.log_handler for side in running.sides.values()]
+    handlers = [side.node.log_handler for side in running_bridge.sides.values()]
     for handler in handlers:
         logger.addHandler(handler)
     try:
@@ -265,10 +265,10 @@ class _Row(NamedTuple):
 class _Report:
     """Report of the counts of all routes, printed once a second."""
 
-    def __init__(self, running: Bridge) -> None:
-        self._running = running
+    def __init__(self, running_bridge: Bridge) -> None:
+        self._bridge = running_bridge
         self._meters: dict[Route, TrafficMeter] = {}
-        names = [running.configuration.side(side).backend.name for side in ("a", "b")]
+        names = [running_bridge.configuration.side(side).backend.name for side in ("a", "b")]
         self._sides: Mapping[str, str] = dict(zip("ab", names if names[0] != names[1] else "ab", strict=True))
 
     def start(self) -> None: ...
@@ -280,7 +280,7 @@ class _Report:
         self.show()
 
     def rows(self) -> list[_Row]:
-        return [self._row(route, route.counts()) for route in self._running.routes]
+        return [self._row(route, route.counts()) for route in self._bridge.routes]
 
     def rate_hz(self, route: Route, counts: RouteCounts) -> float | None:
         meter = self._meters.setdefault(route, TrafficMeter())
@@ -302,7 +302,7 @@ class _Report:
 
 def _problem_text(route: Route, counts: RouteCounts) -> str:
     if route.rival:
-        return _("the bridge '{name}' forwards this topic, too; stop one of the two").format(
+        return _("the bridge '{name}' also forwards this topic; stop one of the bridges").format(
             name=escaped(route.rival)
         )
     return escaped(route.connection_problem or counts.problem)
@@ -312,8 +312,8 @@ class _JsonReport(_Report):
     """Report as one JSON line per second: the status as published on `/nep/bridges`, with rates."""
 
     def show(self) -> None:
-        status = self._running.status()
-        rates = [self.rate_hz(route, route.counts()) for route in self._running.routes]
+        status = self._bridge.status()
+        rates = [self.rate_hz(route, route.counts()) for route in self._bridge.routes]
         routes = status["routes"]
         routes_with_rates = [
             {**each, "rate_hz": rate_hz}
@@ -325,8 +325,8 @@ class _JsonReport(_Report):
 class _PlainReport(_Report):
     """Report for a file or a pipe: prints only routes whose counts have changed."""
 
-    def __init__(self, running: Bridge) -> None:
-        super().__init__(running)
+    def __init__(self, running_bridge: Bridge) -> None:
+        super().__init__(running_bridge)
         self._last_counts: dict[str, tuple[str, ...]] = {}
         self._width = 0
 
@@ -354,11 +354,11 @@ class _PlainReport(_Report):
 class _LiveReport(_Report):
     """Report as a table that is redrawn in place; warnings are printed above the table."""
 
-    def __init__(self, running: Bridge, notes: _WarningHandler) -> None:
+    def __init__(self, running_bridge: Bridge, warning_handler: _WarningHandler) -> None:
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
-        super().__init__(running)
-        self._warning_handler = notes
+        super().__init__(running_bridge)
+        self._warning_handler = warning_handler
         out = console()
         out.soft_wrap = False
         self._live = Live(console=out, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
@@ -404,16 +404,21 @@ class _LiveReport(_Report):
             table.add_row(
                 Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.cells[column] for column in shown_columns)
             )
-        below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
+        footer_lines = [
+            Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem
+        ]
         if hidden_count > 0:
-            below.append(Text(_("and {count} more topics").format(count=hidden_count), "dim"))
-        return Group(table, *below[: max(1, max_rows - len(rows) + 1)])
+            template = ngettext("and {count} more topic", "and {count} more topics", hidden_count)
+            footer_lines.append(Text(template.format(count=hidden_count), "dim"))
+        return Group(table, *footer_lines[: max(1, max_rows - len(rows) + 1)])
 
 
-def _report_for(running: Bridge, notes: _WarningHandler, *, as_json: bool) -> _Report:
+def _report_for(running_bridge: Bridge, warning_handler: _WarningHandler, *, as_json: bool) -> _Report:
     if as_json:
-        return _JsonReport(running)
-    return _LiveReport(running, notes) if sys.stdout.isatty() else _PlainReport(running)
+        return _JsonReport(running_bridge)
+    return (
+        _LiveReport(running_bridge, warning_handler) if sys.stdout.isatty() else _PlainReport(running_bridge)
+    )
 
 
 def _run(report: _Report, count: int) -> None:

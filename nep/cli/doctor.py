@@ -24,7 +24,7 @@ SilentTopicArgument = Annotated[
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SYMBOLS = dict(zip(_STYLES, "✗!·✓", strict=True))
 _ASCII_SYMBOLS = dict(zip(_STYLES, "x!-+", strict=True))
-"""ASCII signs, for output whose encoding lacks the Unicode signs (often on Windows)."""
+"""ASCII symbols for output whose encoding lacks the Unicode symbols (often on Windows)."""
 
 
 def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: SilentTopicArgument = "") -> None:
@@ -48,11 +48,11 @@ def _show_findings(findings: tuple[doctors.Finding, ...]) -> None:
 
     out = console()
     is_unicode = (out.encoding or "").lower().startswith("utf")
-    signs, arrow = (_SYMBOLS, "→") if is_unicode else (_ASCII_SYMBOLS, "->")
+    symbols, arrow = (_SYMBOLS, "→") if is_unicode else (_ASCII_SYMBOLS, "->")
     for finding in findings:
         out.print(
             Text.assemble(
-                (f"{signs[finding.severity]} ", _STYLES[finding.severity]), escaped(finding.sentence)
+                (f"{symbols[finding.severity]} ", _STYLES[finding.severity]), escaped(finding.sentence)
             )
         )
         if finding.fix:

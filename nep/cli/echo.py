@@ -119,20 +119,22 @@ def echo(
             raise typer.BadParameter(
                 _("specify the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
-        picked = FieldExtractor(fields)
-        names_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
-        show: Callable[[Message], object] = MessagePrinter(picked, names_topic=names_topic, in_full=full)
+        extractor = FieldExtractor(fields)
+        includes_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
+        show: Callable[[Message], object] = MessagePrinter(
+            extractor, includes_topic=includes_topic, in_full=full
+        )
         if as_json:
-            show = partial(show_record, fields=picked)
+            show = partial(show_record, fields=extractor)
         elif as_csv:
-            show = CsvMessageWriter(picked, names_topic=names_topic)
+            show = CsvMessageWriter(extractor, includes_topic=includes_topic)
         with closing(_receive_messages(node, topics, graph, timeout_s)) as messages:
-            passing = (each for each in messages if condition is None or _matches(condition, each))
+            matching = (each for each in messages if condition is None or _matches(condition, each))
             try:
-                for message in itertools.islice(passing, count or None):
+                for message in itertools.islice(matching, count or None):
                     show(message)
             finally:
-                picked.report_missing()
+                extractor.report_missing()
 
 
 def _receive_messages(
@@ -141,17 +143,17 @@ def _receive_messages(
     # Yields messages as `_receive_all` does, after subscribing to topics and patterns.
     exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
     patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
-    waiting = TopicMonitor(node, exact)
-    waiting.update(graph)
+    monitor = TopicMonitor(node, exact)
+    monitor.update(graph)
     subscribers: list[Subscriber] = []
-    with ExitStack() as opened:
+    with ExitStack() as stack:
 
         def subscribe(topics: Sequence[tuple[str, str]]) -> None:
             for name, msg_type in topics:
-                subscribers.append(opened.enter_context(node.new_sub(name, msg_type)))
+                subscribers.append(stack.enter_context(node.new_sub(name, msg_type)))
 
-        subscribe([(each, waiting.msg_type(each)) for each in exact] + patterns.new_topics(graph))
-        yield from _receive_all(subscribers, timeout_s, waiting, patterns, subscribe)
+        subscribe([(each, monitor.msg_type(each)) for each in exact] + patterns.new_topics(graph))
+        yield from _receive_all(subscribers, timeout_s, monitor, patterns, subscribe)
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
@@ -171,8 +173,8 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
             topics.append(argument)
         else:
             fields.append(argument)
-    both = [argument for argument in more if argument in graph.topics and not argument.startswith("/")]
-    for argument in both:
+    ambiguous = [argument for argument in more if argument in graph.topics and not argument.startswith("/")]
+    for argument in ambiguous:
         print_status(_("'{word}' is a topic; use .{word} for a field of that name").format(word=argument))
     return list(dict.fromkeys(topics)), fields
 
@@ -180,27 +182,27 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
 def _receive_all(
     subscribers: Sequence[Subscriber],
     timeout_s: float | None,
-    waiting: TopicMonitor,
+    monitor: TopicMonitor,
     patterns: TopicPatterns,
     subscribe_new: Callable[[Sequence[tuple[str, str]]], None],
 ) -> Iterator[Message]:
     # Reports lost messages on stderr. `subscribe_new` adds topics that match the patterns and are new. Raises
     # `WaitTimeoutError`.
     lost: dict[str, int] = {}
-    last, never = time.monotonic(), threading.Event()
+    last_received_at, never = time.monotonic(), threading.Event()
     while True:
         subscribe_new(patterns.poll())
         received = [message for subscriber in subscribers if (message := subscriber.receive(0.0)) is not None]
         if not received and not subscribers:
-            never.wait(waiting.wait_slice_s(timeout_s))
+            never.wait(monitor.wait_slice_s(timeout_s))
         elif not received:
             message = subscribers[0].receive(
-                _RECEIVE_SLICE_S if len(subscribers) > 1 else waiting.wait_slice_s(timeout_s)
+                _RECEIVE_SLICE_S if len(subscribers) > 1 else monitor.wait_slice_s(timeout_s)
             )
             received = [] if message is None else [message]
         now = time.monotonic()
         if received:
-            last = now
+            last_received_at = now
             for subscriber in subscribers:
                 missing = (subscriber.lost or 0) - lost.get(subscriber.topic, 0)
                 if missing > 0:
@@ -212,15 +214,15 @@ def _receive_all(
                     )
                     print_status(template.format(count=missing, topic=subscriber.topic))
             yield from received
-            waiting.mark_received({message.topic for message in received})
-        elif timeout_s is not None and now - last >= timeout_s:
+            monitor.mark_received({message.topic for message in received})
+        elif timeout_s is not None and now - last_received_at >= timeout_s:
             names = format_list(
                 [f"'{topic}'" for topic in (*(sub.topic for sub in subscribers), *patterns.patterns)],
                 "or",
             )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
-            waiting.poll()
+            monitor.poll()
 
 
 def _matches(condition: MessageFilter, message: Message) -> bool:
@@ -268,41 +270,41 @@ class MessagePrinter:
     """Printer of messages for people: time, sequence number, topic and payload, coloured on a terminal."""
 
     def __init__(
-        self, fields: FieldExtractor | None = None, *, names_topic: bool = False, in_full: bool = False
+        self, fields: FieldExtractor | None = None, *, includes_topic: bool = False, in_full: bool = False
     ) -> None:
         """Initialize the printer.
 
         Args:
             fields: Fields to print; None prints the whole payload.
-            names_topic: Print the topic of each message.
+            includes_topic: Print the topic of each message.
             in_full: Print long values in full on a terminal; files and pipes always get them in full.
         """
         self._fields = fields
-        self._names_topic = names_topic
+        self._includes_topic = includes_topic
         self._console = console()
         self._paint = json_highlighter() if self._console.is_terminal else None
-        self._is_untruncated = in_full or self._paint is None
+        self._prints_in_full = in_full or self._paint is None
 
     def __call__(self, message: Message) -> None:
         """Print one message. If fields were chosen, an undecodable message is skipped."""
-        header = _format_head(message)
-        if self._names_topic:
+        header = _format_header(message)
+        if self._includes_topic:
             header += f"  {escaped(message.topic)}"
-        room = self._console.width - display_width(header) - 2
+        max_width = self._console.width - display_width(header) - 2
         if self._fields is not None and self._fields.names:
             values = self._fields.extract(message)
             if values is None:
                 return
-            body = format_payload(self._fields.as_dict(values), in_full=self._is_untruncated)
+            body = format_payload(self._fields.as_dict(values), in_full=self._prints_in_full)
         else:
-            body = _format_body(message, room, in_full=self._is_untruncated)
+            body = _format_body(message, max_width, in_full=self._prints_in_full)
         if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
             write(f"{header}  {body}\n")
         else:
             self._console.print(self._paint(header, body))
 
 
-def _format_head(message: Message) -> str:
+def _format_header(message: Message) -> str:
     stamp = UNKNOWN
     if message.stamp_ns is not None:
         stamp = (
@@ -314,7 +316,7 @@ def _format_head(message: Message) -> str:
     return f"{stamp}{seq}"
 
 
-def _format_body(message: Message, room: int, *, in_full: bool) -> str:
+def _format_body(message: Message, max_width: int, *, in_full: bool) -> str:
     if message.codec == "image":
         return _image_summary(message)
     try:
@@ -334,14 +336,14 @@ def _format_body(message: Message, room: int, *, in_full: bool) -> str:
     # re-encoding decoded JSON is 100 times faster than formatting each value
     is_exact = in_full and message.codec == "json" and not _has_nan(message.data)
     line = encode_json(payload).decode() if is_exact else format_payload(payload, in_full=in_full)
-    if len(line) <= room and display_width(line) <= room:
+    if len(line) <= max_width and display_width(line) <= max_width:
         return line
-    laid_out = (
+    indented = (
         encode_json(payload, indent=True).decode()
         if is_exact
         else format_payload(payload, in_full=in_full, indent=True)
     )
-    return "\n" + textwrap.indent(laid_out, "  ")
+    return "\n" + textwrap.indent(indented, "  ")
 
 
 def _has_nan(data: memoryview) -> bool:

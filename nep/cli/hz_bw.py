@@ -111,7 +111,7 @@ def bw(
         lazy("messages"),
         lazy("lost"),
     )
-    _Report(topics, window_s, headings, _traffic_cells).run(
+    _Report(topics, window_s, headings, _bandwidth_cells).run(
         count, timeout_s, master, backend, as_json=as_json
     )
 
@@ -129,7 +129,7 @@ def delay(
 
     Between two computers the latency is corrected by the difference of their clocks, which the master
     measures within two seconds; the uncertainty follows after ±. Programs of the original NEP send no time
-    stamps. The latency of a latched message is its full age.
+    stamps, so their latency is unknown. The latency of a latched message is its full age.
     """
     _DelayReport(topics, window_s).run(count, timeout_s, master, backend, as_json=as_json)
 
@@ -163,12 +163,12 @@ class _Report:
         as_json: bool,
     ) -> None:
         # Raises `BadTopicError`, `WaitTimeoutError`.
-        with ExitStack() as opened, open_command_node("measure", master, backend) as node:
-            waiting = TopicMonitor(node, list(self._windows))
-            waiting.update(node.graph())
+        with ExitStack() as stack, open_command_node("measure", master, backend) as node:
+            monitor = TopicMonitor(node, list(self._windows))
+            monitor.update(node.graph())
             for topic in self._windows:
-                subscription = self._subscribe(node, topic, waiting.msg_type(topic))
-                self._subscribers[topic] = opened.enter_context(subscription)
+                subscription = self._subscribe(node, topic, monitor.msg_type(topic))
+                self._subscribers[topic] = stack.enter_context(subscription)
             if not as_json:
                 print_status(_("measuring; press Ctrl+C to stop"))
                 write(f"{self._format_line(_('topic'), [_(heading) for heading in self._headings])}\n")
@@ -180,32 +180,32 @@ class _Report:
                     (self._show_json if as_json else self._show)(topic)
                 if number == count:
                     return
-                self._check_silence(waiting, timeout_s)
+                self._check_silence(monitor, timeout_s)
 
     def _wait(self, node: Node, seconds: float) -> None:  # noqa: ARG002 - the sink runs in the node's thread
         self._never.wait(seconds)
 
-    def _check_silence(self, waiting: TopicMonitor, timeout_s: float | None) -> None:
+    def _check_silence(self, monitor: TopicMonitor, timeout_s: float | None) -> None:
         # Reports topics without publishers. Raises `WaitTimeoutError` if no topic received a message in time.
         totals = {topic: window.total for topic, window in self._windows.items()}
         received = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
         now = time.monotonic()
         if received:
             self._totals, self._last_received_at = totals, now
-            waiting.mark_received(received)
+            monitor.mark_received(received)
         if timeout_s is not None and now - self._last_received_at >= timeout_s:
             names = format_list([repr(topic) for topic in totals], "or")
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         if len(received) < len(totals):
-            waiting.poll()
+            monitor.poll()
 
     def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
-        window, replays = self._windows[topic], LatchedFilter(time.monotonic())
+        window, latched_filter = self._windows[topic], LatchedFilter(time.monotonic())
 
         def on_messages(messages: Sequence[Message]) -> None:
             now = time.monotonic()
             for message in messages:
-                if replays.predates_subscription(message, now):
+                if latched_filter.predates_subscription(message, now):
                     continue
                 stamp_s = None if message.stamp_ns is None else message.stamp_ns / 1e9
                 window.add(now, stamp_s, message.size_bytes)
@@ -249,18 +249,18 @@ class _DelayReport(_Report):
         super().__init__(topics, window_s, headings, self._delay_cells)
         self._latency_windows = {topic: LatencyWindow(window_s) for topic in topics}
         self._windows = self._latency_windows
-        self._unstamped: set[str] = set()
-        self._uncompared: dict[str, int] = {}
-        """Number of reports for each topic whose publisher's clock is not compared yet."""
+        self._topics_without_stamp: set[str] = set()
+        self._uncompared_reports: dict[str, int] = {}
+        """Number of reports by topic while the publisher's clock has not been compared."""
 
     def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window = self._latency_windows[topic]
 
         def on_message(message: Message) -> None:
-            age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
-            window.add_latency(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
-            if age_s is None and topic not in self._unstamped:
-                self._unstamped.add(topic)
+            latency_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+            window.add_latency(time.monotonic(), latency_s, message.size_bytes, uncertainty_s)
+            if latency_s is None and topic not in self._topics_without_stamp:
+                self._topics_without_stamp.add(topic)
                 print_status(
                     _("messages of '{topic}' have no time stamp; their latency is unknown").format(
                         topic=topic
@@ -277,12 +277,12 @@ class _DelayReport(_Report):
         if latency is None:
             return None, (UNKNOWN,) * 4
         uncertainty_s = latency.uncertainty_s
-        ages = [
+        latencies = [
             format_latency(each, uncertainty_s) for each in (latency.mean_s, latency.min_s, latency.max_s)
         ]
         if uncertainty_s and latency.mean_s >= 0:
-            ages[0] += f" ± {format_duration(uncertainty_s)}"
-        return latency, (*ages, format_duration(latency.std_s))
+            latencies[0] += f" ± {format_duration(uncertainty_s)}"
+        return latency, (*latencies, format_duration(latency.std_s))
 
     def _format_line(self, topic: str, cells: Sequence[str]) -> str:
         padded_cells = [
@@ -296,10 +296,10 @@ class _DelayReport(_Report):
         latency = self._latency_windows[topic].delay(time.monotonic())
         is_compared = latency is None or latency.uncertainty_s is not None
         if is_compared:
-            self._uncompared.pop(topic, None)
+            self._uncompared_reports.pop(topic, None)
             return
-        self._uncompared[topic] = self._uncompared.get(topic, 0) + 1
-        if self._uncompared[topic] == _CLOCK_WARNING_REPORTS:
+        self._uncompared_reports[topic] = self._uncompared_reports.get(topic, 0) + 1
+        if self._uncompared_reports[topic] == _CLOCK_WARNING_REPORTS:
             message = _(
                 "'{topic}': the clock difference between the two computers is unknown and is included in "
                 "the latency"
@@ -317,7 +317,7 @@ def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, 
     )
 
 
-def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
+def _bandwidth_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
     bandwidth = window.bandwidth(now)
     if bandwidth is None:
         return None, (UNKNOWN,) * 4

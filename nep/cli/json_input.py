@@ -23,7 +23,7 @@ def parse_json(
     file: str | None = None,
     first_line: int = 1,
     allow_nan: bool = False,
-    other_types: bool = False,
+    suggest_types: bool = False,
 ) -> object:
     """Parse a JSON text.
 
@@ -32,7 +32,7 @@ def parse_json(
         file: Name of the file, for error messages.
         first_line: Line number of the text in standard input, for error messages.
         allow_nan: Accept NaN and Infinity, which Python's `json` writes.
-        other_types: Suggest ``--type string`` and ``--type msgpack`` in error messages.
+        suggest_types: Suggest ``--type string`` and ``--type msgpack`` in error messages.
 
     Raises:
         NepError: The text is not valid JSON; the message names the position and the reason.
@@ -42,10 +42,10 @@ def parse_json(
         value: object = json.loads(text) if allow_nan else orjson.loads(text)
         return value
     if file is None and text.strip() and not looks_like_json(text):
-        raise NepError(_not_json_message(text, other_types=other_types))
+        raise NepError(_not_json_message(text, suggest_types=suggest_types))
     raise NepError(
         _invalid_json_message(
-            fault, quotable(file) if file else _excerpt(text), first_line, other_types=other_types
+            fault, quotable(file) if file else _excerpt(text), first_line, suggest_types=suggest_types
         )
     )
 
@@ -59,9 +59,9 @@ def decode_text(data: bytes, file: str) -> str:
         raise NepError(message.format(start=error.start + 1, text=escaped(file))) from error
 
 
-def _invalid_json_message(fault: JsonFault, shown_text: str, first_line: int, *, other_types: bool) -> str:
+def _invalid_json_message(fault: JsonFault, shown_text: str, first_line: int, *, suggest_types: bool) -> str:
     message = _("'{text}' isn't valid JSON: line {line}, column {column}: {reason}")
-    if fault.is_nan and other_types:
+    if fault.is_nan and suggest_types:
         message = _(
             "'{text}' isn't valid JSON: line {line}, column {column}: {reason}, or use --type msgpack"
         )
@@ -69,11 +69,11 @@ def _invalid_json_message(fault: JsonFault, shown_text: str, first_line: int, *,
     return message.format(text=shown_text, line=line, column=fault.column, reason=fault.reason)
 
 
-def _not_json_message(text: str, *, other_types: bool) -> str:
+def _not_json_message(text: str, *, suggest_types: bool) -> str:
     example = text if len(text) <= _MAX_SHOWN_CHARACTERS else _("some text")
     quoted = _quote_for_shell(json.dumps(example, ensure_ascii=bool(first_control(example))))
     message = _("'{text}' isn't valid JSON; put strings in quotes, such as {quoted}")
-    if other_types:
+    if suggest_types:
         message = _(
             "'{text}' isn't valid JSON; put strings in quotes, such as {quoted}, or use --type string"
         )

@@ -96,10 +96,11 @@ def log(
 
 def _receive_records(own_node: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
     error_filter = NewErrorFilter()
-    with own_node.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as latched:
-        lists = iter(partial(latched.receive, 0.0), None)  # latched messages arrived while connecting
-        last = [record for each in lists for record in _new_errors(each, error_filter)]
-    yield from sorted(last, key=lambda record: record.stamp_ns)
+    with own_node.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as last_errors_subscriber:
+        # latched messages arrived while connecting
+        lists = iter(partial(last_errors_subscriber.receive, 0.0), None)
+        last_errors = [record for each in lists for record in _new_errors(each, error_filter)]
+    yield from sorted(last_errors, key=lambda record: record.stamp_ns)
     while True:
         message = subscriber.receive()
         if message is None:

@@ -35,8 +35,8 @@ _ListenOption = Annotated[
     typer.Option(
         metavar=_("ADDRESS"),
         help=_(
-            "Also accept other computers at this address of this computer; 0.0.0.0 means all. There is "
-            "no password: anyone on that network can read and send all messages."
+            "Also accept connections from other computers at this address of this computer; 0.0.0.0 means "
+            "all. There is no password: anyone on that network can read and send all messages."
         ),
         show_default=False,
     ),
@@ -80,10 +80,10 @@ def master(
     address = _address(master, port)
     with Terminal(sys.stderr) as terminal:  # a blocked terminal must not stop the master
         log_to(terminal, logging.WARNING)
-        running = _start(address, owner_pid, terminal, joins_originals=gateway)
+        running_master = _start(address, owner_pid, terminal, has_gateway=gateway)
         try:
-            running.listen(listen or ())
-            _show_address(running.address, terminal, joins_originals=gateway)
+            running_master.listen(listen or ())
+            _show_address(running_master.address, terminal, has_gateway=gateway)
             problem = collect.loopback_problem()
             if problem:
                 print_status(
@@ -93,17 +93,17 @@ def master(
                     ).format(problem=problem),
                     terminal,
                 )
-            _show_remote_addresses(running.address, listen or (), terminal)
+            _show_remote_addresses(running_master.address, listen or (), terminal)
             interrupts.exit_on_termination()
-            running.wait()
+            running_master.wait()
         finally:
-            running.close()
+            running_master.close()
 
 
-def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
+def _start(address: str, owner_pid: int | None, terminal: Terminal, *, has_gateway: bool) -> Master:
     raise_open_file_limit()
     attachments: list[Attachment] = [AlertPrinter(terminal), AlertLog()]
-    if joins_originals:
+    if has_gateway:
         attachments.insert(0, attachment.GatewayAttachment())
     try:
         return Master(address, attachments=attachments, owner_pid=owner_pid).start()
@@ -114,10 +114,10 @@ def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_ori
                     address=address
                 )
             ) from error
-        obstacle = doctor.start_blocker(address)
-        if obstacle is None:
+        blocker = doctor.start_blocker(address)
+        if blocker is None:
             raise
-        raise NepError(obstacle.error_message) from error
+        raise NepError(blocker.error_message) from error
 
 
 def _address(master: str | None, port: int | None) -> str:
@@ -127,17 +127,17 @@ def _address(master: str | None, port: int | None) -> str:
     if not is_loopback(address):
         raise NepError(
             _(
-                "a master always listens on 127.0.0.1; use that, and add --listen {host_of} for"
-                " other computers"
-            ).format(host_of=host_of(address))
+                "a master always listens on 127.0.0.1; use that address, and add --listen {host} to accept "
+                "other computers"
+            ).format(host=host_of(address))
         )
     return address
 
 
-def _show_address(address: str, terminal: Terminal, *, joins_originals: bool) -> None:
+def _show_address(address: str, terminal: Terminal, *, has_gateway: bool) -> None:
     out = console(out=terminal)
     out.print(_("[bold green]●[/] master at [bold]{address}[/]").format(address=address))
-    if joins_originals:
+    if has_gateway:
         out.print(_("  programs of the original NEP can join"), style="dim")
     out.print(_("  press Ctrl+C to stop"), style="dim")
 

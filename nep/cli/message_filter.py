@@ -71,8 +71,8 @@ def _parse_condition(node: ast.expr) -> _Term:
             parts = [_parse_condition(each) for each in values]
             return lambda payload: any(_is_true(part(payload)) for part in parts)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            negated = _parse_condition(operand)
-            return lambda payload: not _is_true(negated(payload))
+            negated_term = _parse_condition(operand)
+            return lambda payload: not _is_true(negated_term(payload))
         case ast.Compare(left=left, ops=ops, comparators=right):
             tests = [_OPERATORS.get(type(op)) for op in ops]
             operators = [test for test in tests if test is not None]

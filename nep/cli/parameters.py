@@ -149,9 +149,9 @@ def dump(
         write(data.decode())
         return
     try:
-        unfinished = file.with_name(f"{file.name}.{os.getpid()}.part")
-        unfinished.write_bytes(data)
-        replace_file(unfinished, file)
+        part_file = file.with_name(f"{file.name}.{os.getpid()}.part")
+        part_file.write_bytes(data)
+        replace_file(part_file, file)
     except OSError as error:
         template = _("can't write '{file}': {problem}; choose another file")
         raise NepError(template.format(file=escaped(str(file)), problem=error.strerror or error)) from error
@@ -228,17 +228,17 @@ def _parse_values(message: Message) -> Mapping[str, object] | None:
 
 def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterator[tuple[str, object]]:
     # Yields names and values that are new or have changed. Raises `NepError` if `name` does not exist.
-    before: dict[str, object] = {}
+    previous_values: dict[str, object] = {}
     for values in states:
-        if name is not None and not before and name not in values:
+        if name is not None and not previous_values and name not in values:
             hint = did_you_mean(name, tuple(values)) if values else _("the node has no parameters")
             raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=hint))
         for key, value in values.items():
-            is_same = key in before and encode_json(before[key]) == encode_json(
+            is_same = key in previous_values and encode_json(previous_values[key]) == encode_json(
                 value
             )  # 1 and 1.0 and True differ
             if not is_same:
-                before[key] = value
+                previous_values[key] = value
                 if name in {None, key}:
                     yield key, value
 

@@ -78,8 +78,8 @@ def play(
 ) -> None:
     """Publish the messages of a recording with their original timing, until its end or Ctrl+C.
 
-    Only the named topics are published: names, patterns in quotes, or --all. Topics that move a robot,
-    according to the recording or to a connected robot, need --allow-moving, or --arm if they are named.
+    Specify the topics by names or by patterns in quotes, or use --all. Topics that move a robot, according
+    to the recording or to a connected robot, need --allow-moving, or --arm if they are named.
     Robots that connect later are protected, too.
     """
     with reader.Recording(file) as recording:
@@ -94,8 +94,8 @@ def play(
             raise NepError(template.format(file=file, count=len(selected), most=_MAX_TOPICS))
         names = _remapped_names(selected, remap or ())
         armed = frozenset(named_topics) if arm else frozenset[str]()
-        limits = _MotionPermissions(recording, names, frozenset(allow_moving or ()), armed)
-        selected = limits.filter_allowed(selected, named_topics)
+        permissions = _MotionPermissions(recording, names, frozenset(allow_moving or ()), armed)
+        selected = permissions.filter_allowed(selected, named_topics)
         try:
             playback = player.Playback(recording, topics=selected, remap=names)
             playback.speed = speed
@@ -103,18 +103,18 @@ def play(
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
         with open_command_node("play", master) as node:
-            limits.guard = MotionGuard(node)
-            limits.guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
-            selected = limits.filter_allowed(selected, named_topics)
+            permissions.guard = MotionGuard(node)
+            permissions.guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
+            selected = permissions.filter_allowed(selected, named_topics)
             if not selected:
                 raise NepError(_("nothing to publish: all chosen topics are blocked"))
             playback.select_topics(selected)
-            with _Sender(node, recording, selected, limits) as sender:
+            with _Sender(node, recording, selected, permissions) as sender:
                 _play(recording, playback, sender)
                 template = ngettext("published {count} message", "published {count} messages", sender.count)
                 print_status(template.format(count=sender.count))
         exit_if_damaged(recording)
-        if limits.was_named_topic_blocked:
+        if permissions.was_named_topic_blocked:
             raise typer.Exit(1)
 
 
@@ -143,11 +143,11 @@ class _MotionPermissions:
         self.guard: MotionGuard | None = None
         self.was_named_topic_blocked = False
         self._topics = recording.topics
-        self._recorded = player.moving_topics(recording)
+        self._recorded_moving = player.moving_topics(recording)
         self._allowed, self._armed = allowed, armed
         self._named_topics: frozenset[str] = frozenset()
         self._checked_moving: MovingTopics | None = None
-        self._blocked: dict[str, str] = {}
+        self._block_reasons: dict[str, str] = {}
 
     def filter_allowed(self, selected: Sequence[str], named_topics: Sequence[str]) -> list[str]:
         # Returns the topics that may be published. Raises `typer.BadParameter` if a named one is blocked.
@@ -164,33 +164,35 @@ class _MotionPermissions:
         return allowed_topics
 
     def allows(self, topic: str) -> bool:
-        # Reports a topic that becomes blocked once on stderr.
+        # Reports on stderr each topic that becomes blocked, once.
         if self.guard is not None and self.guard.moving_topics is not self._checked_moving:
             self._checked_moving = self.guard.moving_topics
-            self._blocked = self._find_blocked(self._blocked)
-        return topic not in self._blocked
+            self._block_reasons = self._find_blocked(self._block_reasons)
+        return topic not in self._block_reasons
 
-    def _find_blocked(self, before: Mapping[str, str]) -> dict[str, str]:
-        blocked = {}
-        for recorded in self._topics:
-            name = self.names.get(recorded, recorded)
-            reason = self._block_reason(recorded)
+    def _find_blocked(self, previous_reasons: Mapping[str, str]) -> dict[str, str]:
+        block_reasons = {}
+        for recorded_topic in self._topics:
+            name = self.names.get(recorded_topic, recorded_topic)
+            reason = self._block_reason(recorded_topic)
             if reason:
-                blocked[name] = reason
-                if name not in before:
+                block_reasons[name] = reason
+                if name not in previous_reasons:
                     print_status(_("not published: {reason}").format(reason=reason))
-                    self.was_named_topic_blocked |= recorded in self._named_topics
-        return blocked
+                    self.was_named_topic_blocked |= recorded_topic in self._named_topics
+        return block_reasons
 
-    def _block_reason(self, recorded: str) -> str:
-        name = self.names.get(recorded, recorded)
-        if recorded in self._armed or recorded in self._allowed:
+    def _block_reason(self, recorded_topic: str) -> str:
+        name = self.names.get(recorded_topic, recorded_topic)
+        if recorded_topic in self._armed or recorded_topic in self._allowed:
             return ""
-        live = () if self.guard is None else self.guard.moving_topics.robots_moved_by(name)
-        recorded_robots = self._recorded.robots_moved_by(recorded, self._topics[recorded].msg_type)
-        recorded_robots = recorded_robots or self._recorded.robots_moved_by(name)
+        live_robots = () if self.guard is None else self.guard.moving_topics.robots_moved_by(name)
+        recorded_robots = self._recorded_moving.robots_moved_by(
+            recorded_topic, self._topics[recorded_topic].msg_type
+        )
+        recorded_robots = recorded_robots or self._recorded_moving.robots_moved_by(name)
         # names of connected robots win, unless the guard only knows the topic
-        robots = recorded_robots or live if live in ((), (name,)) else live
+        robots = recorded_robots or live_robots if live_robots in ((), (name,)) else live_robots
         return denial_text(name, robots, self._allowed)
 
 
@@ -231,10 +233,14 @@ class _Sender:
     """Sender of replayed messages that opens one publisher per topic and type."""
 
     def __init__(
-        self, node: Node, recording: reader.Recording, selected: Sequence[str], limits: _MotionPermissions
+        self,
+        node: Node,
+        recording: reader.Recording,
+        selected: Sequence[str],
+        permissions: _MotionPermissions,
     ) -> None:
-        self.permissions, names = limits, limits.names
-        self._opened = ExitStack()
+        self.permissions, names = permissions, permissions.names
+        self._stack = ExitStack()
         self._subscriber_counts: dict[Publisher, int] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node = node
@@ -248,7 +254,7 @@ class _Sender:
         key = (topic, msg_type)
         if key not in self._publishers:
             publisher = self._node.new_pub(topic, msg_type, latched=topic in self._latched)
-            self._publishers[key] = self._opened.enter_context(publisher)
+            self._publishers[key] = self._stack.enter_context(publisher)
         return self._publishers[key]
 
     def send(self, messages: Sequence[Message]) -> None:
@@ -271,7 +277,7 @@ class _Sender:
         return self
 
     def __exit__(self, *_exc: object) -> None:
-        self._opened.close()
+        self._stack.close()
 
 
 def _play(recording: reader.Recording, playback: player.Playback, sender: _Sender) -> None:
@@ -283,17 +289,17 @@ def _play(recording: reader.Recording, playback: player.Playback, sender: _Sende
         sender.poll_guard()
         return ended.wait(_STATUS_PERIOD_S)
 
-    with player.Player(playback, sender.send, on_jump=_ignore_jump, on_end=ended.set) as playing:
-        playing.apply(lambda each: each.play())
+    with player.Player(playback, sender.send, on_jump=_ignore_jump, on_end=ended.set) as running_player:
+        running_player.apply(lambda each: each.play())
         if out.is_terminal:
             with out.status("") as status_display:
                 while not wait():
-                    status_display.update(_status_line(recording, playing.status))
+                    status_display.update(_status_line(recording, running_player.status))
         else:
             while not wait():
                 pass
-    if playing.problem is not None:
-        raise playing.problem
+    if running_player.problem is not None:
+        raise running_player.problem
 
 
 def _ignore_jump(_messages: Sequence[Message]) -> None:

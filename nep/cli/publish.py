@@ -142,9 +142,15 @@ def publish(
                 _publish_lines(publisher, kind)
             else:
                 repeat(partial(publisher.publish, value), rate_hz or 1.0, count if rate_hz is not None else 1)
-            template = _("published {count} on '{topic}' ({kind}) to {people}")
-            people = _subscriber_text(publisher.subscribers)
-            print_status(template.format(count=publisher.count, topic=topic, kind=kind, people=people))
+            template = ngettext(
+                "published {count} message on '{topic}' ({kind}) to {subscribers}",
+                "published {count} messages on '{topic}' ({kind}) to {subscribers}",
+                publisher.count,
+            )
+            subscribers = _subscriber_text(publisher.subscribers)
+            print_status(
+                template.format(count=publisher.count, topic=topic, kind=kind, subscribers=subscribers)
+            )
             if latched:
                 print_status(_("keeping the message for later subscribers; press Ctrl+C to stop"))
                 _wait_forever()
@@ -205,7 +211,7 @@ def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
     if msg_type in _BYTE_TYPES:
         raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @image.jpg"))
     allow_nan = codec_for(msg_type).name == "msgpack"
-    return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
+    return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, suggest_types=True)
 
 
 def _encode_argument(text: str) -> bytes:
@@ -228,8 +234,8 @@ def read_file(file: Path, msg_type: str) -> bytes:
     """
     shown_path = escaped(str(file))
     try:
-        with file.open("rb") as opened:  # bounded: it may be a pipe or an endless device
-            data = opened.read(_MAX_FILE_BYTES + 1)
+        with file.open("rb") as stream:  # bounded: it may be a pipe or an endless device
+            data = stream.read(_MAX_FILE_BYTES + 1)
     except OSError as error:
         raise EncodeError(
             msg_type,

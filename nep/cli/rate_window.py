@@ -57,26 +57,26 @@ class RateWindow:
     """Sliding window over the messages of one topic. Thread-safe.
 
     Args:
-        seconds: Length of the window.
+        duration_s: Length of the window.
     """
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
+    def __init__(self, duration_s: float) -> None:
+        self._duration_s = duration_s
         self._lock = threading.Lock()
         self._messages: deque[tuple[float, float, int]] = deque(maxlen=MAX_MESSAGES)
         self.total = 0
 
-    def add(self, arrived: float, stamp_s: float | None, size_bytes: int) -> None:
+    def add(self, arrival_s: float, stamp_s: float | None, size_bytes: int) -> None:
         """Add a message.
 
         Args:
-            arrived: Time of arrival (s, monotonic).
+            arrival_s: Time of arrival (s, monotonic).
             stamp_s: Time of publication (s, publisher's clock); None (original NEP) uses the time of arrival.
             size_bytes: Size of the encoded message.
         """
         with self._lock:
             self.total += 1
-            self._messages.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
+            self._messages.append((arrival_s, arrival_s if stamp_s is None else stamp_s, size_bytes))
 
     def frequency(self, now: float) -> Frequency | None:
         """Return the rate at the time `now`.
@@ -109,7 +109,7 @@ class RateWindow:
 
     def _recent_messages(self, now: float) -> Sequence[tuple[float, float, int]]:
         with self._lock:
-            while self._messages and now - self._messages[0][0] > self._seconds:
+            while self._messages and now - self._messages[0][0] > self._duration_s:
                 self._messages.popleft()
             return list(self._messages)
 
@@ -120,11 +120,11 @@ class LatchedFilter:
     Not thread-safe.
 
     Args:
-        opened: Start of the subscription (s, monotonic).
+        start_s: Start of the subscription (s, monotonic).
     """
 
-    def __init__(self, opened: float) -> None:
-        self._opened = opened
+    def __init__(self, start_s: float) -> None:
+        self._start_s = start_s
         self._publishers: set[int | None] = set()
 
     def predates_subscription(self, message: Message, now: float) -> bool:
@@ -141,23 +141,23 @@ class LatchedFilter:
             return False
         is_first = message.publisher not in self._publishers
         self._publishers.add(message.publisher)
-        age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
-        return is_first if age_s is None or uncertainty_s is None else now - age_s < self._opened
+        latency_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
+        return is_first if latency_s is None or uncertainty_s is None else now - latency_s < self._start_s
 
 
 class LatencyWindow(RateWindow):
     """Sliding window over the latencies of one topic's messages. Thread-safe.
 
     Args:
-        seconds: Length of the window.
+        duration_s: Length of the window.
     """
 
-    def __init__(self, seconds: float) -> None:
-        super().__init__(seconds)
+    def __init__(self, duration_s: float) -> None:
+        super().__init__(duration_s)
         self._uncertainty_s: float | None = None
 
     def add_latency(
-        self, arrived: float, age_s: float | None, size_bytes: int, uncertainty_s: float | None = None
+        self, arrival_s: float, latency_s: float | None, size_bytes: int, uncertainty_s: float | None = None
     ) -> None:
         """Add a message and its latency.
 
@@ -165,13 +165,13 @@ class LatencyWindow(RateWindow):
         changes between None and a number, earlier latencies are discarded.
 
         Args:
-            arrived: Time of arrival (s, monotonic).
-            age_s: Latency in seconds, negative if the publisher's clock is ahead; None only counts the
+            arrival_s: Time of arrival (s, monotonic).
+            latency_s: Latency in seconds, negative if the publisher's clock is ahead; None only counts the
                 message.
             size_bytes: Size of the encoded message.
             uncertainty_s: Error bound of the latency; None if the clocks were not compared.
         """
-        if age_s is None:
+        if latency_s is None:
             with self._lock:
                 self.total += 1
             return
@@ -179,13 +179,13 @@ class LatencyWindow(RateWindow):
             if (self._uncertainty_s is None) != (uncertainty_s is None):
                 self._messages.clear()
             self._uncertainty_s = uncertainty_s
-        self.add(arrived, age_s, size_bytes)
+        self.add(arrival_s, latency_s, size_bytes)
 
     def delay(self, now: float) -> Delay | None:
         """Return the latency at the time `now`, or None if the window has no message of known latency."""
-        ages = [age for _, age, _ in self._recent_messages(now)]
-        if not ages:
+        latencies = [latency for _, latency, _ in self._recent_messages(now)]
+        if not latencies:
             return None
-        mean = sum(ages) / len(ages)
-        deviation = math.sqrt(sum((age - mean) ** 2 for age in ages) / len(ages))
-        return Delay(mean, min(ages), max(ages), deviation, len(ages), self._uncertainty_s)
+        mean = sum(latencies) / len(latencies)
+        deviation = math.sqrt(sum((latency - mean) ** 2 for latency in latencies) / len(latencies))
+        return Delay(mean, min(latencies), max(latencies), deviation, len(latencies), self._uncertainty_s)

@@ -93,7 +93,7 @@ def record(
     """
     if duration_s is not None and not 0.0 < duration_s < 1e9:
         raise typer.BadParameter(
-            _("{given:g} isn't a valid duration; use a number of seconds, 0 or greater").format(
+            _("{given:g} isn't a valid duration; use a number of seconds greater than 0").format(
                 given=duration_s
             ),
             param_hint="--duration",
@@ -137,7 +137,9 @@ def _show_result(paths: Sequence[Path], status: writer.RecordingStatus, *, as_js
     _show_summary(paths[0], status)
     if len(paths) > 1:
         template = ngettext(
-            "in {count} file, the last is '{path}'", "in {count} files, the last is '{path}'", len(paths)
+            "split into {count} file; the last is '{path}'",
+            "split into {count} files; the last is '{path}'",
+            len(paths),
         )
         print_status(template.format(count=len(paths), path=paths[-1]))
 
@@ -166,20 +168,22 @@ def _wait(
     max_bytes: int | None,
 ) -> None:
     out = console(stderr=True)
-    until = None if duration_s is None else time.monotonic() + duration_s
+    deadline = None if duration_s is None else time.monotonic() + duration_s
 
-    def has_ended() -> bool:
+    def wait() -> bool:
         if max_bytes is not None and file.status.size_bytes >= max_bytes:
             return True
-        remaining_s = _STATUS_PERIOD_S if until is None else min(_STATUS_PERIOD_S, until - time.monotonic())
+        remaining_s = (
+            _STATUS_PERIOD_S if deadline is None else min(_STATUS_PERIOD_S, deadline - time.monotonic())
+        )
         return remaining_s <= 0.0 or ended.wait(remaining_s)
 
     if not out.is_terminal:
-        while not has_ended():
+        while not wait():
             pass
         return
     with out.status("") as status_display:
-        while not has_ended():
+        while not wait():
             status_display.update(_status_line(file.status))
 
 

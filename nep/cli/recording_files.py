@@ -124,11 +124,11 @@ def exit_if_damaged(recording: reader.Recording) -> None:
 def parse_span_ns(
     recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
-    """Parse the begin and end of a part of a recording; return them in ns since 1970.
+    """Parse the beginning and end of a part of a recording; return them in ns since 1970.
 
     Args:
         recording: The recording.
-        begin: Begin of the part in the format of `parse_time_ns`; None for the begin of the recording.
+        begin: Beginning of the part in the format of `parse_time_ns`; None for that of the recording.
         end: End of the part in the format of `parse_time_ns`; None for the end of the recording.
 
     Raises:
@@ -190,8 +190,8 @@ def _to_unix_ns(moment: datetime) -> int:
 def clock_text(seconds: float) -> str:
     """Format a duration as "12:41" or "1:02:03"."""
     total_s = int(seconds)
-    hours, rest = divmod(total_s, 3600)
-    minutes, secs = divmod(rest, 60)
+    hours, remaining_s = divmod(total_s, 3600)
+    minutes, secs = divmod(remaining_s, 60)
     return f"{hours}:{minutes:02d}:{secs:02d}" if hours else f"{minutes}:{secs:02d}"
 
 

@@ -67,16 +67,16 @@ def info(
 
     The first GB of messages is checked for damage. Exits with 1 if the file is damaged.
     """
-    opened = file_reader.FileReader(file)
-    with reader.Recording(file, file=opened) as recording:
-        topic_figures = recording.stats()
+    source_file = file_reader.FileReader(file)
+    with reader.Recording(file, file=source_file) as recording:
+        topic_stats = recording.stats()
         with progress_bar(_("checking")) as progress:
-            is_checked = opened.check(progress, None if check_all else _MAX_CHECKED_BYTES)
+            is_fully_checked = source_file.check(progress, None if check_all else _MAX_CHECKED_BYTES)
         if as_json:
-            show_json(_to_plain(recording, topic_figures))
+            show_json(_to_plain(recording, topic_stats))
         else:
-            _show(recording, topic_figures)
-            if not is_checked:
+            _show(recording, topic_stats)
+            if not is_fully_checked:
                 message = _("only the first gigabyte was checked for damage; --check reads all of it")
                 print_status(message)
         if not recording.is_complete:
@@ -88,7 +88,7 @@ def info(
         exit_if_damaged(recording)
 
 
-def _show(recording: reader.Recording, topic_figures: Mapping[str, message_counts.TopicStats]) -> None:
+def _show(recording: reader.Recording, topic_stats: Mapping[str, message_counts.TopicStats]) -> None:
     summary = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
@@ -103,15 +103,15 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, message_count
         write(_("file {number} of a split recording").format(number=part) + "\n")
     write(f"{_writer_text(recording.info)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
-    show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])
-    left_out = len(recording.topics) - len(topics)
-    if left_out:
+    show_table(_COLUMNS, [_row(recording, each, topic_stats.get(each.name)) for each in topics])
+    hidden_count = len(recording.topics) - len(topics)
+    if hidden_count:
         template = ngettext(
             "and {count} more topic, which --json lists",
             "and {count} more topics, which --json lists",
-            left_out,
+            hidden_count,
         )
-        write(f"{template.format(count=left_out)}\n")
+        write(f"{template.format(count=hidden_count)}\n")
     if recording.info.attachments:
         rows = [
             (quotable(each.name), quotable(each.media_type), format_size(each.size_bytes))
@@ -123,18 +123,18 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, message_count
 
 
 def _writer_text(file_info: file_reader.FileInfo) -> str:
-    kinds = []
+    chunk_texts = []
     for name, count in sorted(file_info.compressions.items()):
         if name == "-":
-            kinds.append(_("messages outside of chunks"))
+            chunk_texts.append(_("messages outside of chunks"))
         else:
             template = ngettext("{count} chunk {compression}", "{count} chunks {compression}", count)
-            kinds.append(template.format(count=count, compression=name or _("uncompressed")))
+            chunk_texts.append(template.format(count=count, compression=name or _("uncompressed")))
     parts = [quotable(file_info.library) or UNKNOWN]
     if file_info.profile:
         parts.append(_("profile {profile}").format(profile=quotable(file_info.profile)))
     return _("written by {program}; {chunks}").format(
-        program=", ".join(parts), chunks=format_list(kinds, "and") if kinds else _("no messages")
+        program=", ".join(parts), chunks=format_list(chunk_texts, "and") if chunk_texts else _("no messages")
     )
 
 
@@ -156,14 +156,14 @@ def _metadata_lines(file_info: file_reader.FileInfo) -> Iterator[str]:
 
 def _timestamp_text(at_ns: int) -> str:
     try:
-        day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
+        moment = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
     except (OSError, OverflowError, ValueError):  # out of range: written by another program
-        day = None
-    return UNKNOWN if day is None else day.strftime("%Y-%m-%d %H:%M:%S")
+        moment = None
+    return UNKNOWN if moment is None else moment.strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _row(
-    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: message_counts.TopicStats | None
+    recording: reader.Recording, topic: reader.RecordedTopic, topic_stats: message_counts.TopicStats | None
 ) -> tuple[str, ...]:
     duration = recording.duration_s
     return (
@@ -173,15 +173,15 @@ def _row(
         quotable(topic.schema_encoding) or UNKNOWN,
         str(topic.message_count),
         format_rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
-        UNKNOWN if topic_figures is None or topic_figures.lost is None else str(topic_figures.lost),
-        UNKNOWN if topic_figures is None else str(topic_figures.late),
-        UNKNOWN if topic_figures is None else str(topic_figures.undecodable),
-        UNKNOWN if topic_figures is None else str(topic_figures.unkept),
+        UNKNOWN if topic_stats is None or topic_stats.lost is None else str(topic_stats.lost),
+        UNKNOWN if topic_stats is None else str(topic_stats.late),
+        UNKNOWN if topic_stats is None else str(topic_stats.undecodable),
+        UNKNOWN if topic_stats is None else str(topic_stats.unkept),
     )
 
 
 def _to_plain(
-    recording: reader.Recording, topic_figures: Mapping[str, message_counts.TopicStats]
+    recording: reader.Recording, topic_stats: Mapping[str, message_counts.TopicStats]
 ) -> dict[str, object]:
     file_info = recording.info
     return {
@@ -220,7 +220,7 @@ def _to_plain(
                 "encoding": each.encoding,
                 "schema_encoding": each.schema_encoding,
                 "message_count": each.message_count,
-                "figures": topic_figures[each.name].to_plain() if each.name in topic_figures else None,
+                "figures": topic_stats[each.name].to_plain() if each.name in topic_stats else None,
             }
             for each in recording.topics.values()
         },

@@ -91,7 +91,7 @@ def repair(
     )
     if not report.is_complete:
         lost_count = UNKNOWN if report.discarded is None else str(report.discarded)
-        loss_template = _("lost: {messages} messages, {size}, the last {seconds} s")
+        loss_template = _("lost: {messages} messages ({size}), including the last {seconds} s")
         print_status(
             loss_template.format(
                 messages=lost_count,

@@ -50,20 +50,20 @@ class _Saver:
     """Writer that saves the buffer of a flight recorder to files, one at a time. Thread-safe."""
 
     def __init__(self, ring: rings.FlightRecorder, folder: Path, seconds: float, *, as_json: bool) -> None:
-        self._ring, self._folder, self._seconds, self._as_json = ring, folder, seconds, as_json
+        self._ring, self._folder, self._buffer_s, self._as_json = ring, folder, seconds, as_json
         self._lock = threading.Lock()
 
     def handle_request(self, request: object) -> dict[str, object]:
         # The request is {"seconds": 30, "note": "it fell"}; both keys are optional. Raises `NepError`.
         request_body = request if isinstance(request, dict) else {}
-        seconds, note = request_body.get("seconds", self._seconds), request_body.get("note", "")
+        seconds, note = request_body.get("seconds", self._buffer_s), request_body.get("note", "")
         is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
         if not is_number or not isinstance(note, str):
             raise NepError(_('the request must be a JSON object such as {"seconds": 30, "note": "it fell"}'))
         return self.save(float(seconds), note)
 
     def save(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
-        duration_s = self._seconds if seconds is None else seconds
+        duration_s = self._buffer_s if seconds is None else seconds
         if not 0.0 < duration_s < 1e9:
             raise NepError(
                 _("{given:g} isn't a valid duration; use a number of seconds greater than 0").format(
@@ -71,7 +71,7 @@ class _Saver:
                 )
             )
         with self._lock:
-            saved = self._ring.save(self._free_path(), min(duration_s, self._seconds), note)
+            saved = self._ring.save(self._free_path(), min(duration_s, self._buffer_s), note)
         result: dict[str, object] = {**asdict(saved), "path": str(saved.path.resolve())}
         if self._as_json:
             show_json(result)
@@ -144,10 +144,10 @@ def ring(
             size_bytes=round(size_gb * 1e9),
             on_problem=lambda _why: commands.put(_STOP),
         ) as flight_recorder:
-            keeper = _Saver(flight_recorder, folder, seconds, as_json=as_json)
+            saver = _Saver(flight_recorder, folder, seconds, as_json=as_json)
             with (
                 recorder.Recorder(node, flight_recorder, selection),
-                node.new_server(f"{name}/keep", keeper.handle_request, threads=1),
+                node.new_server(f"{name}/keep", saver.handle_request, threads=1),
             ):
                 interrupts.call_on_signal(lambda: commands.put(_STOP))
                 _save_on_signal(commands)
@@ -157,7 +157,7 @@ def ring(
                         "press Ctrl+C to stop"
                     )
                     print_status(template.format(seconds=seconds))
-                _run_commands(commands, keeper, flight_recorder)
+                _run_commands(commands, saver, flight_recorder)
             problem = flight_recorder.status.problem
         with suppress(OSError):  # another flight recorder uses the same folder
             buffer_folder.rmdir()
@@ -175,7 +175,7 @@ def _save_on_signal(commands: queue.SimpleQueue[str]) -> None:
 
 
 def _run_commands(
-    commands: queue.SimpleQueue[str], keeper: _Saver, flight_recorder: rings.FlightRecorder
+    commands: queue.SimpleQueue[str], saver: _Saver, flight_recorder: rings.FlightRecorder
 ) -> None:
     out = console(stderr=True)
 
@@ -185,10 +185,10 @@ def _run_commands(
         return ""
 
     with out.status("") if out.is_terminal else nullcontext() as status_display:
-        while (order := next_command()) != _STOP:
-            if order == _KEEP:
+        while (command := next_command()) != _STOP:
+            if command == _KEEP:
                 try:
-                    keeper.save()
+                    saver.save()
                 except NepError as error:
                     print_status(str(error))
             if status_display is not None:

@@ -40,14 +40,13 @@ class TextColumn:
         heading: Heading, which is translated when the table is printed.
         justify: Alignment of the cells.
         style: Style of the cells, as for rich.
-        is_folded_last: True to narrow other columns first if the table is too wide.
+        is_folded_last: True to narrow other columns first if the table is too wide, as for numbers.
     """
 
     heading: str
     justify: Literal["left", "right"] = "left"
     style: str = ""
     is_folded_last: bool = False
-    """True if this column is wrapped last on a narrow terminal. Columns of numbers are never wrapped."""
 
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
@@ -65,13 +64,13 @@ def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
 def _console_class() -> type[Console]:
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
-    class OpenConsole(Console):
+    class RaisingConsole(Console):
         """Console that raises `BrokenPipeError` on a closed pipe, as plain streams do."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError(errno.EPIPE, _("the output was closed"))
 
-    return OpenConsole
+    return RaisingConsole
 
 
 def json_highlighter() -> Callable[[str, str], Text]:
@@ -96,10 +95,10 @@ def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
     """
     columns = [replace(column, heading=_(column.heading)) for column in columns]
     is_terminal = sys.stdout.isatty()  # files and pipes have no width
-    room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
+    max_width = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
-    widths = _column_widths(columns, lines, room)
-    if _total_width(widths) > room:
+    widths = _column_widths(columns, lines, max_width)
+    if _total_width(widths) > max_width:
         write("".join(_record_blocks(columns, lines)))
         return
     if len(lines) > _MAX_RICH_ROWS and _cells_fit(lines, widths):
@@ -111,7 +110,7 @@ def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
 
     out = console()
     if not is_terminal:
-        out.width = room
+        out.width = max_width
     table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
     for column, width in zip(columns, widths, strict=True):
         table.add_column(
@@ -133,8 +132,8 @@ def display_width(text: str) -> int:
 
 def padded(text: str, width: int, justify: Literal["left", "right"] = "left") -> str:
     """Pad a text with spaces to `width` cells."""
-    room = " " * (width - display_width(text))
-    return text + room if justify == "left" else room + text
+    padding = " " * (width - display_width(text))
+    return text + padding if justify == "left" else padding + text
 
 
 def _total_width(widths: Sequence[int]) -> int:
@@ -173,7 +172,7 @@ def _layout_lines(
     yield from map(line, rows)
 
 
-def _column_widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: int) -> list[int]:
+def _column_widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], max_width: int) -> list[int]:
     widths = [
         max(
             display_width(line)
@@ -183,14 +182,14 @@ def _column_widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]],
         for index, column in enumerate(columns)
     ]
     is_fixed = [column.is_folded_last or column.justify == "right" for column in columns]
-    while _total_width(widths) > room:
-        giving = [
+    while _total_width(widths) > max_width:
+        shrinkable = [
             index for index, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not is_fixed[index]
         ]
-        giving = giving or [index for index, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
-        if not giving:
+        shrinkable = shrinkable or [index for index, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
+        if not shrinkable:
             break
-        widths[max(giving, key=lambda at: widths[at])] -= 1
+        widths[max(shrinkable, key=lambda index: widths[index])] -= 1
     return widths
 
 

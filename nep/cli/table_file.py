@@ -83,22 +83,22 @@ class CsvMessageWriter:
     """Writer of comma-separated values: the time of publication (s since 1970), followed by the fields."""
 
     def __init__(
-        self, fields: FieldExtractor, out: TextSink | None = None, *, names_topic: bool = False
+        self, fields: FieldExtractor, out: TextSink | None = None, *, includes_topic: bool = False
     ) -> None:
         self._fields = fields
-        self._names_topic = names_topic
+        self._includes_topic = includes_topic
         # escape control characters only on a terminal; files get the original text
         self._clean = escaped if out is None and sys.stdout.isatty() else str
         self._out = out or _binary_safe_stdout()
         self._write = csv.writer(self._out, lineterminator="\r\n").writerow
-        self._write([STAMP_COLUMN, *(["topic"] if names_topic else []), *fields.names])
+        self._write([STAMP_COLUMN, *(["topic"] if includes_topic else []), *fields.names])
         self._out.flush()
 
     def __call__(self, message: Message) -> None:
         """Write one row for a message; skip an undecodable message."""
         values = self._fields.extract(message)
         if values is not None:
-            topic = [message.topic] if self._names_topic else []
+            topic = [message.topic] if self._includes_topic else []
             self._write(
                 [
                     self._clean(each)

@@ -48,6 +48,8 @@ _WAIT_SLICE_S = 0.1
 _MAX_NAMES_LENGTH = 40
 _FRAME_LINES = 6
 """Number of terminal lines that are not rows: two headings with rules, the summary, and a spare line."""
+_MAX_NOTES = 3
+"""Maximum number of problems and alerts shown above the tables."""
 _NODE_ROWS_DIVISOR = 3
 """Divisor for the rows reserved for nodes: a third of all rows, plus rows that topics don't need."""
 
@@ -186,13 +188,13 @@ def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrd
 
 def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
     """Return the nodes and their total publishing rates in Hz, sorted by decreasing CPU usage."""
-    published: dict[str, float] = {}
+    rates_hz: dict[str, float] = {}
     for topic in graph.topics.values():
         for publisher in topic.publishers:
             if publisher.rate_hz is not None:
-                published[publisher.node_id] = published.get(publisher.node_id, 0.0) + publisher.rate_hz
+                rates_hz[publisher.node_id] = rates_hz.get(publisher.node_id, 0.0) + publisher.rate_hz
     nodes = sorted(graph.nodes.values(), key=lambda node: (-_sort_key(node.cpu_ratio), node.name, node.id))
-    return [(node, published.get(node.id)) for node in nodes]
+    return [(node, rates_hz.get(node.id)) for node in nodes]
 
 
 @dataclass
@@ -230,13 +232,13 @@ class _GraphPrinter:
 
     def summary(self, graph: GraphView) -> str:
         rates = [each.rate_hz for each in graph.topics.values() if each.rate_hz is not None]
-        bytes_s = [each.bandwidth_Bps for each in graph.topics.values() if each.bandwidth_Bps is not None]
+        bandwidths = [each.bandwidth_Bps for each in graph.topics.values() if each.bandwidth_Bps is not None]
         lost = [each.lost for each in graph.topics.values() if each.lost is not None]
         parts = [
             ngettext("{count} node", "{count} nodes", len(graph.nodes)).format(count=len(graph.nodes)),
             ngettext("{count} topic", "{count} topics", len(graph.topics)).format(count=len(graph.topics)),
             format_rate(sum(rates) if rates else None),
-            format_size(sum(bytes_s) if bytes_s else None, "/s"),
+            format_size(sum(bandwidths) if bandwidths else None, "/s"),
             ngettext("{count} lost", "{count} lost", sum(lost)).format(count=sum(lost)) if lost else "",
         ]
         return " · ".join(part for part in parts if part)
@@ -279,26 +281,29 @@ class _LiveTables:
         topics, nodes = topic_rows(graph, self._printer.pattern, self._printer.order), node_rows(graph)
         notes = [Text(f"! {problem}", "yellow")] if problem else []
         notes += [Text(f"! {escaped(alert.sentence)}", "yellow", no_wrap=True) for alert in graph.alerts]
-        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODE_ROWS_DIVISOR]))
-        for_nodes = max(min(len(nodes), room // _NODE_ROWS_DIVISOR), room - len(topics))
-        above, below = topics[: room - min(len(nodes), for_nodes)], nodes[:for_nodes]
+        max_rows = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_MAX_NOTES]))
+        max_nodes = max(min(len(nodes), max_rows // _NODE_ROWS_DIVISOR), max_rows - len(topics))
+        shown_topics, shown_nodes = topics[: max_rows - min(len(nodes), max_nodes)], nodes[:max_nodes]
         parts: list[RenderableType] = [Text(self._printer.summary(graph), "dim", no_wrap=True)]
-        parts += notes[:_NODE_ROWS_DIVISOR]
-        rows = [self._printer.topic_cells(graph, each) for each in above]
-        grown = {
+        parts += notes[:_MAX_NOTES]
+        rows = [self._printer.topic_cells(graph, each) for each in shown_topics]
+        rows_with_losses = {
             index
-            for index, each in enumerate(above)
+            for index, each in enumerate(shown_topics)
             if (each.lost or 0) > self._lost.get(each.name, each.lost or 0)
         }
-        parts.append(_create_table(_TOPIC_COLUMNS, rows, len(topics) - len(above), grown))
-        rows = [self._printer.node_cells(*each) for each in below]
-        parts.append(_create_table(_NODE_COLUMNS, rows, len(nodes) - len(below), set()))
+        parts.append(_create_table(_TOPIC_COLUMNS, rows, len(topics) - len(shown_topics), rows_with_losses))
+        rows = [self._printer.node_cells(*each) for each in shown_nodes]
+        parts.append(_create_table(_NODE_COLUMNS, rows, len(nodes) - len(shown_nodes), set()))
         self._lost = {each.name: each.lost for each in topics if each.lost is not None}
         self._live.update(Group(*parts), refresh=True)
 
 
 def _create_table(
-    columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], hidden_count: int, grown: set[int]
+    columns: Sequence[TextColumn],
+    rows: Sequence[Sequence[str]],
+    hidden_count: int,
+    rows_with_losses: set[int],
 ) -> RenderableType:
     from rich import box  # noqa: PLC0415 - only a terminal needs it
     from rich.table import Table  # noqa: PLC0415
@@ -316,7 +321,7 @@ def _create_table(
         )  # fmt: skip
     for index, row in enumerate(rows):
         texts = [Text(cell, style="dim" if cell == UNKNOWN else "") for cell in row]
-        if index in grown:
+        if index in rows_with_losses:
             texts[-1].stylize("yellow bold")
         table.add_row(*texts)
     return table

@@ -67,12 +67,12 @@ def info(
     if as_json:
         show_json(convert_ids_to_text(_record(graph, topic_info)))
         return
-    latched = any(each.latched for each in topic_info.publishers)
+    is_latched = any(each.latched for each in topic_info.publishers)
     for heading, value in (
         (_("topic"), escaped(topic_info.name)),
         (_("type"), escaped(topic_info.msg_type)),
         (_("codec"), escaped(topic_info.codec)),
-        (_("latched"), _("yes") if latched else _("no")),
+        (_("latched"), _("yes") if is_latched else _("no")),
         (_("rate"), format_rate(topic_info.rate_hz)),
         (_("bandwidth"), format_bandwidth(topic_info)),
         (_("lost"), _count_text(topic_info.lost)),

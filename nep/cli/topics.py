@@ -83,6 +83,6 @@ def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
 
 def _node_names(graph: GraphView, node_ids: list[str]) -> str:
     nodes = [graph.nodes[each] for each in node_ids if each in graph.nodes]
-    originals = any(node.generation not in {"native", "gateway"} for node in nodes)
-    names = [node.name for node in nodes if not (originals and node.generation == "gateway")]
+    has_originals = any(node.generation not in {"native", "gateway"} for node in nodes)
+    names = [node.name for node in nodes if not (has_originals and node.generation == "gateway")]
     return "\n".join(dict.fromkeys(map(escaped, names))) or UNKNOWN

@@ -1,9 +1,8 @@
 """Translation of typer's own output: usage line, built-in options and usage errors.
 
 Half of typer's messages are translated with gettext, to which `nep.i18n.set_initial_language` adds nep's
-catalogue.
-The messages in this module are matched by their English text, so messages of later typer versions may
-remain English.
+catalogue. The messages in this module are matched by their English text, so messages of later typer versions
+may remain English.
 """
 
 from __future__ import annotations

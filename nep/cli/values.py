@@ -39,7 +39,7 @@ def encode_json(value: object, *, indent: bool = False) -> bytes:
         data = orjson.dumps(_simplify(value, _MAX_JSON_DEPTH), default=str, option=option)
     if data.isascii() and b"\x7f" not in data:
         return data
-    return _CONTROL_CHARACTERS.sub(lambda found: f"\\u{ord(found.group()):04x}", data.decode()).encode()
+    return _CONTROL_CHARACTERS.sub(lambda match: f"\\u{ord(match.group()):04x}", data.decode()).encode()
 
 
 def _to_plain(value: object) -> object:
@@ -92,39 +92,43 @@ def format_payload(value: object, *, in_full: bool, indent: bool = False) -> str
     return encode_json(_shorten_value(value, *limits), indent=indent).decode()
 
 
-def _shorten_value(value: object, items: float, fields: float, letters: float, depth: float) -> object:
+def _shorten_value(
+    value: object, max_items: float, max_fields: float, max_characters: float, depth: float
+) -> object:
     if isinstance(value, float) and not math.isfinite(value):
         return orjson.Fragment(str(value).encode())
     if isinstance(value, (bytes, bytearray, memoryview)):
         value = value.hex()
     if isinstance(value, str):
-        return shortened(value, int(letters)) if len(value) > letters else value
+        return shortened(value, int(max_characters)) if len(value) > max_characters else value
     if not isinstance(value, (Mapping, list, tuple)):
         return value
     if depth <= 0:
         return orjson.Fragment("…".encode())
     if isinstance(value, Mapping):
-        return _shorten_map(value, items, fields, letters, depth)
-    return _shorten_list(value, items, fields, letters, depth)
+        return _shorten_map(value, max_items, max_fields, max_characters, depth)
+    return _shorten_list(value, max_items, max_fields, max_characters, depth)
 
 
 def _shorten_map(
-    value: Mapping[object, object], items: float, fields: float, letters: float, depth: float
+    value: Mapping[object, object], max_items: float, max_fields: float, max_characters: float, depth: float
 ) -> object:
     result: dict[str, object] = {}
     for number, (key, item) in enumerate(value.items()):
-        if number >= fields:
+        if number >= max_fields:
             result["…"] = _("{count} more").format(count=len(value) - number)
             break
-        result[_key_text(key)] = _shorten_value(item, items, fields, letters, depth - 1)
+        result[_key_text(key)] = _shorten_value(item, max_items, max_fields, max_characters, depth - 1)
     return result
 
 
 def _shorten_list(
-    value: Sequence[object], items: float, fields: float, letters: float, depth: float
+    value: Sequence[object], max_items: float, max_fields: float, max_characters: float, depth: float
 ) -> object:
-    count = len(value) if len(value) <= items else int(items)
-    result = [_shorten_value(each, items, fields, letters, depth - 1) for each in value[:count]]
+    count = len(value) if len(value) <= max_items else int(max_items)
+    result = [
+        _shorten_value(each, max_items, max_fields, max_characters, depth - 1) for each in value[:count]
+    ]
     if count < len(value):
         result.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
     return result

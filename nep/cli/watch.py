@@ -46,7 +46,9 @@ _STYLES = {"on": "bold red", "off": "green", "still": "bold red"}
 
 FileArgument = Annotated[
     str | None,
-    typer.Argument(metavar=_("FILE"), help=_("Alarm file in JSON, as Studio saves it."), show_default=False),
+    typer.Argument(
+        metavar=_("FILE"), help=_("Alarm file (JSON), such as one saved by Studio."), show_default=False
+    ),
 ]
 CheckOption = Annotated[bool, typer.Option("--check", help=_("Validate the file and exit."))]
 ExampleOption = Annotated[bool, typer.Option("--example", help=_("Print an example file and exit."))]
@@ -85,15 +87,15 @@ def watch(
     if not any(rule.is_enabled for rule in rules):
         raise NepError(_("all alarms of '{file}' are switched off").format(file=file))
     interrupts.exit_on_termination()
-    with ExitStack() as opened:
-        node = opened.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
+    with ExitStack() as stack:
+        node = stack.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
         guard = MotionGuard(node, allow_moving or ())
-        watching = _AlarmRunner(node, rules, _JsonEventPrinter() if as_json else _EventPrinter(), guard)
-        opened.callback(watching.close)
-        watching.check_send_actions()
+        runner = _AlarmRunner(node, rules, _JsonEventPrinter() if as_json else _EventPrinter(), guard)
+        stack.callback(runner.close)
+        runner.check_send_actions()
         if not as_json:
-            watching.show_rules()
-        watching.run(count)
+            runner.show_rules()
+        runner.run(count)
 
 
 # ---- output
@@ -166,7 +168,7 @@ class _AlarmRunner:
         self._node, self._out, self._guard = node, out, guard
         self._commands = AlarmCommands(self._denial_reason)
         self._save_client: Client | None = None
-        carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, DoneCallback], None]] = {
+        action_starters: Mapping[str, Callable[[AlarmEvent, AlarmAction, DoneCallback], None]] = {
             "banner": _do_nothing,  # every alarm is printed anyway
             "console": _do_nothing,
             "sound": self._ring_bell,
@@ -175,7 +177,7 @@ class _AlarmRunner:
             "keep": self._save_flight_recorder,
             **dict.fromkeys(_STUDIO_ACTIONS, self._skip_studio_action),
         }
-        self.alarms = Alarms(rules, carriers=carriers)
+        self.alarms = Alarms(rules, action_starters=action_starters)
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._view: GraphView | None = None
         self._poll_at = 0.0
@@ -184,16 +186,16 @@ class _AlarmRunner:
 
     def check_send_actions(self) -> None:
         # Raises `typer.BadParameter` if an alarm would move a robot without permission.
-        sends = [
+        send_actions = [
             action
             for rule in self.alarms.rules
             if rule.is_enabled
             for action in rule.actions
             if action.kind == "send"
         ]
-        if sends:
+        if send_actions:
             self._guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
-        for action in sends:
+        for action in send_actions:
             reason = self._guard.denial_reason(action.name, action.msg_type)
             if reason:
                 raise typer.BadParameter(reason)
@@ -202,12 +204,12 @@ class _AlarmRunner:
         rules = [rule for rule in self.alarms.rules if rule.is_enabled]
         for rule in rules:
             print_status(rule_text(rule))
-        studios = dict.fromkeys(
+        studio_actions = dict.fromkeys(
             action_text(action) for rule in rules for action in rule.actions if action.kind in _STUDIO_ACTIONS
         )
-        if studios:
+        if studio_actions:
             template = _("these actions need Studio and are skipped: {actions}")
-            print_status(template.format(actions=", ".join(studios)))
+            print_status(template.format(actions=", ".join(studio_actions)))
         print_status(_("watching; press Ctrl+C to stop"))
 
     def run(self, count: int) -> None:
@@ -301,7 +303,7 @@ class _AlarmRunner:
             if self._save_client is None:
                 self._save_client = self._node.new_client(KEEP_SERVICE, timeout_s=SAVE_TIMEOUT_S)
             self._save_client.call_async(request).add_done_callback(
-                lambda ended: _report_saved(ended, on_done)
+                lambda future: _report_saved(future, on_done)
             )
         except NepError as error:
             on_done(False, _("nothing saved: {reason}").format(reason=error))
@@ -322,12 +324,12 @@ class _AlarmRunner:
                 self._out.print_action(rule, text, at_s)
 
 
-def _report_saved(ended: Future[object], on_done: DoneCallback) -> None:
-    error = None if ended.cancelled() else ended.exception()
-    if error is not None or ended.cancelled():
+def _report_saved(future: Future[object], on_done: DoneCallback) -> None:
+    error = None if future.cancelled() else future.exception()
+    if error is not None or future.cancelled():
         on_done(False, _("nothing saved: {reason}").format(reason=error or ""))
     else:
-        result = ended.result()
+        result = future.result()
         path = result.get("path") if isinstance(result, dict) else ""
         on_done(True, _("saved {file}").format(file=path))
 

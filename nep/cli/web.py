@@ -145,8 +145,8 @@ def _read_or_create_token(file: Path | None, *, is_needed: bool) -> str:
     try:
         if not file.exists():
             return _create_token_file(file)
-        with file.open("rb") as opened:
-            token = opened.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
+        with file.open("rb") as stream:
+            token = stream.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
     except OSError as error:
         raise NepError(
             _("can't use the token file '{file}': {reason}").format(file=file, reason=error.strerror)
@@ -165,8 +165,8 @@ def _create_token_file(file: Path) -> str:
     """Create a file with a new token, readable by its owner only; return the token."""
     token = new_token()
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
-        opened.write(token + "\n")
+    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
+        stream.write(token + "\n")
     return token
 
 
@@ -183,7 +183,7 @@ def _print_start_message(server: WebServer, terminal: Terminal, *, token_file: P
     page_url = f"http://{hosts[0]}:{server.port}{query or '/'}"
     out.print(_("  test page: {url}").format(url=page_url), style="dim")
     if token_file is not None:
-        message = _("  append /?token=TOKEN to the URL, with the token in {file}")
+        message = _("  append /?token=TOKEN to the URL, where TOKEN is the token in {file}")
         out.print(message.format(file=token_file), style="dim")
     if not server.settings.access.origins:
         out.print(

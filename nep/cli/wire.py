@@ -67,7 +67,7 @@ def check(
         _show_rules(rules, as_json=as_json)
         return
     if not command:
-        raise typer.BadParameter(_("missing the command of the adapter after '--'"), param_hint="COMMAND")
+        raise typer.BadParameter(_("specify the command of the adapter after '--'"), param_hint="COMMAND")
     outcomes = []
     try:
         for outcome in conformance.check(lambda master: conformance.AdapterProcess(command, master), rules):
@@ -81,7 +81,7 @@ def check(
     if as_json:
         show_json([each.to_plain() for each in outcomes])
     else:
-        _summarize(outcomes, failed)
+        _print_summary(outcomes, failed)
     raise typer.Exit(1 if failed else 0)
 
 
@@ -104,13 +104,13 @@ def _show_outcome(outcome: conformance.Outcome) -> None:
     out.print(Text.assemble((labels[outcome.status], _STYLES[outcome.status]), f"  {outcome.rule.id}"))
     if outcome.status == "failed":
         fields = outcome.to_plain()
-        for line in (fields["requirement"], outcome.observed, fields["section"]):
+        for line in (fields["requirement"], outcome.observation, fields["section"]):
             out.print(Text(f"    {escaped(str(line))}"))
     elif outcome.status == "skipped":
-        out.print(Text(f"    {escaped(outcome.observed)}", "dim"))
+        out.print(Text(f"    {escaped(outcome.observation)}", "dim"))
 
 
-def _summarize(outcomes: list[conformance.Outcome], failed: int) -> None:
+def _print_summary(outcomes: list[conformance.Outcome], failed: int) -> None:
     skipped = sum(each.status == "skipped" for each in outcomes)
     passed = len(outcomes) - failed - skipped
     parts = [ngettext("{count} rule passed", "{count} rules passed", passed).format(count=passed)]

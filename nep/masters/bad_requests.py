@@ -28,7 +28,7 @@ _ALERT_INTERVAL_S = 1.0
 _MAX_REASON_LENGTH = 200
 """Maximum length of a reason in characters; it may quote untrusted input."""
 _HINT = lazy(
-    "It may use another version of nep, or not be a nep program. Check which program connects "
+    "The sender may use another version of nep, or not be a nep program. Check which programs connect "
     "to the master's port."
 )
 

@@ -67,21 +67,21 @@ class Clocks:
         return differences
 
     def renewal_timestamps(
-        self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
+        self, member: RegisteredNode, received_ns: int, wall_clock_ns: Callable[[], int] | None = None
     ) -> tuple[int, ...]:
         """Return the times to include in the reply to a renewal, with which the node compares its clock.
 
         Args:
             member: The node.
             received_ns: Time at which the renewal was received, in nanoseconds since 1970.
-            wall: Returns the current time in nanoseconds since 1970. Default: `time.time_ns`.
+            wall_clock_ns: Returns the current time in nanoseconds since 1970. Default: `time.time_ns`.
 
         Returns:
             Times of receipt and reply; empty if the node shares the master's clock.
         """
-        return () if self.is_local(member) else (received_ns, (wall or time.time_ns)())
+        return () if self.is_local(member) else (received_ns, (wall_clock_ns or time.time_ns)())
 
 
 def _uncertainty_ns(clock: NodeClock, now: float) -> int:
-    aged = 0 if clock.reported_at is None else drift_ns((now - clock.reported_at) * 1e9)
-    return clock.uncertainty_ns + aged
+    drift_since_report_ns = 0 if clock.reported_at is None else drift_ns((now - clock.reported_at) * 1e9)
+    return clock.uncertainty_ns + drift_since_report_ns

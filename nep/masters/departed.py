@@ -24,8 +24,8 @@ class DepartedPublishers(Generic[P]):
     """
 
     def __init__(self) -> None:
-        self.changes = 0
-        """Number of removals so far, by which callers detect that their caches are outdated."""
+        self.removal_count = 0
+        """Number of removals so far; if it has changed, caches of callers are outdated."""
         self._by_name: dict[str, dict[int, P]] = {}
         self._names: dict[int, frozenset[str]] = {}
         """Names under which each publisher is stored, by its id, oldest first."""
@@ -67,7 +67,7 @@ class DepartedPublishers(Generic[P]):
     def _remove(self, publisher: int) -> None:
         self._expires_at.pop(publisher, None)
         names = self._names.pop(publisher, frozenset())
-        self.changes += bool(names)
+        self.removal_count += bool(names)
         for name in names:
             publishers = self._by_name.get(name, {})
             publishers.pop(publisher, None)

@@ -136,7 +136,7 @@ class Graph:
         self._snapshot_builder = GraphSnapshotBuilder(self._registry)
         self._leases = Leases(self._registry, lease_s)
         self._learning_until = now + learn_s
-        self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
+        self._waiting_requests: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
 
     # ---- called by the server
 
@@ -173,10 +173,10 @@ class Graph:
             if is_foreign:
                 self._authorize(request, sender, out)
             if isinstance(request, AddPublisher | AddSubscriber) and now < self._learning_until:
-                if len(self._waiting) >= _MAX_WAITING_REQUESTS:
+                if len(self._waiting_requests) >= _MAX_WAITING_REQUESTS:
                     reason = _("too many programs are registering while the master starts; try again")
                     raise WireError(reason, code="busy")
-                self._waiting.append((request, call, sender, is_foreign))
+                self._waiting_requests.append((request, call, sender, is_foreign))
                 return tuple(out)
             reply = self._execute(request, now, sender, out)
         except WireError as error:
@@ -187,9 +187,9 @@ class Graph:
     def tick(self, now: float) -> tuple[OutgoingMessage, ...]:
         """Finish learning, expire leases, and adapt the renewal interval; return the messages to send."""
         out: list[OutgoingMessage] = []
-        if self._waiting and now >= self._learning_until:
-            waiting, self._waiting = self._waiting, []
-            for request, call, sender, is_foreign in waiting:
+        if self._waiting_requests and now >= self._learning_until:
+            waiting_requests, self._waiting_requests = self._waiting_requests, []
+            for request, call, sender, is_foreign in waiting_requests:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
         out.extend(self.unregister_nodes(self._leases.expired_node_ids(now)))
         self._registry.departed.tick(now)
@@ -199,7 +199,7 @@ class Graph:
     @property
     def learning_end(self) -> float | None:
         """Time at which `tick` must be called to execute waiting requests, or None if no request waits."""
-        return self._learning_until if self._waiting else None
+        return self._learning_until if self._waiting_requests else None
 
     def probes_for_overdue(self, now: float) -> tuple[OutgoingMessage, ...]:
         """Return probe messages for nodes that have missed a renewal.
@@ -231,8 +231,8 @@ class Graph:
     def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
         """Handle a renewal of the usual form; return the newest sequence numbers by publisher id.
 
-        Returns None if the renewal must be passed to `apply`; a part of its statistics may be stored by
-        then.
+        Returns None if the renewal must be passed to `apply`; some of its statistics may already have been
+        stored.
 
         Args:
             renewal: Parsed renewal.
@@ -274,7 +274,7 @@ class Graph:
             raise WireError(reason, code="node-key")
         if not node.key and sender != node.id:
             raise WireError(
-                _("a node needs a key that proves its id, or its id as routing id; update nep"),
+                _("a node must have a key that proves its id, or use its id as routing id; update nep"),
                 code="node-unproven",
             )
         other = self._registry.members_by_route.get(sender)
@@ -417,8 +417,8 @@ class Graph:
         for other, subscriber in self._registry.receivers_of(request.publisher.topic):
             if not other.is_managed:
                 entry = ExpectedSubscriber(subscriber.record.id, other.node.id, other.node.name)
-                # hung for this node: not waited for. Hung for another node: waited for unless its renewal is
-                # late, too.
+                # A subscriber that doesn't respond to this node isn't waited for. One that doesn't respond to
+                # another node is waited for, unless its renewal is late.
                 is_hung = member.node.id in other.unconnected_node_ids or (
                     other.unconnected_node_ids and self._leases.is_late(other, now)
                 )
@@ -487,14 +487,14 @@ class Graph:
         )
         member = self._renew_member(renewal, now, sender)
         if member is None:
-            unknown = self._member_at(request.node_id, sender)
-            if unknown is not None:
-                unknown.renewed_at = now
+            rejoining_member = self._member_at(request.node_id, sender)
+            if rejoining_member is not None:
+                rejoining_member.renewed_at = now
             return RenewedReply(self.epoch, self.revision, again=True)
         topics: Iterable[str] = ()
         if self._registry.publishers_revision > request.revision:
             topics = sorted(self._registry.topics_received_by(member))
-        changed = tuple(
+        changed_topics = tuple(
             TopicPublishers(topic, self._registry.publishers_of(topic))
             for topic in topics
             if self._registry.topic_revision(topic) > request.revision
@@ -502,7 +502,7 @@ class Graph:
         last_seqs, next_s = self._registry.last_seqs(member), self._leases.renew(member, now)
         clocks = self.clocks.differences(member, now)
         return RenewedReply(
-            self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks
+            self.epoch, self.revision, False, changed_topics, last_seqs, next_s=next_s, clocks=clocks
         )
 
     def _unregister_publisher(

@@ -30,7 +30,7 @@ renewal.
 
 _RENEWAL_PREFIX = b"\x83\xa2do\xa5renew"
 """First bytes of renewals sent by nep. Other implementations may order the fields differently."""
-_SMALL_BYTES, _MAX_LISTS = 4096, 20_000
+_SMALL_BODY_BYTES, _MAX_LISTS = 4096, 20_000
 
 
 class Leases:
@@ -44,7 +44,7 @@ class Leases:
     def __init__(self, registry: Registry, lease_s: float) -> None:
         self._registry = registry
         self._grace_s = lease_s - RENEW_INTERVAL_S
-        self._renew_s = RENEW_INTERVAL_S
+        self._renew_interval_s = RENEW_INTERVAL_S
         self._paced_revision = 0
         """Revision of the registry for which the interval was computed."""
         self._slot_size = 0
@@ -58,13 +58,15 @@ class Leases:
             return
         self._paced_revision = self._registry.revision
         nodes = sum(not member.is_managed for member in self._registry.members.values())
-        self._renew_s = min(_MAX_RENEW_INTERVAL_S, max(RENEW_INTERVAL_S, nodes / _MAX_RENEWALS_PER_S))
-        self._slot_size = 1 + int(nodes * _SLOT_WIDTH_S / self._renew_s)
+        self._renew_interval_s = min(
+            _MAX_RENEW_INTERVAL_S, max(RENEW_INTERVAL_S, nodes / _MAX_RENEWALS_PER_S)
+        )
+        self._slot_size = 1 + int(nodes * _SLOT_WIDTH_S / self._renew_interval_s)
 
     def renew(self, member: RegisteredNode, now: float) -> float:
         """Record a renewal; return the seconds until the next one."""
         member.renewed_at, member.renew_interval_s = now, RENEW_INTERVAL_S
-        if self._renew_s > RENEW_INTERVAL_S and not member.is_managed:
+        if self._renew_interval_s > RENEW_INTERVAL_S and not member.is_managed:
             slot = self._free_slot(now)
             self._slots[slot] = self._slots.get(slot, 0) + 1
             member.renew_interval_s = slot * _SLOT_WIDTH_S - now
@@ -73,7 +75,7 @@ class Leases:
     def _free_slot(self, now: float) -> int:
         # Uses the latest slot, or an earlier one if it is full; at least a second from now.
         last, first = (
-            round((now + self._renew_s) / _SLOT_WIDTH_S),
+            round((now + self._renew_interval_s) / _SLOT_WIDTH_S),
             int((now + RENEW_INTERVAL_S) / _SLOT_WIDTH_S) + 1,
         )
         slots = range(last, min(first, last - 1), -1)
@@ -130,7 +132,7 @@ def parse_renewal(body: bytes) -> RawRenewal | None:
         return None
     try:
         envelope: Any = (
-            unpack_bounded(body, _MAX_LISTS, _MAX_LISTS) if len(body) > _SMALL_BYTES else unpack(body)
+            unpack_bounded(body, _MAX_LISTS, _MAX_LISTS) if len(body) > _SMALL_BODY_BYTES else unpack(body)
         )
         payload = envelope["what"]
         renewal = RawRenewal(
@@ -145,8 +147,8 @@ def parse_renewal(body: bytes) -> RawRenewal | None:
         )
     except (ValueError, LookupError, TypeError, AttributeError):
         return None
-    numbers = type(renewal.call) is type(renewal.epoch) is type(renewal.revision) is int
-    is_usual = numbers and renewal.call >= 0 and type(renewal.node_id) is str
+    is_usual = type(renewal.call) is type(renewal.epoch) is type(renewal.revision) is int
+    is_usual = is_usual and renewal.call >= 0 and type(renewal.node_id) is str
     is_usual = is_usual and type(renewal.cpu_ratio) in {float, type(None)}
     is_usual = is_usual and {type(renewal.publishers), type(renewal.subscribers)} <= {list, tuple}
     return renewal if is_usual else None

@@ -30,8 +30,8 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
         NepError: An address isn't an IPv4 address, or doesn't belong to this computer.
     """
     own_hosts = {own_address.host for own_address in addresses}
-    checked = tuple(dict.fromkeys(hosts))
-    for host in checked:
+    unique_hosts = tuple(dict.fromkeys(hosts))
+    for host in unique_hosts:
         try:
             address = ipaddress.IPv4Address(host)
         except ValueError:
@@ -47,7 +47,7 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
                     host=host, others=others
                 )
             )
-    return checked
+    return unique_hosts
 
 
 class ListenAddresses:
@@ -72,12 +72,12 @@ class ListenAddresses:
         self._router = router
         self._port = port
         self._list_addresses = list_addresses
-        self._bound: set[str] = set()
+        self._bound_hosts: set[str] = set()
 
     @property
     def endpoints(self) -> tuple[str, ...]:
         """Bound endpoints, without the master's own address."""
-        return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
+        return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound_hosts)
 
     def serve(self, hosts: Iterable[str]) -> None:
         """Bind to exactly these addresses and release all others; `ANY_HOST` means all addresses.
@@ -87,17 +87,17 @@ class ListenAddresses:
         """
         addresses = self._list_addresses()
         checked_hosts = check_hosts(hosts, addresses)
-        new: list[str] = []
+        new_hosts: list[str] = []
         try:
-            for host in self._available_hosts(checked_hosts, addresses) - self._bound:
+            for host in self._available_hosts(checked_hosts, addresses) - self._bound_hosts:
                 self._bind(host)
-                new.append(host)
+                new_hosts.append(host)
         except NepError:
-            for host in new:
+            for host in new_hosts:
                 self._unbind(host)
             raise
         self.hosts = checked_hosts
-        for host in self._bound - self._available_hosts(checked_hosts, addresses):
+        for host in self._bound_hosts - self._available_hosts(checked_hosts, addresses):
             self._unbind(host)
 
     def refresh(self) -> tuple[Alert, ...]:
@@ -106,15 +106,15 @@ class ListenAddresses:
             return ()
         addresses = self._list_addresses()
         available = self._available_hosts(self.hosts, addresses)
-        for host in self._bound - available:
+        for host in self._bound_hosts - available:
             self._unbind(host)
-        for host in available - self._bound:
+        for host in available - self._bound_hosts:
             with contextlib.suppress(AddressInUseError):  # retried at the next call
                 self._bind(host)
         return tuple(
             self._lost_alert(host, addresses)
             for host in self.hosts
-            if host != ANY_HOST and host not in self._bound
+            if host != ANY_HOST and host not in self._bound_hosts
         )
 
     def _available_hosts(self, hosts: tuple[str, ...], addresses: tuple[OwnAddress, ...]) -> set[str]:
@@ -124,14 +124,14 @@ class ListenAddresses:
         return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
 
     def _lost_alert(self, host: str, addresses: tuple[OwnAddress, ...]) -> Alert:
-        now = ", ".join(own_address.host for own_address in addresses)
+        current_hosts = ", ".join(own_address.host for own_address in addresses)
         return Alert(
             f"listen:{host}",
             _(
                 "This computer no longer has the address {host}, so other computers can't reach its programs"
             ).format(host=host),
-            _("Use the address {now} on the other computers.").format(now=now)
-            if now
+            _("Use another address on the other computers: {hosts}.").format(hosts=current_hosts)
+            if current_hosts
             else _("Reconnect to the network."),
         )
 
@@ -141,11 +141,11 @@ class ListenAddresses:
             self._router.bind(endpoint_of(address))
         except zmq.ZMQError as error:
             raise AddressInUseError(address) from error
-        self._bound.add(host)
+        self._bound_hosts.add(host)
 
     def _unbind(self, host: str) -> None:
         try:
             self._router.unbind(endpoint_of(f"{host}:{self._port}"))
         except zmq.ZMQError as error:  # the address has disappeared, and with it the binding
             _logger.debug("failed to unbind '%s': %s", host, error)
-        self._bound.discard(host)
+        self._bound_hosts.discard(host)

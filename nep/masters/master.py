@@ -93,13 +93,13 @@ class Master:
         self.address = server.address
         self._server = server
         server.start()
-        started: list[Attachment] = []
+        started_attachments: list[Attachment] = []
         try:
             for attachment in self._attachments:
                 attachment.start(self)
-                started.append(attachment)
+                started_attachments.append(attachment)
         except BaseException:
-            for attachment in reversed(started):
+            for attachment in reversed(started_attachments):
                 attachment.close()
             self._server = None
             server.close()

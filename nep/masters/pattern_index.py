@@ -82,7 +82,7 @@ class PatternIndex(Generic[T]):
         return self._topics.get(pattern, set())
 
     def subscribers_of(self, topic: str) -> list[tuple[T, int]]:
-        """Return (owner, id) of each subscriber whose pattern matches a topic; it may be a removed topic."""
+        """Return (owner, id) of each subscriber whose pattern matches a topic, which may be a removed one."""
         if not self._subscribers:
             return []
         patterns = self._patterns.get(topic)

@@ -122,29 +122,29 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
 
 
 def _request(request: Request, address: str, timeout_s: float) -> Reply:
-    check_free_descriptors(_DESCRIPTORS_NEEDED, "a question to the master")
+    check_free_descriptors(_DESCRIPTORS_NEEDED, "a connection to the master")
     started = time.monotonic()
-    name = MasterNameResolver(address, lambda _known: None)
-    name.resolve(started)
-    if not name.wait(timeout_s):
+    resolver = MasterNameResolver(address, lambda _known: None)
+    resolver.resolve(started)
+    if not resolver.wait(timeout_s):
         raise MasterUnreachable(address, timeout_s, is_known=False)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     try:
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        endpoint, body = endpoint_of(name.address), encode_request(request, 1)
+        endpoint, body = endpoint_of(resolver.address), encode_request(request, 1)
         socket.connect(endpoint)
         _send(socket, endpoint, body)
-        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_INTERVAL_S
+        deadline, retry_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_INTERVAL_S
         while (remaining_s := deadline - time.monotonic()) > 0:
             if socket.poll(int(min(remaining_s, 0.1) * 1000) + 1):
                 reply = _decode_reply(socket.recv())
                 if reply is not None:
                     return reply
             # the request may have been sent to a master that was just stopping
-            elif time.monotonic() >= again_at:
-                again_at += _RETRY_INTERVAL_S
+            elif time.monotonic() >= retry_at:
+                retry_at += _RETRY_INTERVAL_S
                 _send(socket, endpoint, body)
         raise MasterUnreachable(address, timeout_s)
     finally:
@@ -210,11 +210,12 @@ def start_process(
         start_new_session=True,
         creationflags=detached,
     )
-    started_s, asked_s = time.monotonic(), 0.5
+    started_s, reply_timeout_s = time.monotonic(), 0.5
     while (remaining_s := started_s + timeout_s - time.monotonic()) > 0 and process.poll() is None:
-        if is_running(resolved_address, min(asked_s, remaining_s)):
+        if is_running(resolved_address, min(reply_timeout_s, remaining_s)):
             return process
-        asked_s = min(2 * asked_s, _MAX_REQUEST_TIMEOUT_S)  # a busy computer may need longer for every reply
+        # a busy computer may need longer for every reply
+        reply_timeout_s = min(2 * reply_timeout_s, _MAX_REQUEST_TIMEOUT_S)
     if process.poll() is None:
         process.kill()
     process.wait(5.0)

@@ -146,14 +146,14 @@ class Registry:
         self.revision = 1
         self.publishers_revision = 0
         """Revision of the last change of any topic's publishers."""
-        self.touched: set[str] = set()
+        self.changed_topics: set[str] = set()
         """Topics that changed since the last snapshot, including their statistics. Cleared by the snapshot.
 
         Unused names are removed, because a program may use a new name every second.
         """
         self._topic_revisions: dict[str, int] = {}
-        self._publishing: dict[str, dict[int, RegisteredNode]] = {}
-        self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
+        self._publisher_owners_by_topic: dict[str, dict[int, RegisteredNode]] = {}
+        self._subscriber_owners_by_topic: dict[str, dict[int, RegisteredNode]] = {}
         self._alerts_by_source: dict[str, tuple[Alert, ...]] = {}
         self.patterns: PatternIndex[RegisteredNode] = PatternIndex()
         self.departed: DepartedPublishers[RegisteredPublisher] = DepartedPublishers()
@@ -162,7 +162,7 @@ class Registry:
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
         """Return the publishers of a topic to which subscribers can connect."""
-        owners = self._publishing.get(topic, {})
+        owners = self._publisher_owners_by_topic.get(topic, {})
         return tuple(
             self.remote_publisher(member, member.publishers[publisher_id].record)
             for publisher_id, member in owners.items()
@@ -172,11 +172,11 @@ class Registry:
     @property
     def topics(self) -> list[str]:
         """Names of all topics with publishers or subscribers."""
-        return sorted(set(self._publishing) | set(self._subscribing))
+        return sorted(set(self._publisher_owners_by_topic) | set(self._subscriber_owners_by_topic))
 
     def publishers_with_nodes(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
         """Return all publishers of a topic with their nodes, including those without endpoints."""
-        owners = self._publishing.get(topic)
+        owners = self._publisher_owners_by_topic.get(topic)
         return (
             [(member, member.publishers[publisher_id]) for publisher_id, member in owners.items()]
             if owners
@@ -185,7 +185,7 @@ class Registry:
 
     def subscribers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
         """Return the subscribers of a topic with their nodes."""
-        owners = self._subscribing.get(topic)
+        owners = self._subscriber_owners_by_topic.get(topic)
         return (
             [(member, member.subscribers[subscriber_id]) for subscriber_id, member in owners.items()]
             if owners
@@ -223,7 +223,7 @@ class Registry:
 
         Recently unregistered publishers are included.
         """
-        version = self.revision + self.departed.changes
+        version = self.revision + self.departed.removal_count
         if member.sources_version != version:
             member.sources_version = version
             topics = self.topics_received_by(member)
@@ -236,7 +236,7 @@ class Registry:
             member.sources |= {
                 publisher_id: other.publishers[publisher_id]
                 for topic in topics
-                for publisher_id, other in self._publishing.get(topic, {}).items()
+                for publisher_id, other in self._publisher_owners_by_topic.get(topic, {}).items()
                 if other.publishers[publisher_id].record.endpoints
             }
             owners = {
@@ -309,7 +309,7 @@ class Registry:
             self.remove_publisher(member.node.id, record.id)
         member.publishers[record.id] = RegisteredPublisher(record)
         self.publisher_owners[record.id] = member
-        self._publishing.setdefault(record.topic, {})[record.id] = member
+        self._publisher_owners_by_topic.setdefault(record.topic, {})[record.id] = member
         self.patterns.add_topic(record.topic)
         self._bump_revision(record.topic)
         return True
@@ -319,10 +319,10 @@ class Registry:
         if record.id not in member.subscribers:
             member.subscribers[record.id] = RegisteredSubscriber(record)
             self.subscriber_owners[record.id] = member
-            self._subscribing.setdefault(record.topic, {})[record.id] = member
+            self._subscriber_owners_by_topic.setdefault(record.topic, {})[record.id] = member
             if record.pattern:
-                self.patterns.add(record.topic, record.id, member, self._publishing)
-            self.touched.add(record.topic)
+                self.patterns.add(record.topic, record.id, member, self._publisher_owners_by_topic)
+            self.changed_topics.add(record.topic)
             self.revision += 1
 
     def remove_publisher(self, node_id: str, publisher: int) -> PublisherRecord | None:
@@ -334,8 +334,8 @@ class Registry:
         self.publisher_owners.pop(publisher, None)
         if removed.record.endpoints:
             self.departed.add(self._names_of(removed.record.topic), publisher, removed)
-        _discard(self._publishing, removed.record.topic, publisher)
-        if removed.record.topic not in self._publishing:
+        _discard(self._publisher_owners_by_topic, removed.record.topic, publisher)
+        if removed.record.topic not in self._publisher_owners_by_topic:
             self.patterns.remove_topic(removed.record.topic)
         self._bump_revision(removed.record.topic)
         self._discard_unused(removed.record.topic)
@@ -355,17 +355,17 @@ class Registry:
         removed = member.subscribers.pop(subscriber, None) if member else None
         if removed is not None:
             self.subscriber_owners.pop(subscriber, None)
-            _discard(self._subscribing, removed.record.topic, subscriber)
+            _discard(self._subscriber_owners_by_topic, removed.record.topic, subscriber)
             if removed.record.pattern:
                 self.patterns.remove(removed.record.topic, subscriber)
-            self.touched.add(removed.record.topic)
+            self.changed_topics.add(removed.record.topic)
             self.revision += 1
             self._discard_unused(removed.record.topic)
 
     def _discard_unused(self, topic: str) -> None:
         # Discards data of unused topics; a new subscriber or publisher gets the full state anyway.
-        if topic not in self._publishing and topic not in self._subscribing:
-            self.touched.discard(topic)
+        if topic not in self._publisher_owners_by_topic and topic not in self._subscriber_owners_by_topic:
+            self.changed_topics.discard(topic)
             self._topic_revisions.pop(topic, None)
 
     def remove_node(self, node_id: str) -> None:
@@ -436,9 +436,9 @@ class Registry:
         if count != publisher.count:
             publisher.changed_at = now
             publisher.count, publisher.bytes = count, size_bytes
-            self.touched.add(publisher.record.topic)
+            self.changed_topics.add(publisher.record.topic)
         elif now - publisher.changed_at < RATE_DECAY_S:
-            self.touched.add(publisher.record.topic)
+            self.changed_topics.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 
     def update_last_message(
@@ -451,7 +451,7 @@ class Registry:
     def update_problem(self, publisher: RegisteredPublisher, problem: str) -> None:
         """Store the problem that a publisher reports, or "" if the problem is solved."""
         publisher.problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH)) if problem else ""
-        self.touched.add(publisher.record.topic)
+        self.changed_topics.add(publisher.record.topic)
 
     def update_subscriber(
         self, subscriber: RegisteredSubscriber, received: int | None, lost: int | None, problem: str
@@ -462,7 +462,7 @@ class Registry:
         if problem:
             problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH))
         if received != subscriber.received or lost != subscriber.lost or problem != subscriber.problem:
-            self.touched.add(subscriber.record.topic)
+            self.changed_topics.add(subscriber.record.topic)
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 
     def report_missing(self, node_id: str, publisher: int, subscribers: Iterable[int]) -> None:
@@ -480,7 +480,7 @@ class Registry:
         if reporter is None or registered is None:
             return
         for subscriber in subscribers:
-            member = self._subscribing.get(registered.record.topic, {}).get(subscriber)
+            member = self._subscriber_owners_by_topic.get(registered.record.topic, {}).get(subscriber)
             if member is not None and len(member.unconnected_node_ids) < _MAX_UNCONNECTED_NODES:
                 member.unconnected_node_ids.add(reporter.node.id)
 
@@ -496,7 +496,7 @@ class Registry:
         return tuple(alert for alerts in self._alerts_by_source.values() for alert in alerts)
 
     def _bump_revision(self, topic: str) -> None:
-        self.touched.add(topic)
+        self.changed_topics.add(topic)
         self.revision += 1
         self.publishers_revision = self._topic_revisions[topic] = self.revision
 
@@ -609,9 +609,10 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
                 shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
-                    _("'{said}' isn't a publisher endpoint; it must have the form 'tcp://HOST:PORT'").format(
-                        said=shown_endpoint
-                    ),
+                    _(
+                        "'{said}' isn't a publisher endpoint; it must have the form 'tcp://HOST:PORT' or "
+                        "'nanomsg://HOST:PORT/PORT'"
+                    ).format(said=shown_endpoint),
                     code="endpoint",
                 )
 

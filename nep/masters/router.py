@@ -66,7 +66,7 @@ class MasterRouter:
         self._monitor = self._open_monitor()
         self._senders: dict[int, bytes] = {}
         """Last sender of each connection, by the number of the connection."""
-        self._ended: dict[bytes, float] = {}
+        self._ended_at: dict[bytes, float] = {}
         """Time at which each sender's connection ended."""
         self._last_frame: zmq.Frame | None = None
         self._unread: dict[bytes, list[tuple[zmq.MessageTracker, int]]] = {}
@@ -98,10 +98,10 @@ class MasterRouter:
             connection = frame.get(_SRCFD)
         except zmq.ZMQError:  # the connection has already ended
             return
-        before = self._senders.get(connection)
-        if before != sender:
-            if before is not None:  # the number was reused: its previous connection has ended
-                self._ended.setdefault(before, time.monotonic())
+        previous_sender = self._senders.get(connection)
+        if previous_sender != sender:
+            if previous_sender is not None:  # the number was reused: its previous connection has ended
+                self._ended_at.setdefault(previous_sender, time.monotonic())
             self._senders[connection] = sender
 
     def take_ended_senders(self, now: float) -> list[bytes]:
@@ -109,10 +109,10 @@ class MasterRouter:
 
         A sender may have reconnected since.
         """
-        sent = [
+        drained_routes = [
             each for each, unread in self._unread.items() if all(tracker.done for tracker, _size in unread)
         ]
-        for route in sent:
+        for route in drained_routes:
             del self._unread[route]
         while self._monitor is not None:
             try:
@@ -121,10 +121,12 @@ class MasterRouter:
                 break
             sender = self._senders.pop(_MONITOR_EVENT.unpack(event)[1], None)
             if sender is not None:
-                self._ended.setdefault(sender, now)
-        ended = [sender for sender, ended_at in self._ended.items() if now - ended_at >= _RECONNECT_TIMEOUT_S]
+                self._ended_at.setdefault(sender, now)
+        ended = [
+            sender for sender, ended_at in self._ended_at.items() if now - ended_at >= _RECONNECT_TIMEOUT_S
+        ]
         for sender in ended:
-            del self._ended[sender]
+            del self._ended_at[sender]
         return ended
 
     def send(self, to: bytes, body: bytes) -> bool:
@@ -159,7 +161,7 @@ class MasterRouter:
         return monitor
 
     def close(self) -> None:
-        """Close the socket after all bodies were sent."""
+        """Close the socket. Queued bodies are still sent, for at most 0.2 s."""
         if self._monitor is not None:
             self.socket.disable_monitor()
             self._monitor.close(0)

@@ -91,8 +91,8 @@ class MasterServer:
         self._router = MasterRouter(address)
         self.address = self._router.address
         self._waker = Waker()
-        self._submitted: deque[Submission] = deque()
-        self._pending: dict[int, Submission] = {}
+        self._submissions: deque[Submission] = deque()
+        self._pending_submissions: dict[int, Submission] = {}
         self._last_call = 0
         self._encoder = ReplyEncoder()
         self._bad_requests = BadRequestCounter()
@@ -100,13 +100,13 @@ class MasterServer:
         """Renewals without a reply yet: sender, body, and time of receipt (ns since 1970)."""
         self._notify_at = 0.0
         self._is_open = False
-        self._closing = self._is_forked = False
+        self._is_closing = self._is_forked = False
         self._notified_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
         self._listen_addresses = ListenAddresses(self._router.socket, int(self.address.rpartition(":")[2]))
         self._address_check_at = 0.0
-        self._failures = 0
+        self._failure_count = 0
         self._ticked_at = time.monotonic()
         notify_after_fork(self)
 
@@ -123,7 +123,7 @@ class MasterServer:
 
     def close(self) -> None:
         """Stop the thread and release the address."""
-        self._closing = True
+        self._is_closing = True
         self._waker.wake()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(5.0)
@@ -135,12 +135,12 @@ class MasterServer:
 
     def forked(self) -> None:
         """Stop in a forked child process without touching sockets. See `nep.system.forks`."""
-        self._closing = self._is_forked = True
+        self._is_closing = self._is_forked = True
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
         """Execute a request of this process. See `Master.submit`."""
         submission = Submission(request)
-        self._submitted.append(submission)
+        self._submissions.append(submission)
         self._waker.wake()
         if not submission.done.wait(timeout_s):
             raise WaitTimeoutError(_("a reply from the master"), timeout_s)
@@ -155,7 +155,7 @@ class MasterServer:
         polled: list[tuple[int | zmq.Socket[bytes], int]] = [waker]
         tick_at = time.monotonic()
         try:
-            while not self._closing:
+            while not self._is_closing:
                 if self._is_open and len(polled) == 1:
                     polled.append((self._router.socket, int(zmq.POLLIN)))
                 zmq.zmq_poll(polled, self._poll_timeout_ms(tick_at))
@@ -168,12 +168,12 @@ class MasterServer:
                 try:
                     self._run_once(waker, is_due=is_due)
                 except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
-                    self._log_failure(error, "its periodic work")
+                    self._log_failure(error, "do its work")
         finally:
             if not self._is_forked:
                 self.ended.set()
                 self._release()
-                for submission in (*self._submitted, *self._pending.values()):
+                for submission in (*self._submissions, *self._pending_submissions.values()):
                     submission.done.set()
 
     def _run_once(self, waker: tuple[int, int], *, is_due: bool) -> None:
@@ -191,10 +191,10 @@ class MasterServer:
 
     def _log_failure(self, error: Exception, operation: str) -> None:
         # Logged at increasing intervals.
-        self._failures += 1
-        if is_logged(self._failures):
-            template = "the master failed to execute %s (%d so far)"
-            _logger.error(template, operation, self._failures, exc_info=error)
+        self._failure_count += 1
+        if is_logged(self._failure_count):
+            template = "the master failed to %s (%d so far)"
+            _logger.error(template, operation, self._failure_count, exc_info=error)
 
     def _wait_for_more_renewals(self, waker: tuple[int, int]) -> bool:
         # With hundreds of nodes a wake-up costs more than a reply, so renewals are collected for some ms.
@@ -211,15 +211,15 @@ class MasterServer:
         return max(0, int((wake_at - time.monotonic()) * 1000) + 1)
 
     def _tick(self, now: float) -> None:
-        was_away, self._ticked_at = now - self._ticked_at > _MIN_SUSPENSION_S, now
-        if not was_away:  # otherwise this thread was late itself: renewals may still be queued
+        was_suspended, self._ticked_at = now - self._ticked_at > _MIN_SUSPENSION_S, now
+        if not was_suspended:  # otherwise this thread was late itself: renewals may still be queued
             self._send(self._graph.tick(now))
             self._send(self._graph.probes_for_overdue(now))
         ended = (self._graph.node_at(_route_of(sender)) for sender in self._router.take_ended_senders(now))
         self._send(self._graph.probes_for([each.node.id for each in ended if each is not None]))
         self._graph.apply(ReportAlerts("requests", self._bad_requests.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
-            self._closing = True
+            self._is_closing = True
         if self._listen_addresses.hosts and now >= self._address_check_at:
             self._address_check_at = now + _ADDRESS_CHECK_INTERVAL_S
             self._report_lost_addresses()
@@ -235,16 +235,16 @@ class MasterServer:
         return any(node.pid not in own_pids for node in self._graph.nodes)
 
     def _serve_submissions(self) -> None:
-        while self._submitted:
-            submission = self._submitted.popleft()
+        while self._submissions:
+            submission = self._submissions.popleft()
             self._last_call -= 1  # negative numbers are distinct from calls of nodes
-            self._pending[self._last_call] = submission
+            self._pending_submissions[self._last_call] = submission
             self._apply_request(ReceivedRequest(self._last_call, submission.request), "")
 
     def _serve_router(self) -> None:
-        enough_at = time.monotonic() + _TICK_INTERVAL_S
+        deadline = time.monotonic() + _TICK_INTERVAL_S
         for _round in range(1000):  # then other work
-            if time.monotonic() > enough_at:
+            if time.monotonic() > deadline:
                 return
             try:
                 sender, *body = self._router.receive()
@@ -263,21 +263,21 @@ class MasterServer:
         # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
         replies = [self._try_renew(*renewal) for renewal in renewals]
-        for (sender, body, _came_ns), reply in zip(renewals, replies, strict=True):
+        for (sender, body, _received_ns), reply in zip(renewals, replies, strict=True):
             if reply is None:
                 self._serve_request(sender, [body], "")
             elif not self._router.send(sender, reply):
                 self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
 
-    def _try_renew(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
+    def _try_renew(self, sender: bytes, body: bytes, received_ns: int) -> bytes | None:
         # If this fails for a renewal, the general path handles it and replies.
         try:
-            return self._renew_fast(sender, body, came_ns)
+            return self._renew_fast(sender, body, received_ns)
         except Exception as error:  # noqa: BLE001 - logged; other renewals go on
-            self._log_failure(error, "a renewal")
+            self._log_failure(error, "handle a renewal")
             return None
 
-    def _renew_fast(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
+    def _renew_fast(self, sender: bytes, body: bytes, received_ns: int) -> bytes | None:
         # None if it is not a usual renewal.
         renewal = parse_renewal(body)
         if renewal is None:
@@ -289,7 +289,7 @@ class MasterServer:
             return None
         member = graph.members[renewal.node_id]
         clocks = graph.clocks.differences(member, now)
-        times = () if renewal.clock is None else graph.clocks.renewal_timestamps(member, came_ns)
+        timestamps = () if renewal.clock is None else graph.clocks.renewal_timestamps(member, received_ns)
         return encode_renewed(
             renewal.call,
             graph.epoch,
@@ -297,7 +297,7 @@ class MasterServer:
             last_seqs,
             self._listen_addresses.hosts,
             member.renew_interval_s,
-            times=times,
+            times=timestamps,
             clocks=clocks,
         )
 
@@ -324,23 +324,25 @@ class MasterServer:
             else:
                 now, is_foreign = time.monotonic(), bool(sender)
                 with gc_disabled() if isinstance(request, QueryGraph) else nullcontext():
-                    came_ns = time.time_ns()
+                    received_ns = time.time_ns()
                     outgoing = self._graph.apply(request, received.call, now, sender, is_foreign=is_foreign)
                     if isinstance(request, Renew) and request.clock is not None:
-                        outgoing = self._with_times(outgoing, came_ns)
+                        outgoing = self._with_times(outgoing, received_ns)
                     self._send(outgoing)
                 return _rejection_reason(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
-            self._log_failure(error, "a request")
+            self._log_failure(error, "execute a request")
             outgoing = (OutgoingMessage(sender, self._create_rejection(), received.call),)
         self._send(outgoing)
         return request.reason if isinstance(request, WireError) else ""
 
-    def _with_times(self, outgoing: Sequence[OutgoingMessage], came_ns: int) -> tuple[OutgoingMessage, ...]:
+    def _with_times(
+        self, outgoing: Sequence[OutgoingMessage], received_ns: int
+    ) -> tuple[OutgoingMessage, ...]:
         # Adds receipt and reply time to replies of a renewal.
         return tuple(
             each._replace(
-                body=replace(each.body, times=self._graph.clocks.renewal_timestamps(member, came_ns))
+                body=replace(each.body, times=self._graph.clocks.renewal_timestamps(member, received_ns))
             )
             if isinstance(each.body, RenewedReply) and (member := self._graph.node_at(each.to)) is not None
             else each
@@ -367,7 +369,7 @@ class MasterServer:
             self._send(self._graph.unregister_nodes(dead))
 
     def _reply_to_submission(self, message: OutgoingMessage) -> None:
-        submission = self._pending.pop(message.call or 0, None)
+        submission = self._pending_submissions.pop(message.call or 0, None)
         if submission is not None:
             submission.reply = with_hosts(message.body, self._listen_addresses.hosts)  # type: ignore[assignment]
             submission.done.set()
@@ -384,7 +386,7 @@ class MasterServer:
         try:
             body = self._encoder.encode(reply, message.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
-            self._log_failure(error, "an answer")
+            self._log_failure(error, "encode a message")
             if message.call is None:
                 return True
             body = self._encoder.encode(self._create_rejection(), message.call)
@@ -405,9 +407,9 @@ class MasterServer:
         if self._listeners and self._graph.revision != self._notified_revision and now >= self._notify_at:
             self._notified_revision = self._graph.revision
             view = replace(self._graph.view(), listens=self._listen_addresses.hosts)
-            for changed in self._listeners:
+            for listener in self._listeners:
                 try:
-                    changed(view)
+                    listener(view)
                 except Exception:  # an attachment must not stop the master
                     _logger.exception("an attachment of the master failed")
             self._notify_at = 4.0 * time.monotonic() - 3.0 * now  # pause for three times the duration

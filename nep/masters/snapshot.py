@@ -38,16 +38,16 @@ class GraphSnapshotBuilder:
 
     def view(self, epoch: int) -> GraphView:
         """Return a snapshot of the registry for the master's `epoch`."""
-        registry, touched = self._registry, self._registry.touched
+        registry, changed_topics = self._registry, self._registry.changed_topics
         names: list[str] = []
-        served: list[str] = []
+        service_topics: list[str] = []
         for name in registry.topics:
-            (names if service_of(name) is None else served).append(name)
-        for name in touched:
+            (names if service_of(name) is None else service_topics).append(name)
+        for name in changed_topics:
             self._topics.pop(name, None)
             self._patterns.pop(name, None)
             self._alerts.pop(name, None)
-        touched.clear()
+        changed_topics.clear()
         cached = self._topics
         if len(cached) > len(names) or not cached.keys() <= set(names):
             for removed_name in cached.keys() - set(names):
@@ -58,13 +58,13 @@ class GraphSnapshotBuilder:
             if name not in cached:
                 publishing, subscribing = registry.publishers_with_nodes(name), registry.subscribers_of(name)
                 cached[name] = self._topic(name, publishing, subscribing)
-                is_told = any(each.problem for _member, each in subscribing)
-                is_told = is_told or any(each.problem for _member, each in publishing)
-                if len(publishing) > 1 or is_told:
+                has_problem = any(each.problem for _member, each in subscribing)
+                has_problem = has_problem or any(each.problem for _member, each in publishing)
+                if len(publishing) > 1 or has_problem:
                     self._alerts[name] = tuple(_topic_alerts(name, publishing, subscribing))
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
         topics = {name: topic for name in names if (topic := cached[name]) is not None}
-        services = {each.name: each for each in (_service_info(name, registry) for name in served)}
+        services = {each.name: each for each in (_service_info(name, registry) for name in service_topics)}
         alerts = (
             *self._all_alerts(),
             *_service_alerts(services, registry),
@@ -99,7 +99,7 @@ class GraphSnapshotBuilder:
 
 def _node_info(member: RegisteredNode) -> NodeInfo:
     node, clock = member.node, member.clock
-    every_field: dict[str, object] = {
+    field_values: dict[str, object] = {
         "id": node.id,
         "name": node.name,
         "host": node.host,
@@ -111,7 +111,7 @@ def _node_info(member: RegisteredNode) -> NodeInfo:
         "clock_offset_ns": None if clock is None else clock.offset_ns,
         "clock_uncertainty_ns": None if clock is None else clock.uncertainty_ns,
     }
-    return create_frozen(NodeInfo, every_field)
+    return create_frozen(NodeInfo, field_values)
 
 
 def _topic_info(
@@ -124,13 +124,13 @@ def _topic_info(
     rate = bandwidth = None
     stamp_ns: int | None = None
     is_alone = len(publishing) < 2
-    counted = publishing if is_alone else _publishers_for_rate(publishing)
+    rated_publishers = publishing if is_alone else _publishers_for_rate(publishing)
     publishers, subscribers = [], []
     for entry in publishing:
         member, publisher = entry
         rates = publisher.meter.rates()
         publishers.append(_publisher_info(member, publisher, rates))
-        if is_alone or entry in counted:
+        if is_alone or entry in rated_publishers:
             if rates is not None:
                 rate, bandwidth = (rate or 0.0) + rates[0], (bandwidth or 0.0) + rates[1]
             if publisher.last_stamp_ns is not None:
@@ -142,7 +142,7 @@ def _topic_info(
         if subscriber.lost is not None:
             lost = clamp_count((lost or 0) + subscriber.lost)
             received += subscriber.received or 0
-    every_field: dict[str, object] = {
+    field_values: dict[str, object] = {
         "name": name,
         "msg_type": first.msg_type if first else subscribing[0][1].record.msg_type,
         "codec": first.codec if first else "",
@@ -154,7 +154,7 @@ def _topic_info(
         "lost": lost,
         "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
     }
-    return create_frozen(TopicInfo, every_field)
+    return create_frozen(TopicInfo, field_values)
 
 
 def _publishers_for_rate(
@@ -169,7 +169,7 @@ def _publisher_info(
     member: RegisteredNode, publisher: RegisteredPublisher, rates: tuple[float, float] | None
 ) -> PublisherInfo:
     record = publisher.record
-    every_field: dict[str, object] = {
+    field_values: dict[str, object] = {
         "id": record.id,
         "node_id": member.node.id,
         "endpoints": record.endpoints,
@@ -181,17 +181,17 @@ def _publisher_info(
         "rate_hz": None if rates is None else rates[0],
         "bandwidth_Bps": None if rates is None else rates[1],
     }
-    return create_frozen(PublisherInfo, every_field)
+    return create_frozen(PublisherInfo, field_values)
 
 
 def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -> SubscriberInfo:
-    every_field: dict[str, object] = {
+    field_values: dict[str, object] = {
         "id": subscriber.record.id,
         "node_id": member.node.id,
         "received": subscriber.received,
         "lost": subscriber.lost,
     }
-    return create_frozen(SubscriberInfo, every_field)
+    return create_frozen(SubscriberInfo, field_values)
 
 
 def _service_info(topic: str, registry: Registry) -> ServiceInfo:
@@ -203,11 +203,11 @@ def _service_info(topic: str, registry: Registry) -> ServiceInfo:
     clients = tuple(
         ClientInfo(each.record.id, member.node.id, each.received, each.lost) for member, each in subscribing
     )
-    kinds = [each.record.msg_type for _member, each in publishing]
-    kinds = kinds or [each.record.msg_type for _member, each in subscribing]
+    types = [each.record.msg_type for _member, each in publishing]
+    types = types or [each.record.msg_type for _member, each in subscribing]
     return ServiceInfo(
         service_of(topic) or topic,
-        kinds[0],
+        types[0],
         servers,
         clients,
         clamp_count(sum(each.calls for each in servers)),
@@ -260,10 +260,10 @@ def _is_original(node_id: str, registry: Registry) -> bool:
 
 
 def _name_alerts(registry: Registry) -> Iterator[Alert]:
-    by_name: dict[str, int] = {}
+    counts_by_name: dict[str, int] = {}
     for member in registry.members.values():
-        by_name[member.node.name] = by_name.get(member.node.name, 0) + 1
-    for name, count in sorted(by_name.items()):
+        counts_by_name[member.node.name] = counts_by_name.get(member.node.name, 0) + 1
+    for name, count in sorted(counts_by_name.items()):
         if count > 1:
             yield Alert(
                 f"name:{name}",

@@ -16,9 +16,8 @@ T = TypeVar("T")
 class History(Generic[T]):
     """Newest messages, oldest first, limited in number and total bytes.
 
-    The newest is stored whatever its size.
-
-    A history of length 0 stays empty. Not thread-safe: guarded by the publisher's lock.
+    The newest message is stored even if it alone exceeds the limit of bytes. A history of length 0 stays
+    empty. Not thread-safe: guarded by the publisher's lock.
     """
 
     def __init__(self, max_messages: int, max_bytes: int = MAX_HISTORY_BYTES) -> None:

@@ -97,10 +97,10 @@ class ImageFormat:
         if frame.dtype.name != "uint8":
             columns = _numpy().arange(self.width) * width // self.width
             lines = _numpy().arange(rows) * height // rows
-            picked: NDArray[Any] = frame[lines][:, columns]
-            return picked
-        sized: NDArray[Any] = opencv.resize(frame, (self.width, rows), interpolation=3)  # INTER_AREA
-        return sized
+            subsampled: NDArray[Any] = frame[lines][:, columns]
+            return subsampled
+        scaled: NDArray[Any] = opencv.resize(frame, (self.width, rows), interpolation=3)  # INTER_AREA
+        return scaled
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +204,10 @@ def raw_image(payload: object) -> Encoded:
 def _encode_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     opencv = _opencv()
     try:
-        is_made, buffer = opencv.imencode(f".{kind}", frame, options)
+        is_encoded, buffer = opencv.imencode(f".{kind}", frame, options)
     except opencv.error:  # such as a JPEG with more than 65535 rows
-        is_made, buffer = False, None
-    if not is_made:
+        is_encoded, buffer = False, None
+    if not is_encoded:
         reason = _("OpenCV can't encode this image as {kind}; publish 'nep.raw_image(…)' instead").format(
             kind=kind
         )
@@ -217,12 +217,12 @@ def _encode_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
 
 def _encode_raw(frame: NDArray[Any]) -> Encoded:
     shape = _shape(frame)
-    numbers = _dtype_name(frame.dtype)
-    encoding = _ENCODINGS_BY_LAYOUT.get((numbers, shape[2]))
+    dtype_name = _dtype_name(frame.dtype)
+    encoding = _ENCODINGS_BY_LAYOUT.get((dtype_name, shape[2]))
     if encoding is None:
-        encoding = f"{next(name for name, each in _DTYPES.items() if each == numbers)}C{shape[2]}"
+        encoding = f"{next(name for name, each in _DTYPES.items() if each == dtype_name)}C{shape[2]}"
     # not copied: a publisher copies it once, into shared memory if possible
-    data = frame.astype(numbers, copy=False).data.cast("B")
+    data = frame.astype(dtype_name, copy=False).data.cast("B")
     return Encoded(data, {"shape": shape, "encoding": encoding})
 
 
@@ -300,12 +300,12 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
         raise DecodeError("image", data.nbytes, _(_INSTALL_HINT)) from error
 
 
-def decode_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
+def decode_file(file: ImageFile, reduction: int = 1) -> NDArray[Any]:
     """Decode the pixels of a file, rotated upright.
 
     Args:
         file: Examined file.
-        reduced: Factor by which a JPEG is scaled down: 1, 2, 4 or 8.
+        reduction: Factor by which a JPEG is scaled down: 1, 2, 4 or 8.
 
     Raises:
         DecodeError: The pixels can't be decoded.
@@ -314,7 +314,7 @@ def decode_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
     if file.kind == "png":
         flag = -1  # IMREAD_UNCHANGED: keeps number type, single channel and alpha
     else:
-        grey, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduced]  # IMREAD_REDUCED_…
+        grey, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduction]  # IMREAD_REDUCED_…
         flag = 128 + (grey if file.channels == 1 else colour)  # IMREAD_IGNORE_ORIENTATION
     try:
         picture = opencv.imdecode(np.frombuffer(file.data, np.uint8), flag)
@@ -354,28 +354,28 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
     Raises `DecodeError` if `shape` is invalid, doesn't match the size of `data`, or exceeds a limit.
     """
     np = _numpy()
-    numbers = np.dtype(layout.dtype)
+    dtype = np.dtype(layout.dtype)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
             "image", data.nbytes, _("'{shape}' isn't a valid image shape").format(shape=str(shape)[:60])
         )
     height, width = sides
-    pixel_bytes = layout.channels * numbers.itemsize
+    pixel_bytes = layout.channels * dtype.itemsize
     if min(height, width) < 1 or height * width * pixel_bytes != data.nbytes:
         reason = _(
             "the data size doesn't match an image of {width} x {height} pixels with {pixel_bytes} bytes each"
         ).format(width=width, height=height, pixel_bytes=pixel_bytes)
         raise DecodeError("image", data.nbytes, reason)
     check_size(width, height, pixel_bytes, data.nbytes)
-    flat: NDArray[Any] = np.frombuffer(data, numbers)
+    flat: NDArray[Any] = np.frombuffer(data, dtype)
     return flat.reshape((height, width) if layout.channels == 1 else (height, width, layout.channels))
 
 
 def image_info(data: bytes | memoryview) -> dict[str, object] | None:
     """Return the message extension for a JPEG or PNG file.
 
-    None if the file isn't a valid JPEG or PNG, or exceeds a limit. The pixels are not decoded.
+    Returns None if the file isn't a valid JPEG or PNG, or exceeds a limit. The pixels are not decoded.
     """
     try:
         return parse_header(data).extension

@@ -121,10 +121,13 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
             width=width, height=height, most=MAX_PIXELS // 10**6
         )
         raise DecodeError("image", size_bytes, reason)
-    needed = width * height * pixel_bytes
-    if needed > MAX_BYTES:
+    needed_bytes = width * height * pixel_bytes
+    if needed_bytes > MAX_BYTES:
         reason = _("{width} × {height} pixels need {needed} MB; the limit is {most} MB").format(  # noqa: RUF001
-            width=width, height=height, needed=number(needed / 1000000.0, ".0f"), most=MAX_BYTES // 10**6
+            width=width,
+            height=height,
+            needed=number(needed_bytes / 1000000.0, ".0f"),
+            most=MAX_BYTES // 10**6,
         )
         raise DecodeError("image", size_bytes, reason)
 
@@ -166,7 +169,7 @@ class _JpegReader(_HeaderReader):
                 raise self.error(_("the data is truncated"))
             if marker in _FRAME_MARKERS:
                 if frame is not None:
-                    raise self.error(_("two header chunks"))
+                    raise self.error(_("two frame headers"))
                 frame = self._read_frame(marker, offset, length)
             elif marker == _SCAN:
                 if frame is None:

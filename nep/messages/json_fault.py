@@ -131,8 +131,8 @@ def _fault_at(
 def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
     position, message = error.pos, error.msg
     if not text.strip():
-        example = _("the text is empty; write JSON, such as {example}").format(example='{"x": 1}')
-        return _fault_at(text, 0, example)
+        reason = _("the text is empty; write JSON, such as {example}").format(example='{"x": 1}')
+        return _fault_at(text, 0, reason)
     if message.startswith(("Unterminated", "Invalid control")):
         return _invalid_string_fault(text, position)
     if message.startswith("Invalid \\"):
@@ -146,17 +146,17 @@ def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
 
 
 def _unexpected_character_fault(text: str, position: int, message: str) -> JsonFault:
-    sign, end = text[position : position + 1], len(text[:position].rstrip())
-    last = text[end - 1 : end]
-    if sign in {"}", "]"} and last == ",":
+    character, end = text[position : position + 1], len(text[:position].rstrip())
+    previous = text[end - 1 : end]
+    if character in {"}", "]"} and previous == ",":
         return _trailing_comma_fault(text, end - 1)
     if message.startswith("Expecting ':'"):
         return _fault_at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
-    if not sign:
+    if not character:
         return _unclosed_bracket_fault(text, end)
     if message.startswith("Expecting ','"):
         return _missing_comma_fault(text, position, end)
-    if sign in {"}", "]", ","} and last == ":":
+    if character in {"}", "]", ","} and previous == ":":
         return _fault_at(text, end, _("a value is missing after the colon"))
     return _missing_value_fault(text, position, is_name=message.startswith("Expecting property name"))
 
@@ -166,25 +166,25 @@ def _trailing_comma_fault(text: str, position: int) -> JsonFault:
 
 
 def _missing_comma_fault(text: str, position: int, end: int) -> JsonFault:
-    sign = text[position]
-    if sign in {"}", "]"}:
-        return _fault_at(text, position, _("{sign} doesn't match the opening bracket").format(sign=sign))
-    if position == end and (sign.isalnum() or sign in "._"):
+    character = text[position]
+    if character in {"}", "]"}:
+        return _fault_at(text, position, _("{sign} doesn't match the opening bracket").format(sign=character))
+    if position == end and (character.isalnum() or character in "._"):
         return _fault_at(text, position, _("JSON doesn't support this number"))
     return _fault_at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 
 
 def _unclosed_bracket_fault(text: str, end: int) -> JsonFault:
-    opened: list[str] = []
+    open_brackets: list[str] = []
     for match in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
-        sign = match[0]
-        if sign in _CLOSING_BRACKETS:
-            opened.append(sign)
-        elif sign in {"}", "]"} and opened:
-            opened.pop()
-    if not opened:
+        character = match[0]
+        if character in _CLOSING_BRACKETS:
+            open_brackets.append(character)
+        elif character in {"}", "]"} and open_brackets:
+            open_brackets.pop()
+    if not open_brackets:
         return _fault_at(text, end, _("a value is missing at the end"))
-    missing = "".join(_CLOSING_BRACKETS[sign] for sign in reversed(opened))
+    missing = "".join(_CLOSING_BRACKETS[character] for character in reversed(open_brackets))
     fix = JsonFix(end, end, missing) if text[end - 1] not in ",:" else None
     shown_brackets = shortened(missing, _MAX_WORD_LENGTH)
     return _fault_at(
@@ -197,7 +197,7 @@ def _missing_value_fault(text: str, position: int, *, is_name: bool) -> JsonFaul
     if text[position] == "'":
         end = text.find("'", position + 1)
         quoted = text[position + 1 : end] if end > position else ""
-        is_plain = bool(quoted) and not any(sign in quoted for sign in '"\\\n')
+        is_plain = bool(quoted) and not any(character in quoted for character in '"\\\n')
         fix = JsonFix(position, end + 1, f'"{quoted}"') if is_plain else None
         return _fault_at(text, position, _("JSON needs double quotes, not single quotes"), fix)
     if match is None:
@@ -219,14 +219,16 @@ def _missing_value_fault(text: str, position: int, *, is_name: bool) -> JsonFaul
 
 def _invalid_string_fault(text: str, position: int) -> JsonFault:
     # No closing quote, or a character that must be escaped.
-    sign = text[position : position + 1]
-    if sign == "\t":
+    character = text[position : position + 1]
+    if character == "\t":
         fix = JsonFix(position, position + 1, "\\t")
         return _fault_at(text, position, _("a string contains a tab character; use \\t"), fix)
-    if sign and sign not in {'"', "\n", "\r"}:
+    if character and character not in {'"', "\n", "\r"}:
         return _fault_at(text, position, _("a string contains an invisible character; delete it"))
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
     line = text[start : end if end >= 0 else len(text)].rstrip()
-    close = start + len(line[:-1].rstrip() if line.endswith(",") else line)
-    return _fault_at(text, position, _("a string has no closing quote"), JsonFix(close, close, '"'))
+    closing_position = start + len(line[:-1].rstrip() if line.endswith(",") else line)
+    return _fault_at(
+        text, position, _("a string has no closing quote"), JsonFix(closing_position, closing_position, '"')
+    )

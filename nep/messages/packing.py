@@ -81,7 +81,7 @@ def _to_hashable(key: object) -> object:
     return tuple(map(_to_hashable, key)) if isinstance(key, list) else key
 
 
-def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
+def unpack_bounded(data: bytes, max_lists: int, max_length: int) -> object:
     """Decode untrusted msgpack as `unpack` does, with limits.
 
     Without limits, a message of a megabyte could contain a million empty lists, which take seconds to
@@ -89,20 +89,20 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
 
     Args:
         data: Encoded value.
-        most_lists: Maximum number of lists and maps.
-        longest: Maximum length of a list or map.
+        max_lists: Maximum number of lists and maps.
+        max_length: Maximum length of a list or map.
 
     Raises:
         ValueError: The data isn't valid msgpack, or exceeds a limit.
     """
-    remaining = most_lists
+    remaining = max_lists
 
     def count(value: _Value) -> _Value:
         nonlocal remaining
         remaining -= 1
         if remaining < 0:
             raise ValueError(
-                _("the value has more than {most_lists} lists and maps").format(most_lists=most_lists)
+                _("the value has more than {most_lists} lists and maps").format(most_lists=max_lists)
             )
         return value
 
@@ -113,8 +113,8 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
             strict_map_key=False,
             list_hook=count,
             object_hook=count,
-            max_array_len=longest,
-            max_map_len=longest,
+            max_array_len=max_length,
+            max_map_len=max_length,
         )
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
         raise ValueError(str(error) or _("the data is truncated")) from error

@@ -28,7 +28,7 @@ class Inbox:
         self._max_bytes = max_bytes
         self.messages: deque[Message] = deque()
         """Queued messages, oldest first. Read-only."""
-        self._bytes = 0
+        self._size_bytes = 0
 
     def put(self, message: Message) -> int:
         """Append a message; return the number of dropped messages.
@@ -36,13 +36,13 @@ class Inbox:
         With the policy "latest", a replaced message is not counted as dropped.
         """
         self.messages.append(message)
-        self._bytes += message.size_bytes
+        self._size_bytes += message.size_bytes
         dropped = 0
         # the newest is kept even if it exceeds the limit alone
         while len(self.messages) > self._max_messages or (
-            self._bytes > self._max_bytes and len(self.messages) > 1
+            self._size_bytes > self._max_bytes and len(self.messages) > 1
         ):
-            self._bytes -= self.messages.popleft().size_bytes
+            self._size_bytes -= self.messages.popleft().size_bytes
             dropped += self._keeps_all
         return dropped
 
@@ -51,42 +51,42 @@ class Inbox:
         if not self.messages:
             return None
         message = self.messages.popleft()
-        self._bytes -= message.size_bytes
+        self._size_bytes -= message.size_bytes
         return message
 
-    def move(self, target: deque[Message], max_messages: int, most_bytes: int) -> None:
+    def move(self, target: deque[Message], max_messages: int, max_bytes: int) -> None:
         """Move the oldest messages to another queue.
 
         Args:
             target: Queue to append to.
             max_messages: Maximum number of messages.
-            most_bytes: Stop after the message with which this total size is reached.
+            max_bytes: Stop after the message with which this total size is reached.
         """
         messages = self.messages
-        while messages and max_messages > 0 and most_bytes > 0:
+        while messages and max_messages > 0 and max_bytes > 0:
             message = messages.popleft()
             target.append(message)
             size = message.size_bytes
-            self._bytes -= size
-            most_bytes -= size
+            self._size_bytes -= size
+            max_bytes -= size
             max_messages -= 1
 
-    def pop_all(self, most_bytes: int | None = None) -> list[Message]:
+    def pop_all(self, max_bytes: int | None = None) -> list[Message]:
         """Remove and return all messages, oldest first.
 
         Args:
-            most_bytes: Stop after the message with which this total size is reached; None for no limit.
+            max_bytes: Stop after the message with which this total size is reached; None for no limit.
         """
-        if most_bytes is None or self._bytes <= most_bytes:
+        if max_bytes is None or self._size_bytes <= max_bytes:
             messages = list(self.messages)
             self.messages.clear()
-            self._bytes = 0
+            self._size_bytes = 0
             return messages
         messages = []
-        while self.messages and most_bytes > 0:
+        while self.messages and max_bytes > 0:
             messages.append(self.messages.popleft())
-            most_bytes -= messages[-1].size_bytes
-            self._bytes -= messages[-1].size_bytes
+            max_bytes -= messages[-1].size_bytes
+            self._size_bytes -= messages[-1].size_bytes
         return messages
 
     def __len__(self) -> int:

@@ -369,7 +369,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
             raise mismatch  # has the path inside the member
         raise wrong_type_error(value, shape.expected)
 
-    # looked up at use: a dataclass may be filled later
+    # looked up when used: `read` and `write` of a dataclass's shape may be assigned later
     shape.read = lambda value: convert(value, [each.read for each in ordered])
     shape.write = lambda value: convert(value, [each.write for each in ordered])
     return shape
@@ -399,17 +399,21 @@ def _as_items(value: object, expected: str) -> list[Any] | tuple[Any, ...]:
 def list_shape(item: ValueShape, kind: type) -> ValueShape:
     """Return the shape of a list or tuple (`kind`) of any length."""
     shape = ValueShape(kind.__name__, json_types={list})
-    exact = {item.unchanged_type} - {None}
+    unchanged_types = {item.unchanged_type} - {None}
 
     def read(value: object) -> object:
         values = _as_items(value, shape.expected)
         # fast path for thousands of numbers; the list is copied because it may be shared
-        converted = values if exact and set(map(type, values)) <= exact else _convert_items(item.read, values)
+        converted = (
+            values
+            if unchanged_types and set(map(type, values)) <= unchanged_types
+            else _convert_items(item.read, values)
+        )
         return kind(converted)
 
     def write(value: object) -> object:
         values = _as_items(value, shape.expected)
-        if item.unchanged_type is float and set(map(type, values)) <= exact:
+        if item.unchanged_type is float and set(map(type, values)) <= unchanged_types:
             return list(values)
         return _convert_items(item.write, values)
 

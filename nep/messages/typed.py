@@ -78,7 +78,7 @@ def message_type(declared: type) -> MessageType:
     The name of the message type is the class attribute `MSG_TYPE`, or else the name of the class.
 
     Raises:
-        ValueError: The class is neither a dataclass nor a TypedDict, its name of the message type is
+        ValueError: The class is neither a dataclass nor a TypedDict, the name of its message type is
             invalid or that of a built-in type, or JSON can't represent the type of a field.
     """
     is_map = _is_typed_dict(declared)
@@ -345,7 +345,7 @@ def _read_fields(value: object, entries: Sequence[_FieldEntry], record_shape: Va
 def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object, ValueShape]) -> None:
     hints = _type_hints(declared)
     entries: list[_FieldEntry] = []
-    written: list[tuple[str, ValueShape]] = []
+    sent_fields: list[tuple[str, ValueShape]] = []
     for data_field in fields(declared):
         location = f"{declared.__name__}.{data_field.name}"
         is_required = (
@@ -353,7 +353,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object
         )
         if not data_field.name.startswith("_"):
             field_shape = _shape(hints[data_field.name], location, known_shapes)
-            written.append((data_field.name, field_shape))
+            sent_fields.append((data_field.name, field_shape))
             if data_field.init:
                 other_name = data_field.metadata.get(OTHER_NAME_KEY, data_field.name)
                 entries.append(_FieldEntry(data_field.name, other_name, field_shape, is_required))
@@ -368,7 +368,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object
         if not isinstance(value, declared):
             raise wrong_type_error(value, shape.expected)
         values: dict[str, Any] = {}
-        for name, field_shape in written:
+        for name, field_shape in sent_fields:
             try:
                 values[name] = field_shape.write(getattr(value, name))
             except ShapeMismatch as mismatch:
@@ -381,11 +381,11 @@ def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object
 def _check_constructor(declared: type, names: Collection[str]) -> None:
     # Raises `ValueError` if the constructor needs more than the fields.
     for parameter in inspect.signature(declared).parameters.values():
-        is_open = (
+        is_optional = (
             parameter.kind in {parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD}
             or parameter.default is not parameter.empty
         )
-        if not is_open and (parameter.name not in names or parameter.kind is parameter.POSITIONAL_ONLY):
+        if not is_optional and (parameter.name not in names or parameter.kind is parameter.POSITIONAL_ONLY):
             raise ValueError(
                 _(
                     "{where} is required by the constructor but isn't a field of the message; add a "
@@ -410,10 +410,10 @@ def _fill_map(shape: ValueShape, declared: type, known_shapes: dict[object, Valu
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
     entries: list[_FieldEntry] = []
     for name, hint in hints.items():
-        mark = _qualifier_of(hint)  # __required_keys__ is wrong with string annotations
-        is_required = mark == "Required" or (name in required and mark != "NotRequired")
-        shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known_shapes)
-        entries.append(_FieldEntry(name, name, shape_of_it, is_required))
+        qualifier = _qualifier_of(hint)  # __required_keys__ is wrong with string annotations
+        is_required = qualifier == "Required" or (name in required and qualifier != "NotRequired")
+        field_shape = _shape(hint, f"{declared.__name__}.{name}", known_shapes)
+        entries.append(_FieldEntry(name, name, field_shape, is_required))
     shapes = {each.name: (each.shape, each.is_required) for each in entries}
 
     def write(value: object) -> dict[str, Any]:

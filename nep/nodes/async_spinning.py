@@ -51,10 +51,10 @@ async def spin(work: Work, timeout_s: float | None) -> None:
 
 async def _run_once(work: Work) -> bool:
     # One turn: every due timer, one call per server, one message per callback. Returns False if idle.
-    has_called = work.run_servers()
+    has_worked = work.run_servers()
     for timer in work.timers:
         if timer.claim_tick():
-            has_called = True
+            has_worked = True
             await _await_result(timer.callback())
         if not work.is_running:
             return True
@@ -63,9 +63,9 @@ async def _run_once(work: Work) -> bool:
             break
         item = work.next_item(callback)
         if item is not NO_MESSAGE:
-            has_called = True
+            has_worked = True
             await _await_result(callback.call(item))
-    return has_called
+    return has_worked
 
 
 async def _await_result(returned: object) -> None:

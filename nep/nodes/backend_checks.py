@@ -34,7 +34,7 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
 def codec_with_image_format(codec: Codec, image: ImageFormat | None) -> Codec:
     """Return `codec` with an image format.
 
-    Raises `ValueError` if `image` is given for another codec than "image".
+    Raises `ValueError` if `image` is given for a codec other than "image".
     """
     if image is None:
         return codec

@@ -68,15 +68,15 @@ def _running_works(works: Sequence[Work]) -> list[Work]:
 
 def _wait(shared_wait: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
     # Disarms everything at the end: a subscriber that stays armed but is not read would block its publisher.
-    entered: list[CallQueue] = []
+    entered_queues: list[CallQueue] = []
     try:
         for call_queue in (queue for work in works for queue in work.services.queues):
             if not call_queue.enter_wait(shared_wait.wake):
                 return
-            entered.append(call_queue)
+            entered_queues.append(call_queue)
         if all(shared_wait.arm(subscriber) for work in works for subscriber in work.waiting_subscribers):
             shared_wait.wait(timeout_s)
     finally:
         shared_wait.disarm_all()
-        for call_queue in entered:
+        for call_queue in entered_queues:
             call_queue.leave_wait(shared_wait.wake)

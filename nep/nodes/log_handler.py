@@ -194,14 +194,14 @@ class LogHandler(logging.Handler):
         self.logger.parent = logging.getLogger()
         self.logger.addHandler(self)
         self._node = node
-        self._open = open_publisher
+        self._open_publisher = open_publisher
         self._open_errors = open_errors
-        self._errors: deque[dict[str, object]] = deque(maxlen=MAX_LAST_ERRORS)
+        self._last_errors: deque[dict[str, object]] = deque(maxlen=MAX_LAST_ERRORS)
         self._errors_publisher: LogPublisher | None = None
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
-        self._tokens, self._counted_at = float(burst), clock()
+        self._tokens, self._refilled_at = float(burst), clock()
         self._queue: deque[dict[str, object]] = deque()
-        self._dropped = 0
+        self._dropped_count = 0
         self._reported_at = float("-inf")
         self._has_work = threading.Condition()
         self._thread: threading.Thread | None = None
@@ -211,7 +211,7 @@ class LogHandler(logging.Handler):
     @property
     def unreported_drops(self) -> int:
         """Number of dropped records that have not been reported yet."""
-        return self._dropped
+        return self._dropped_count
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a record for the handler's thread.
@@ -228,7 +228,7 @@ class LogHandler(logging.Handler):
             if self._is_closed:
                 return
             if not self._take_token_locked():
-                self._dropped += 1
+                self._dropped_count += 1
                 return
         try:
             payload = self._to_plain(record)
@@ -237,13 +237,13 @@ class LogHandler(logging.Handler):
             return
         with self._has_work:
             if len(self._queue) >= _MAX_QUEUED_RECORDS:
-                self._dropped += 1
+                self._dropped_count += 1
                 return
             try:
                 self._start_thread_locked()
             # the interpreter is shutting down (Python 3.12+), or no thread can be started
             except RuntimeError:
-                self._dropped += 1
+                self._dropped_count += 1
                 return
             self._queue.append(payload)
             self._has_work.notify()
@@ -264,15 +264,15 @@ class LogHandler(logging.Handler):
         self._has_work = threading.Condition()
         self._thread = None
         self._queue.clear()
-        self._dropped = 0
+        self._dropped_count = 0
 
     # ---- worker thread
 
     def _take_token_locked(self) -> bool:
         # Token bucket. Called with the lock held.
         now = self._clock()
-        self._tokens = min(float(self._burst), self._tokens + (now - self._counted_at) * self._rate_hz)
-        self._counted_at = now
+        self._tokens = min(float(self._burst), self._tokens + (now - self._refilled_at) * self._rate_hz)
+        self._refilled_at = now
         if self._tokens < 1.0:
             return False
         self._tokens -= 1.0
@@ -319,17 +319,17 @@ class LogHandler(logging.Handler):
             return
         for record in records:
             text = shortened(str(record["text"]), _MAX_ERROR_TEXT_LENGTH)
-            self._errors.append({**record, "text": text})
+            self._last_errors.append({**record, "text": text})
         with suppress(NepError):  # retried with the next error
             if self._errors_publisher is None:
                 self._errors_publisher = self._open_errors()
-            self._errors_publisher.publish(list(self._errors))
+            self._errors_publisher.publish(list(self._last_errors))
 
     def _open_with_retry(self) -> LogPublisher | None:
         # Retry until a publisher can be opened; None when the handler is closed.
         while True:
             try:
-                return self._open()
+                return self._open_publisher()
             except ClosedError:
                 return None
             except NepError:
@@ -344,14 +344,14 @@ class LogHandler(logging.Handler):
         with self._has_work:
             while not self._queue and not self._is_closed:
                 # the number of dropped records is reported once a second, and at the end of the burst
-                was_notified = self._has_work.wait(_DROP_REPORT_INTERVAL_S if self._dropped else None)
-                if not was_notified and self._dropped:
+                was_notified = self._has_work.wait(_DROP_REPORT_INTERVAL_S if self._dropped_count else None)
+                if not was_notified and self._dropped_count:
                     break
             records = list(self._queue)
             self._queue.clear()
-            if not records and not self._dropped:
+            if not records and not self._dropped_count:
                 return None
-            if self._dropped and (self._is_closed or self._is_report_due_locked()):
+            if self._dropped_count and (self._is_closed or self._is_report_due_locked()):
                 records.append(self._drop_record_locked())
             return records
 
@@ -359,7 +359,7 @@ class LogHandler(logging.Handler):
         return self._clock() - self._reported_at >= _DROP_REPORT_INTERVAL_S
 
     def _drop_record_locked(self) -> dict[str, object]:
-        count, self._dropped = self._dropped, 0
+        count, self._dropped_count = self._dropped_count, 0
         self._reported_at = self._clock()
         text = ngettext(
             "{count} log record was dropped: the limit is {rate_hz} per second",

@@ -35,20 +35,20 @@ ReadyCallback = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
 """`LoopWait` of each event loop by the loop's id; a reference to the loop would keep it alive."""
-_inherited: list[LoopWait] = []
+_inherited_waits: list[LoopWait] = []
 """`LoopWait` objects of the parent process after a fork. Referenced forever, so that none is finalized."""
 _lock = threading.Lock()
 
 
-def _forked() -> None:
+def _reset_after_fork() -> None:
     # In a forked child there is no thread, and no loop runs.
     global _lock  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
-    _inherited.extend(_waits.values())
+    _inherited_waits.extend(_waits.values())
     _waits.clear()
 
 
-forks.call_in_child(_forked)
+forks.call_in_child(_reset_after_fork)
 
 
 def loop_wait() -> LoopWait:
@@ -83,7 +83,7 @@ class LoopWait:
         self._loop = weakref.ref(loop)
         self._id = id(loop)
         self._shared_wait = SharedWait()
-        self._calls: dict[SubscriberTransport, list[ReadyCallback]] = {}
+        self._callbacks: dict[SubscriberTransport, list[ReadyCallback]] = {}
         self._requests: deque[tuple[bool, SubscriberTransport]] = deque()
         self._is_stopped = False
         self._thread = threading.Thread(target=self._run, name="nep-async", daemon=True)
@@ -102,20 +102,20 @@ class LoopWait:
         """Return True if this object belongs to `loop` and its thread is running."""
         return self._loop() is loop and not self._is_stopped
 
-    def watch(self, subscriber: SubscriberTransport, call: ReadyCallback) -> None:
-        """Call `call` once when the subscriber may have a message or is closed."""
-        calls = self._calls.setdefault(subscriber, [])
-        calls.append(call)
-        if len(calls) == 1:
+    def watch(self, subscriber: SubscriberTransport, callback: ReadyCallback) -> None:
+        """Call `callback` once when the subscriber may have a message or is closed."""
+        callbacks = self._callbacks.setdefault(subscriber, [])
+        callbacks.append(callback)
+        if len(callbacks) == 1:
             self._request(True, subscriber)
 
-    def unwatch(self, subscriber: SubscriberTransport, call: ReadyCallback) -> None:
-        """Cancel a `watch`. Has no effect if `call` was already called."""
-        calls = self._calls.get(subscriber)
-        if calls is not None and call in calls:
-            calls.remove(call)
-            if not calls:
-                del self._calls[subscriber]
+    def unwatch(self, subscriber: SubscriberTransport, callback: ReadyCallback) -> None:
+        """Cancel a `watch`. Has no effect if `callback` was already called."""
+        callbacks = self._callbacks.get(subscriber)
+        if callbacks is not None and callback in callbacks:
+            callbacks.remove(callback)
+            if not callbacks:
+                del self._callbacks[subscriber]
                 self._request(False, subscriber)
 
     def close(self) -> None:
@@ -132,15 +132,15 @@ class LoopWait:
         finally:
             self.close()
 
-    def _request(self, is_armed: bool, subscriber: SubscriberTransport) -> None:
-        self._requests.append((is_armed, subscriber))
+    def _request(self, should_arm: bool, subscriber: SubscriberTransport) -> None:
+        self._requests.append((should_arm, subscriber))
         self._shared_wait.wake()
 
     def _call_ready(self, subscribers: list[SubscriberTransport]) -> None:
         # Runs in the loop.
         for subscriber in subscribers:
-            for call in self._calls.pop(subscriber, ()):
-                call()
+            for callback in self._callbacks.pop(subscriber, ()):
+                callback()
 
     # ---- thread
 
@@ -162,8 +162,8 @@ class LoopWait:
         # Returns subscribers that may already have a message.
         ready = []
         while self._requests:
-            is_armed, subscriber = self._requests.popleft()
-            if not is_armed:
+            should_arm, subscriber = self._requests.popleft()
+            if not should_arm:
                 self._shared_wait.disarm(subscriber)
             elif not self._shared_wait.arm(subscriber):
                 ready.append(subscriber)

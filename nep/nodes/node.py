@@ -85,7 +85,7 @@ messages.
 
 _open_nodes: set[Node] = set()
 """Open nodes, referenced until they are closed, because a publisher may outlive the variable of its node."""
-_inherited: list[Node] = []
+_inherited_nodes: list[Node] = []
 """Nodes of the parent process after a fork. Referenced forever, so that none is finalized."""
 _finalizer_pid = 0
 """Id of the process in which `multiprocessing` is set up to close the nodes at exit."""
@@ -269,8 +269,10 @@ class Node(ServiceNode):
             ClosedError: The node is closed.
             ValueError: An argument is invalid.
         """
-        connected = require_topic_support(self._resolve_configuration(configuration))
-        history_length = max(check_history(self._backend, history, connected), 1 if latched is True else 0)
+        topic_configuration = require_topic_support(self._resolve_configuration(configuration))
+        history_length = max(
+            check_history(self._backend, history, topic_configuration), 1 if latched is True else 0
+        )
         number = next(self._numbers)
         spec = PublisherSpec(
             derive_id(self._key, number),
@@ -278,7 +280,7 @@ class Node(ServiceNode):
             name_of(msg_type),
             codec_with_image_format(codec_of(self._backend, msg_type), image),
             check_bool("latched", latched) or history_length > 0,
-            connected,
+            topic_configuration,
             self._wait_s,
             number,
             check_bool("batch", batch),
@@ -289,8 +291,8 @@ class Node(ServiceNode):
         publisher = Publisher(transport, spec, self._publishers.discard, is_strict=self._is_strict)
         with self._lock:
             self._publishers.add(publisher)
-            is_late = self._is_closed
-        if is_late:
+            is_node_closed = self._is_closed
+        if is_node_closed:
             publisher.close(0.0)
             raise self._closed_error()
         return publisher
@@ -403,9 +405,9 @@ class Node(ServiceNode):
             qos=check_quality(self._backend, qos),
             is_pattern=is_pattern_for(self._backend, topic, configuration),
         )
-        incoming = transport.create_subscriber(spec)
-        subscriber = self._add_subscriber(incoming, spec, msg_type)
-        self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
+        subscriber_transport = transport.create_subscriber(spec)
+        subscriber = self._add_subscriber(subscriber_transport, spec, msg_type)
+        self._work.add_callback(Callback(subscriber, subscriber_transport, callback, with_message))
         return subscriber
 
     def _new_id(self) -> tuple[int, int]:
@@ -478,8 +480,8 @@ class Node(ServiceNode):
         subscriber = new_subscriber(transport, spec, self._remove_subscriber, msg_type)
         with self._lock:
             self._subscribers.add(subscriber)
-            is_late = self._is_closed
-        if is_late:
+            is_node_closed = self._is_closed
+        if is_node_closed:
             subscriber.close()
             raise self._closed_error()
         return subscriber
@@ -624,7 +626,7 @@ class Node(ServiceNode):
         if self._parameters is not None:
             self._parameters.forked()
         _open_nodes.discard(self)
-        _inherited.append(self)
+        _inherited_nodes.append(self)
 
     def _open_transport(self) -> Transport:
         if self._is_closed:

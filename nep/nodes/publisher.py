@@ -300,14 +300,14 @@ class Publisher:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         import numpy as np  # noqa: PLC0415 - optional and heavy
 
-        numbers = np.dtype(dtype)
+        number_type = np.dtype(dtype)
         sides = (shape,) if isinstance(shape, int) else tuple(shape)
-        size = math.prod(sides) * numbers.itemsize
+        size = math.prod(sides) * number_type.itemsize
         memory = self._transport.borrow_memory(size) if size > 0 else None
         if memory is None:
-            return np.empty(sides, numbers)
-        lent: NDArray[Any] = np.frombuffer(memory, numbers).reshape(sides)
-        return lent
+            return np.empty(sides, number_type)
+        array: NDArray[Any] = np.frombuffer(memory, number_type).reshape(sides)
+        return array
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Deliver published messages within `timeout_s` seconds and unregister. Idempotent."""
@@ -365,7 +365,7 @@ class RejectedPayloads:
         self._clock = clock
         self._validate_at = clock()
         self._locate_at = clock()
-        self._located = ("", "")
+        self._located_problem = ("", "")
 
     def is_valid(self, payload: object) -> bool:
         """Encode a payload of an unsubscribed topic to detect errors; return False if the encoding fails.
@@ -390,11 +390,11 @@ class RejectedPayloads:
         self.count += 1
         reason = _error_text(error)
         now = self._clock()
-        if self._located[0] != reason and (now >= self._locate_at or not self._located[0]):
+        if self._located_problem[0] != reason and (now >= self._locate_at or not self._located_problem[0]):
             self._locate_at = now + _VALIDATE_INTERVAL_S  # finding the path may take long
             path = "" if getattr(error, "place", "") else _escaped_unencodable_path(payload, self._encode)
-            self._located = (reason, f"{reason}; it is at '{path}'" if path else reason)
-        message = self._located[1] if self._located[0] == reason else reason
+            self._located_problem = (reason, f"{reason}; the value is at '{path}'" if path else reason)
+        message = self._located_problem[1] if self._located_problem[0] == reason else reason
         if is_logged(self.count):
             _logger.warning(
                 "a message on '%s' can't be sent (%d so far): %s", self._topic, self.count, message
@@ -410,7 +410,7 @@ class RejectedPayloads:
         path = error.place or _escaped_unencodable_path(payload, self._encode)
         if not path or error.place:
             return error
-        return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{path}'", path)
+        return EncodeError(error.codec, error.kind, f"{error.reason}; the value is at '{path}'", path)
 
     def resolve(self) -> None:
         """Clear the reported problem after a payload was encoded successfully."""

@@ -50,36 +50,36 @@ class SharedWait:
                 ) from error
             raise
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
-        self._armed: dict[SubscriberTransport, _ReadyCallback] = {}
-        self._polled: set[SubscriberTransport] = set()
-        self._ready: deque[SubscriberTransport] = deque()
+        self._armed_callbacks: dict[SubscriberTransport, _ReadyCallback] = {}
+        self._polled_subscribers: set[SubscriberTransport] = set()
+        self._ready_queue: deque[SubscriberTransport] = deque()
 
     def arm(self, subscriber: SubscriberTransport) -> bool:
         """Add a subscriber to the wait. Idempotent.
 
         Returns False, without adding the subscriber, if it may have a message already or is closed.
         """
-        if subscriber in self._armed or subscriber in self._polled:
+        if subscriber in self._armed_callbacks or subscriber in self._polled_subscribers:
             return True
         if getattr(subscriber, "enter_wait", None) is None:  # an older plug-in
-            self._polled.add(subscriber)
+            self._polled_subscribers.add(subscriber)
             return not subscriber.is_closed
         callback = _ReadyCallback(self, subscriber)
         if not subscriber.enter_wait(callback):
             return False
-        self._armed[subscriber] = callback
+        self._armed_callbacks[subscriber] = callback
         if subscriber.fd >= 0:
             try:
                 self._selector.register(subscriber.fd, selectors.EVENT_READ, subscriber)
             except (OSError, ValueError, KeyError):  # not pollable
-                subscriber.leave_wait(self._armed.pop(subscriber))
-                self._polled.add(subscriber)
+                subscriber.leave_wait(self._armed_callbacks.pop(subscriber))
+                self._polled_subscribers.add(subscriber)
         return True
 
     def disarm(self, subscriber: SubscriberTransport) -> None:
         """Remove a subscriber from the wait."""
-        self._polled.discard(subscriber)
-        callback = self._armed.pop(subscriber, None)
+        self._polled_subscribers.discard(subscriber)
+        callback = self._armed_callbacks.pop(subscriber, None)
         if callback is not None:
             if subscriber.fd >= 0:
                 with suppress(
@@ -90,9 +90,9 @@ class SharedWait:
 
     def disarm_all(self) -> None:
         """Remove all subscribers from the wait."""
-        for subscriber in list(self._armed):
+        for subscriber in list(self._armed_callbacks):
             self.disarm(subscriber)
-        self._polled.clear()
+        self._polled_subscribers.clear()
 
     def wait(self, timeout_s: float) -> list[SubscriberTransport]:
         """Wait until a subscriber is ready or `wake` is called; return the ready subscribers.
@@ -102,21 +102,23 @@ class SharedWait:
         Args:
             timeout_s: Time limit in seconds.
         """
-        ready = self._selector.select(min(timeout_s, _POLL_INTERVAL_S) if self._polled else timeout_s)
+        ready = self._selector.select(
+            min(timeout_s, _POLL_INTERVAL_S) if self._polled_subscribers else timeout_s
+        )
         self._waker.clear()
-        self._ready.extend(key.data for key, _events in ready if key.data is not None)
-        self._ready.extend(self._polled)
+        self._ready_queue.extend(key.data for key, _events in ready if key.data is not None)
+        self._ready_queue.extend(self._polled_subscribers)
         ready_subscribers: dict[SubscriberTransport, None] = {}
-        while self._ready:
-            subscriber = self._ready.popleft()
-            if subscriber in self._armed or subscriber in self._polled:
+        while self._ready_queue:
+            subscriber = self._ready_queue.popleft()
+            if subscriber in self._armed_callbacks or subscriber in self._polled_subscribers:
                 self.disarm(subscriber)
                 ready_subscribers[subscriber] = None
         return list(ready_subscribers)
 
     def set_ready(self, subscriber: SubscriberTransport) -> None:
         """Mark a subscriber as ready and end the wait. Thread-safe."""
-        self._ready.append(subscriber)
+        self._ready_queue.append(subscriber)
         self._waker.wake()
 
     def wake(self) -> None:

@@ -58,7 +58,7 @@ class Subscriber:
         self._empty = codec_for(spec.msg_type).empty
         self._async_reader = AsyncReader(transport, self._poll_first)
         self._problem = ""
-        self._unreadable = 0
+        self._undecodable_count = 0
 
     @property
     def topic(self) -> str:
@@ -109,10 +109,10 @@ class Subscriber:
             ValueError: `timeout_s` is negative or not a number.
         """
         try:
-            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+            is_invalid = timeout_s is not None and not timeout_s >= 0.0
         except TypeError:
-            is_wrong = True
-        if is_wrong:
+            is_invalid = True
+        if is_invalid:
             check_optional_time_limit("timeout_s", timeout_s)
         payloads, ready = self.payloads, self._ready
         if payloads:
@@ -136,17 +136,17 @@ class Subscriber:
         return self._wait_and_listen(block_mode, timeout_s)
 
     def _wait_and_listen(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
-        limit = None if block_mode and timeout_s is None else timeout_s or 0.0
-        deadline = time.monotonic() + limit if limit else None
+        limit_s = None if block_mode and timeout_s is None else timeout_s or 0.0
+        deadline = time.monotonic() + limit_s if limit_s else None
         while True:
-            message = self._receive_for_listen(limit)
+            message = self._receive_for_listen(limit_s)
             if message is None:
                 return False, self._empty()
             try:
                 return True, self.decoded(message)
             except DecodeError:
                 if deadline is not None:
-                    limit = max(0.0, deadline - time.monotonic())
+                    limit_s = max(0.0, deadline - time.monotonic())
 
     # ---- names of the original module
 
@@ -187,10 +187,10 @@ class Subscriber:
             ValueError: `timeout_s` is negative.
         """
         try:
-            is_wrong = timeout_s is not None and not timeout_s >= 0.0
+            is_invalid = timeout_s is not None and not timeout_s >= 0.0
         except TypeError:
-            is_wrong = True
-        if is_wrong:
+            is_invalid = True
+        if is_invalid:
             check_optional_time_limit("timeout_s", timeout_s)
         self.want_messages()
         return self._receive(timeout_s)
@@ -250,16 +250,16 @@ class Subscriber:
 
         Waits without limit by default.
         """
-        limit = check_optional_time_limit("timeout_s", timeout_s)
-        deadline = None if limit is None else time.monotonic() + limit
+        limit_s = check_optional_time_limit("timeout_s", timeout_s)
+        deadline = None if limit_s is None else time.monotonic() + limit_s
         while True:
-            message = await self.receive_async(limit)
+            message = await self.receive_async(limit_s)
             if message is None:
                 return False, self._empty()
             try:
                 return True, self.decoded(message)
             except DecodeError:
-                limit = None if deadline is None else max(0.0, deadline - time.monotonic())
+                limit_s = None if deadline is None else max(0.0, deadline - time.monotonic())
 
     def _poll_first(self) -> Message | None:
         self.want_messages()
@@ -309,10 +309,10 @@ class Subscriber:
             raise
 
     def _report_problem(self, error: DecodeError) -> None:
-        self._unreadable += 1
-        if is_logged(self._unreadable):
+        self._undecodable_count += 1
+        if is_logged(self._undecodable_count):
             _logger.warning(
-                "a message on '%s' can't be read (%d so far): %s", self.topic, self._unreadable, error
+                "a message on '%s' can't be read (%d so far): %s", self.topic, self._undecodable_count, error
             )
         self._problem = str(error)
         self._transport.report(self._problem)

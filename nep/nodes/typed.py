@@ -57,8 +57,8 @@ def wrap_sink(msg_type: MsgType, sink: Sink | None) -> Sink | None:
     """
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else check_function("sink", sink)
-    give, reader = check_function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
-    return lambda messages: give([reader.convert(each) for each in messages])
+    call_sink, reader = check_function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
+    return lambda messages: call_sink([reader.convert(each) for each in messages])
 
 
 class TypedSubscriber(Subscriber):

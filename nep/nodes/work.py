@@ -58,8 +58,8 @@ class Work:
         self._lock = threading.Lock()
         self._is_stopped = threading.Event()
         self._watchers: tuple[Wakeable, ...] = ()
-        self._coroutine = ""
-        """Description of a callback that needs an event loop, or ""."""
+        self._coroutine_owner = ""
+        """Topic or timer whose callback is a coroutine function, or ""."""
 
     # ---- callbacks and timers
 
@@ -69,7 +69,7 @@ class Work:
             if not callback.transport.is_closed and not self.is_closed:
                 self.callbacks = (*self.callbacks, callback)
                 if is_coroutine_function(callback.call):
-                    self._coroutine = self._coroutine or callback.subscriber.topic
+                    self._coroutine_owner = self._coroutine_owner or callback.subscriber.topic
         self.wake()
 
     def remove_callback(self, subscriber: Subscriber) -> None:
@@ -87,7 +87,7 @@ class Work:
             else:
                 self.timers = (*self.timers, timer)
                 if is_coroutine_function(callback):
-                    self._coroutine = self._coroutine or repr(timer)
+                    self._coroutine_owner = self._coroutine_owner or repr(timer)
         self.wake()  # a spinning thread may have to wake earlier now
         return timer
 
@@ -98,10 +98,10 @@ class Work:
 
     def _update_coroutine_locked(self) -> None:
         # Call with the lock held.
-        if self._coroutine:
+        if self._coroutine_owner:
             topics = (each.subscriber.topic for each in self.callbacks if is_coroutine_function(each.call))
             timers = (repr(each) for each in self.timers if is_coroutine_function(each.callback))
-            self._coroutine = next(chain(topics, timers), "")
+            self._coroutine_owner = next(chain(topics, timers), "")
 
     # ---- state
 
@@ -173,12 +173,12 @@ class Work:
         Raises:
             NepError: A callback is a coroutine function.
         """
-        if self._coroutine:
+        if self._coroutine_owner:
             raise NepError(
                 _(
                     "the callback of '{what}' is a coroutine function, which 'spin' can't run; use 'await "
                     "node.spin_async()'"
-                ).format(what=self._coroutine)
+                ).format(what=self._coroutine_owner)
             )
         has_run = self._run_timers() if self.timers else False
         if self.services.has_servers:
@@ -188,7 +188,7 @@ class Work:
     def _run_until(self, until: float) -> bool:
         # A single callback gets messages until the time `until`; several callbacks get one message each.
         callbacks = self.callbacks
-        if len(callbacks) != 1 or self.services.has_servers or self._coroutine:
+        if len(callbacks) != 1 or self.services.has_servers or self._coroutine_owner:
             return self.run()
         has_run = self._run_timers() if self.timers else False
         if self.timers:

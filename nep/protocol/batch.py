@@ -25,7 +25,7 @@ __all__ = [
     "check_batch",
     "encode_batch",
     "parse_entries",
-    "read_parts",
+    "parse_parts",
     "table_struct",
     "unknown_codec_error",
 ]
@@ -124,7 +124,7 @@ def check_batch(header: Header, body: bytes) -> None:
         )
 
 
-def read_parts(parts: Sequence[bytes | memoryview]) -> list[ParsedMessage]:
+def parse_parts(parts: Sequence[bytes | memoryview]) -> list[ParsedMessage]:
     """Parse a message or batch; return its messages.
 
     Raises:

@@ -92,20 +92,24 @@ class ClockSamples:
             now: Readings at the arrival of the reply; None for the current ones.
         """
         now = now or self.now()
-        taken_ns = now.steady_ns - sent.steady_ns
-        away_ns = taken_ns - (answered_ns - received_ns)
-        is_possible = answered_ns >= received_ns and away_ns >= -now.uncertainty_ns - sent.uncertainty_ns
+        elapsed_ns = now.steady_ns - sent.steady_ns
+        round_trip_ns = elapsed_ns - (answered_ns - received_ns)
+        is_possible = (
+            answered_ns >= received_ns and round_trip_ns >= -now.uncertainty_ns - sent.uncertainty_ns
+        )
         if not is_possible or not self._is_consistent(sent, now):
             return False
         offset_ns = (received_ns - sent.wall_ns + answered_ns - now.wall_ns) // 2
-        uncertainty_ns = max(0, away_ns) // 2 + self._resolution_ns + now.uncertainty_ns + sent.uncertainty_ns
+        uncertainty_ns = (
+            max(0, round_trip_ns) // 2 + self._resolution_ns + now.uncertainty_ns + sent.uncertainty_ns
+        )
         if not is_plausible_clock(offset_ns, uncertainty_ns):
             return False
         sample = _Sample(offset_ns, uncertainty_ns, now.steady_ns)
         best = self._best_sample(now.steady_ns)
         if best is not None:
-            apart_ns = abs(offset_ns - best.offset_ns)
-            if apart_ns > uncertainty_ns + best.uncertainty_at(now.steady_ns):
+            difference_ns = abs(offset_ns - best.offset_ns)
+            if difference_ns > uncertainty_ns + best.uncertainty_at(now.steady_ns):
                 self._on_step()  # contradiction: the master's clock was set
         self._samples.append(sample)
         return True
@@ -127,9 +131,11 @@ class ClockSamples:
 
     def _is_consistent(self, previous: Moment, now: Moment) -> bool:
         # True if both clocks have advanced equally.
-        by_steady = now.steady_ns - previous.steady_ns
+        elapsed_ns = now.steady_ns - previous.steady_ns
         allowed = _MIN_STEP_NS + previous.uncertainty_ns + now.uncertainty_ns + 2 * self._resolution_ns
-        return abs(now.wall_ns - previous.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR
+        return (
+            abs(now.wall_ns - previous.wall_ns - elapsed_ns) <= allowed + max(0, elapsed_ns) // _SLEW_DIVISOR
+        )
 
     def _on_step(self) -> None:
         self.steps += 1

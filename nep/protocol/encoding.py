@@ -134,11 +134,11 @@ class ReplyEncoder:
         self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable_value).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
-    def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
+    def encode(self, message: Reply | Push, call: int = 0) -> bytes:
         """Encode a reply to `call`, or a push."""
-        if isinstance(answer, GraphReply):
-            return self._encode_graph_reply(answer, call)
-        return pack_saturated({"is": _REPLY_NAMES[type(answer)], "re": call, "what": to_plain(answer)})
+        if isinstance(message, GraphReply):
+            return self._encode_graph_reply(message, call)
+        return pack_saturated({"is": _REPLY_NAMES[type(message)], "re": call, "what": to_plain(message)})
 
     def _encode_graph_reply(self, reply: GraphReply, call: int) -> bytes:
         view = reply.view
@@ -212,7 +212,7 @@ def call_of_graph_reply(body: bytes) -> int | None:
 
 
 def decode_reply(body: bytes) -> tuple[int, Reply | Push]:
-    """Decode a reply or push; return (call, answer). The call id of a push is 0. Raises `WireError`."""
+    """Decode a reply or push, and return it with its call id, which is 0 for a push. Raises `WireError`."""
     if len(body) < _LARGE_BODY_BYTES:
         return _decode_reply(body)
     with gc_disabled():
@@ -228,9 +228,9 @@ def _decode_reply(body: bytes) -> tuple[int, Reply | Push]:
     return call, from_plain(kind, envelope.get("what", {}))
 
 
-def _unpack_envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str, object]:
+def _unpack_envelope(body: bytes, decode: Callable[[bytes], object]) -> Mapping[str, object]:
     try:
-        value = unpack_it(body)
+        value = decode(body)
     except ValueError as error:
         reason = _("the body isn't valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(body), code="msgpack") from error
@@ -245,12 +245,12 @@ def gc_disabled() -> Iterator[None]:
 
     Affects the whole process, so use it for milliseconds only.
     """
-    was_on = gc.isenabled()
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if was_on:
+        if was_enabled:
             gc.enable()
 
 
@@ -315,13 +315,13 @@ class _MismatchError(Exception):
         self.path: list[str] = []
 
 
-def create_frozen(kind: type[T], every_field: dict[str, object]) -> T:
+def create_frozen(kind: type[T], field_values: dict[str, object]) -> T:
     """Create a frozen dataclass from a dict of all its fields, in a fifth of the constructor's time.
 
-    The dataclass takes ownership of `every_field`, which must not be changed afterwards.
+    The dataclass takes ownership of `field_values`, which must not be changed afterwards.
     """
     value = object.__new__(kind)
-    object.__setattr__(value, "__dict__", every_field)
+    object.__setattr__(value, "__dict__", field_values)
     return value
 
 
@@ -374,7 +374,7 @@ def _mapping_reader(key: Reader, item: Reader) -> Reader:
 
 def _dataclass_reader(kind: type) -> Reader:
     hints = get_type_hints(kind)
-    # the usual type of a value, which needs no further call
+    # values of the usual type are used unchanged, without calling the reader
     readers = [
         (
             each.name,
@@ -393,11 +393,11 @@ def _dataclass_reader(kind: type) -> Reader:
         if not isinstance(value, Mapping):
             raise _MismatchError(_NOT_A_MAP_MESSAGE, given=type(value).__name__)
         values: dict[str, object] = {}
-        for name, usual, reader, field in readers:
+        for name, usual_type, reader, field in readers:
             item = value.get(name, MISSING)
             if item is MISSING:
                 values[name] = _default_value(field)
-            elif type(item) is usual:
+            elif type(item) is usual_type:
                 values[name] = item
             else:
                 try:
@@ -415,8 +415,10 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
     # returns None for any other map, which the general parser then handles or rejects.
     types_by_field = {name: _plain_types(hint) for name, hint in hints.items()}
     names = [name for name, types in types_by_field.items() if types]
-    others = [(name, _reader(hints[name])) for name, types in types_by_field.items() if not types]
-    of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
+    parsed_fields = [(name, _reader(hints[name])) for name, types in types_by_field.items() if not types]
+    plain_values = (
+        itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
+    )
     valid_types: set[tuple[type, ...]] = set()
     """Combinations of field types that were found valid. An optional field has two possible types."""
 
@@ -424,17 +426,17 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
         if len(value) != len(types_by_field):
             return None
         try:
-            types = tuple(map(type, of_plain(value)))
+            types = tuple(map(type, plain_values(value)))
             if types not in valid_types:
                 if not all(each in types_by_field[name] for name, each in zip(names, types, strict=True)):
                     return None
                 valid_types.add(types)
-            fields_of_it = dict(value)
-            for name, reader in others:
-                fields_of_it[name] = reader(value[name])
+            field_values = dict(value)
+            for name, reader in parsed_fields:
+                field_values[name] = reader(value[name])
         except (LookupError, _MismatchError):
             return None
-        instance: object = create_frozen(kind, fields_of_it)
+        instance: object = create_frozen(kind, field_values)
         return instance
 
     return read_fast

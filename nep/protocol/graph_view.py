@@ -219,7 +219,8 @@ class GraphView:
         nodes: Nodes by id.
         topics: Topics by name.
         alerts: Current problems.
-        listens: Addresses at which the master serves other computers; empty if it serves only its own.
+        listens: Addresses at which the master serves other computers; empty if it serves only its own
+            computer.
         services: Services by name.
         patterns: Subscriptions with wildcards by pattern.
     """

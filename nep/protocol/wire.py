@@ -174,14 +174,14 @@ class Hello(NamedTuple):
         subscriber: Id of the subscriber.
         topic: Name of the topic.
         reads_one_part: True if the subscriber reads messages of one part.
-        acknowledges: True if the subscriber acknowledges echoes.
+        acknowledges_echoes: True if the subscriber acknowledges echoes.
         reads_batches: True if the subscriber reads batches.
     """
 
     subscriber: int
     topic: str
     reads_one_part: bool
-    acknowledges: bool = False
+    acknowledges_echoes: bool = False
     reads_batches: bool = False
 
 
@@ -219,9 +219,9 @@ def hello_part(
     subscriber: int,
     topic: str,
     *,
-    one_part: bool = False,
+    reads_one_part: bool = False,
     acknowledges_echoes: bool = False,
-    batches: bool = False,
+    reads_batches: bool = False,
 ) -> bytes:
     """Return the hello filter of a subscriber, which is also the first part of messages addressed to it.
 
@@ -230,40 +230,40 @@ def hello_part(
     Args:
         subscriber: Id of the subscriber.
         topic: Name of the topic.
-        one_part: True if the subscriber reads messages of one part.
+        reads_one_part: True if the subscriber reads messages of one part.
         acknowledges_echoes: True if the subscriber also acknowledges echoes.
-        batches: True if the subscriber also reads batches.
+        reads_batches: True if the subscriber also reads batches.
     """
-    begin = (
+    prefix = (
         HELLO_BATCHES
-        if batches
+        if reads_batches
         else HELLO_ACKNOWLEDGES
         if acknowledges_echoes
         else HELLO_ONE_PART
-        if one_part
+        if reads_one_part
         else HELLO
     )
-    return begin + f"{subscriber:016x}/{topic}".encode()
+    return prefix + f"{subscriber:016x}/{topic}".encode()
 
 
 def parse_hello(part: bytes) -> Hello | None:
     """Parse a hello filter; return None for anything else."""
-    begin = next((each for each in _HELLO_PREFIXES if part.startswith(each)), None)
-    if begin is None:
+    prefix = next((each for each in _HELLO_PREFIXES if part.startswith(each)), None)
+    if prefix is None:
         return None
-    digits, slash, topic = part[len(begin) :].partition(b"/")
+    digits, slash, topic = part[len(prefix) :].partition(b"/")
     try:
         if not _ID_PATTERN.fullmatch(digits) or not slash:
             return None
-        rank = _HELLO_PREFIXES.index(begin)
+        rank = _HELLO_PREFIXES.index(prefix)
         return Hello(int(digits, 16), topic.decode("utf-8"), rank <= 2, rank <= 1, rank == 0)
     except ValueError:
         return None
 
 
-def acknowledgement_part(read: Acknowledgement) -> bytes:
-    """Return the filter that acknowledges all messages up to `read.seq`."""
-    return ACKNOWLEDGEMENT + b"/".join(b"%016x" % number for number in read)
+def acknowledgement_part(acknowledgement: Acknowledgement) -> bytes:
+    """Return the filter that acknowledges all messages up to `acknowledgement.seq`."""
+    return ACKNOWLEDGEMENT + b"/".join(b"%016x" % number for number in acknowledgement)
 
 
 def parse_acknowledgement(part: bytes) -> Acknowledgement | None:
@@ -272,9 +272,9 @@ def parse_acknowledgement(part: bytes) -> Acknowledgement | None:
     return None if numbers is None else Acknowledgement(*numbers)
 
 
-def acceptance_part(shares: OfferAcceptance) -> bytes:
+def acceptance_part(acceptance: OfferAcceptance) -> bytes:
     """Return the filter that accepts an offer of shared memory."""
-    return ACCEPTANCE + b"/".join(b"%016x" % number for number in shares)
+    return ACCEPTANCE + b"/".join(b"%016x" % number for number in acceptance)
 
 
 def parse_acceptance(part: bytes) -> OfferAcceptance | None:
@@ -283,9 +283,9 @@ def parse_acceptance(part: bytes) -> OfferAcceptance | None:
     return None if numbers is None else OfferAcceptance(*numbers)
 
 
-def _numbers_after(begin: bytes, part: bytes, count: int) -> list[int] | None:
-    fields = part[len(begin) :].split(b"/")
-    if not part.startswith(begin) or len(fields) != count or not all(map(_ID_PATTERN.fullmatch, fields)):
+def _numbers_after(prefix: bytes, part: bytes, count: int) -> list[int] | None:
+    fields = part[len(prefix) :].split(b"/")
+    if not part.startswith(prefix) or len(fields) != count or not all(map(_ID_PATTERN.fullmatch, fields)):
         return None
     return [int(each, 16) for each in fields]
 
@@ -344,8 +344,8 @@ def join(
     """Return all parts of a message. The flag EXTENSION is set if `extension` is not empty."""
     if not extension:
         return topic_part(topic), header.pack(), payload
-    flagged = header._replace(flags=header.flags | EXTENSION)
-    return topic_part(topic), flagged.pack(), payload, extension_part(extension)
+    extended_header = header._replace(flags=header.flags | EXTENSION)
+    return topic_part(topic), extended_header.pack(), payload, extension_part(extension)
 
 
 def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
@@ -353,12 +353,16 @@ def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
 
     Raises `WireError` if the part is too short.
     """
-    cut = part.find(b"\0") + 1
-    if not cut or len(part) < cut + HEADER_BYTES:
+    header_start = part.find(b"\0") + 1
+    if not header_start or len(part) < header_start + HEADER_BYTES:
         raise WireError(
             _("a message must have 3 or 4 parts, but this one has 1"), len(part), code="part-count"
         )
-    return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
+    return (
+        part[:header_start],
+        part[header_start : header_start + HEADER_BYTES],
+        part[header_start + HEADER_BYTES :],
+    )
 
 
 class ParsedMessage(NamedTuple):
@@ -371,7 +375,7 @@ class ParsedMessage(NamedTuple):
 
 
 def split(parts: Sequence[bytes | memoryview]) -> ParsedMessage:
-    """Parse a message. The payload of a batch is its body, which `nep.protocol.batch.read_parts` splits.
+    """Parse a message. The payload of a batch is its body, which `nep.protocol.batch.parse_parts` splits.
 
     Raises:
         WireError: The parts violate the specification. The rules are checked in the order of
@@ -379,27 +383,27 @@ def split(parts: Sequence[bytes | memoryview]) -> ParsedMessage:
     """
     if not parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
-    first, *rest = split_single_part(bytes(parts[0])) if len(parts) == 1 else parts
+    first, *remaining_parts = split_single_part(bytes(parts[0])) if len(parts) == 1 else parts
     topic = _parse_topic(bytes(first))
-    header, payload, extension = parse_remaining_parts(rest, is_one_part=len(parts) == 1)
+    header, payload, extension = parse_remaining_parts(remaining_parts, is_one_part=len(parts) == 1)
     return ParsedMessage(topic, header, payload, extension)
 
 
 def parse_remaining_parts(
-    rest: Sequence[bytes | memoryview], *, is_one_part: bool = False
+    remaining_parts: Sequence[bytes | memoryview], *, is_one_part: bool = False
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
     """Parse the parts after the first: header, payload and extension. Raises `WireError`.
 
     The extension is an empty map if the message has none.
 
     Args:
-        rest: The parts.
+        remaining_parts: The parts.
         is_one_part: True if the parts were split from one part; only then a batch is allowed.
     """
-    if not rest:
+    if not remaining_parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has 1"), code="part-count")
-    header = read_header(bytes(rest[0]))
-    expected_count, part_count = 4 if header.flags & EXTENSION else 3, len(rest) + 1
+    header = read_header(bytes(remaining_parts[0]))
+    expected_count, part_count = 4 if header.flags & EXTENSION else 3, len(remaining_parts) + 1
     if part_count not in {3, 4}:
         reason = _("a message must have 3 or 4 parts, but this one has {there}").format(there=part_count)
         raise WireError(reason, code="part-count")
@@ -412,7 +416,7 @@ def parse_remaining_parts(
         )
     if header.flags & BATCH and not (is_one_part and header.flags == BATCH):
         raise WireError(_("a batch must be one part without other flags"), code="batch-form")
-    size = len(rest[1])
+    size = len(remaining_parts[1])
     if header.size and header.size != size:
         raise WireError(
             _("the header declares {size} bytes, but the payload has {payload}").format(
@@ -421,7 +425,7 @@ def parse_remaining_parts(
             size,
             code="payload-size",
         )
-    return header, rest[1], read_extension(rest[2]) if header.flags & EXTENSION else {}
+    return header, remaining_parts[1], read_extension(remaining_parts[2]) if header.flags & EXTENSION else {}
 
 
 def _parse_topic(part: bytes) -> str:

@@ -9,7 +9,7 @@
     Repair:   repair(path)
     Export:   export(recording, "csv", folder)
 
-They are in the modules `writer`, `recorder`, `ring`, `reader`, `player`, `repair` and `export`. The packages
-of `nep-studio[recordings]` are imported when a recording is opened or created; if they are missing,
+These names are in the modules `writer`, `recorder`, `ring`, `reader`, `player`, `repair` and `export`. The
+packages of `nep-studio[recordings]` are imported when a recording is opened or created; if they are missing,
 `RecordingsUnavailableError` is raised.
 """

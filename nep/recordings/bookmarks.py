@@ -112,11 +112,11 @@ class Bookmarks:
             ValueError: The bookmark is a note or doesn't exist.
             RecordingError: The change can't be saved.
         """
-        new = replace(bookmark, name=name[:_MAX_NAME_LENGTH])
+        renamed = replace(bookmark, name=name[:_MAX_NAME_LENGTH])
         saved = list(self._saved)
-        saved[self._index_of(bookmark)] = new
+        saved[self._index_of(bookmark)] = renamed
         self._save(saved)
-        return new
+        return renamed
 
     def remove(self, bookmark: Bookmark) -> None:
         """Remove a bookmark. Raises the exceptions of `rename`."""
@@ -147,7 +147,7 @@ class Bookmarks:
 
     def _save(self, bookmarks: list[Bookmark]) -> None:
         document = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in bookmarks]}
-        unfinished = self.path.with_name(f"{self.path.name}.part")
+        part_file = self.path.with_name(f"{self.path.name}.part")
         try:
             text = orjson.dumps(document, option=orjson.OPT_INDENT_2)
         except TypeError as error:  # a lone surrogate
@@ -158,14 +158,14 @@ class Bookmarks:
             if self._is_damaged:
                 replace_file(self.path, self.path.with_name(f"{self.path.name}.damaged"))
                 self._is_damaged = False
-            with unfinished.open("wb") as file:
+            with part_file.open("wb") as file:
                 file.write(text)
                 file.flush()
                 os.fsync(file.fileno())
-            replace_file(unfinished, self.path)
+            replace_file(part_file, self.path)
         except OSError as error:
             with suppress(OSError):
-                unfinished.unlink(missing_ok=True)
+                part_file.unlink(missing_ok=True)
             raise disk_error(self.path, error) from error
         self._saved = bookmarks
         self._sort()

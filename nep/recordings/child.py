@@ -112,13 +112,13 @@ class RecorderService:
         """Lock that is held while a recording or the ring starts or stops."""
         self._recording: _ActiveRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
-        self._copies: list[threading.Thread] = []
+        self._copy_threads: list[threading.Thread] = []
         self._is_ending = False
         self._check_now = threading.Event()
         self._commands: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
             "record": self._record,
             "stop": self._stop,
-            "note": self._note,
+            "note": self._add_note,
             "say": self._write_entry,
             "ring": self._start_ring,
             "keep": self._save_ring,
@@ -131,17 +131,17 @@ class RecorderService:
     def execute(self, line: bytes) -> None:
         """Execute the command in a line of JSON. Errors are reported as events, not raised."""
         try:
-            order = orjson.loads(line)
+            command = orjson.loads(line)
         except orjson.JSONDecodeError:
-            order = None
-        op = order.get("op") if isinstance(order, dict) else None
-        carry_out = self._commands.get(op) if isinstance(op, str) else None
-        if carry_out is None or not isinstance(order, dict):
+            command = None
+        op = command.get("op") if isinstance(command, dict) else None
+        handler = self._commands.get(op) if isinstance(op, str) else None
+        if handler is None or not isinstance(command, dict):
             self._report_problem(str(op), _("unknown command"))
             return
-        path = order.get("path")
+        path = command.get("path")
         with self._lock:
-            self._report_errors(str(op), path if isinstance(path, str) else "", lambda: carry_out(order))
+            self._report_errors(str(op), path if isinstance(path, str) else "", lambda: handler(command))
 
     def _report_errors(self, op: str, path: str, function: Callable[[], object]) -> None:
         try:
@@ -157,7 +157,7 @@ class RecorderService:
         self._is_ending = True
         self._check_now.set()
         self._thread.join()
-        for thread in self._copies:
+        for thread in self._copy_threads:
             thread.join()
         with self._lock:
             self._report_errors("stop", "", lambda: self._stop({}))
@@ -182,19 +182,19 @@ class RecorderService:
 
     # ---- commands
 
-    def _record(self, order: Mapping[str, Any]) -> None:
-        path = _text(order, "path")
+    def _record(self, command: Mapping[str, Any]) -> None:
+        path = _text(command, "path")
         if self._recording is not None:
             self._report_problem("record", _("a recording is already running"), path)
             return
-        selection = _selection(order)
-        seconds, most_bytes = order.get("seconds"), order.get("size_bytes")
-        until = None if seconds is None else self._clock() + _checked_duration_s(seconds)
-        if most_bytes is not None and (type(most_bytes) is not int or most_bytes < 1):
+        selection = _selection(command)
+        seconds, max_bytes = command.get("seconds"), command.get("size_bytes")
+        stop_at = None if seconds is None else self._clock() + _check_duration_s(seconds)
+        if max_bytes is not None and (type(max_bytes) is not int or max_bytes < 1):
             raise ValueError("size_bytes")
         writer = RecordingWriter(
             path,
-            note=_text(order, "note", ""),
+            note=_text(command, "note", ""),
             on_problem=self._wake_on_failure,
         )
         try:
@@ -204,40 +204,42 @@ class RecorderService:
             with suppress(OSError):  # the file is empty
                 Path(path).unlink()
             raise
-        self._recording = _ActiveRecording(writer, recorder, path, until, most_bytes)
+        self._recording = _ActiveRecording(writer, recorder, path, stop_at, max_bytes)
         self._check_now.set()  # the limit may be reached before the next figures
         self.report("recording", path=path)
 
     def _stop(self, _order: Mapping[str, Any], limit: str = "") -> None:
         if self._recording is None:
             return
-        ended, self._recording = self._recording, None
-        ended.recorder.close()
-        self.report("ended", path=ended.path, status=_status_to_plain(ended.writer.close()), limit=limit)
+        recording, self._recording = self._recording, None
+        recording.recorder.close()
+        self.report(
+            "ended", path=recording.path, status=_status_to_plain(recording.writer.close()), limit=limit
+        )
 
-    def _note(self, order: Mapping[str, Any]) -> None:
+    def _add_note(self, command: Mapping[str, Any]) -> None:
         if self._recording is not None:
-            self._recording.writer.write_entry("notes", {"text": _text(order, "text")})
+            self._recording.writer.write_entry("notes", {"text": _text(command, "text")})
 
-    def _write_entry(self, order: Mapping[str, Any]) -> None:
+    def _write_entry(self, command: Mapping[str, Any]) -> None:
         # Discarded while nothing is recorded.
-        role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
-        if role not in _RUN_ROLES or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
+        role, value, target = _text(command, "role"), command["value"], _text(command, "to", "")
+        if role not in _RUN_ROLES or not isinstance(value, dict) or target not in {"", "ring", "recording"}:
             raise ValueError(role)
-        if self._recording is not None and to != "ring":
+        if self._recording is not None and target != "ring":
             self._recording.writer.write_entry(role, value)
-        if self._ring is not None and to != "recording":
+        if self._ring is not None and target != "recording":
             self._ring[0].write_entry(role, value)
 
-    def _start_ring(self, order: Mapping[str, Any]) -> None:
+    def _start_ring(self, command: Mapping[str, Any]) -> None:
         if self._ring is not None:
             self._report_problem("ring", _("the flight recorder is already on"))
             return
-        selection = _selection(order)
+        selection = _selection(command)
         ring = FlightRecorder(
-            _text(order, "folder"),
-            seconds=float(order.get("seconds", 60.0)),
-            size_bytes=int(order.get("size_bytes", 2_000_000_000)),
+            _text(command, "folder"),
+            seconds=float(command.get("seconds", 60.0)),
+            size_bytes=int(command.get("size_bytes", 2_000_000_000)),
             on_problem=self._wake_on_failure,
         )
         try:
@@ -248,18 +250,18 @@ class RecorderService:
         self._ring = (ring, recorder)
         self.report("ring")
 
-    def _save_ring(self, order: Mapping[str, Any]) -> None:
+    def _save_ring(self, command: Mapping[str, Any]) -> None:
         # Copies in a thread, so that commands are still served.
-        path = _text(order, "path")
+        path = _text(command, "path")
         if self._ring is None:
             self._report_problem("keep", _("the flight recorder is off"), path)
             return
-        self._copies = [each for each in self._copies if each.is_alive()]
-        if len(self._copies) >= _MAX_COPIES:
+        self._copy_threads = [each for each in self._copy_threads if each.is_alive()]
+        if len(self._copy_threads) >= _MAX_COPIES:
             self._report_problem("keep", _("the last seconds are already being saved"), path)
             return
         ring = self._ring[0]
-        seconds, note = float(order.get("seconds", 60.0)), _text(order, "note", "")
+        seconds, note = float(command.get("seconds", 60.0)), _text(command, "note", "")
 
         def copy() -> None:
             saved = ring.save(path, seconds, note)
@@ -268,14 +270,14 @@ class RecorderService:
             )
 
         target = partial(self._report_errors, "keep", path, copy)
-        self._copies.append(threading.Thread(target=target, name="recorder-keep", daemon=True))
-        self._copies[-1].start()
+        self._copy_threads.append(threading.Thread(target=target, name="recorder-keep", daemon=True))
+        self._copy_threads[-1].start()
 
     def _stop_ring(self, _order: Mapping[str, Any]) -> None:
         if self._ring is None:
             return
         (ring, recorder), self._ring = self._ring, None
-        for thread in self._copies:
+        for thread in self._copy_threads:
             thread.join()
         recorder.close()
         ring.close()
@@ -329,26 +331,26 @@ def _status_to_plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
     return asdict(status)
 
 
-def _checked_duration_s(seconds: object) -> float:
+def _check_duration_s(seconds: object) -> float:
     # Raises `ValueError`.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MAX_SECONDS:
-        raise ValueError(_("{given} isn't a time").format(given=seconds))
+        raise ValueError(_("{given} isn't a valid duration in seconds").format(given=seconds))
     return float(seconds)
 
 
-def _selection(order: Mapping[str, Any]) -> TopicSelection:
-    return TopicSelection(_text_list(order, "topics"), _text_list(order, "left_out"))
+def _selection(command: Mapping[str, Any]) -> TopicSelection:
+    return TopicSelection(_text_list(command, "topics"), _text_list(command, "left_out"))
 
 
-def _text_list(order: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    value = order.get(key, [])
+def _text_list(command: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    value = command.get(key, [])
     if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
         raise TypeError(key)
     return tuple(value)
 
 
-def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str:
-    value = order.get(key, default)
+def _text(command: Mapping[str, Any], key: str, default: str | None = None) -> str:
+    value = command.get(key, default)
     if not isinstance(value, str):
         raise TypeError(key)
     return value
@@ -356,12 +358,12 @@ def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str
 
 def _read_lines(stream: IO[bytes]) -> Iterator[bytes]:
     # A line longer than any command is replaced by an empty one, which is not a command.
-    is_inside = False
+    is_inside_long_line = False
     while line := stream.readline(_MAX_LINE_BYTES):
         is_end = line.endswith(b"\n")
-        if not is_inside:
+        if not is_inside_long_line:
             yield line if is_end or len(line) < _MAX_LINE_BYTES else b""
-        is_inside = not is_end
+        is_inside_long_line = not is_end
 
 
 def _stop_on_signals() -> None:

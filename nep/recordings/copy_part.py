@@ -31,7 +31,7 @@ def copy_part(
     path: Path,
     span: tuple[int | None, int | None],
     topics: Collection[str],
-    copied: Callable[[], object],
+    on_copied: Callable[[], object],
 ) -> int:
     """Write a part of a recording to a new, complete file; return the number of messages written.
 
@@ -40,7 +40,7 @@ def copy_part(
         path: File to write; an existing file is overwritten.
         span: Start (inclusive) and end (exclusive) in ns since 1970; None for no limit.
         topics: Names of the topics to copy; topics without messages are included.
-        copied: Called after each message, to report progress.
+        on_copied: Called after each message, to report progress.
 
     Raises:
         RecordingError: There are too many channels.
@@ -48,7 +48,7 @@ def copy_part(
     """
     writer = FileWriter(path, is_new=False, profile=recording.info.profile)
     try:
-        copy = _PartCopier(recording, writer, topics, copied)
+        copy = _PartCopier(recording, writer, topics, on_copied)
         for raw in recording.file.read_raw(*span, copy.channels):
             copy.add(raw)
         copy.finish()
@@ -60,25 +60,29 @@ def copy_part(
 
 class _PartCopier:
     def __init__(
-        self, recording: Recording, writer: FileWriter, topics: Collection[str], copied: Callable[[], object]
+        self,
+        recording: Recording,
+        writer: FileWriter,
+        topics: Collection[str],
+        on_copied: Callable[[], object],
     ) -> None:
-        self._recording, self._writer, self._copied = recording, writer, copied
+        self._recording, self._writer, self._on_copied = recording, writer, on_copied
         self._path = writer.path
         self.count = 0
         self._roles: dict[int, str] = {}
-        self._numbers: dict[int, int] = {}
+        self._channel_ids: dict[int, int] = {}
         for channel, definition in recording.info.channels.items():
             role = dict(definition.metadata).get("nep.role")
             if role in _COPIED_ROLES:
                 self._roles[channel] = role
             elif role is None and definition.topic in topics:
-                self._numbers[channel] = self._channel_id(channel)
-        self.channels = frozenset((*self._roles, *self._numbers))
-        writer.write_channels(dict.fromkeys(self._numbers.values()))
+                self._channel_ids[channel] = self._channel_id(channel)
+        self.channels = frozenset((*self._roles, *self._channel_ids))
+        writer.write_channels(dict.fromkeys(self._channel_ids.values()))
         self._stats_counter = _StatsCounter(recording) if recording.stats() else None
         self._last_entries: dict[tuple[str, str], object] = {}
         self._entry_count = 0
-        self._chunk_ns: int | None = None
+        self._chunk_start_ns: int | None = None
         self._last_ns = 0
 
     def _channel_id(self, channel: int) -> int:
@@ -92,20 +96,23 @@ class _PartCopier:
             self._copy_entry(raw)
             return
         self._last_ns = raw.log_ns
-        self._write_message(self._numbers[raw.channel], raw)
+        self._write_message(self._channel_ids[raw.channel], raw)
         self.count += 1
-        self._copied()
+        self._on_copied()
         if self._stats_counter is not None:
             self._stats_counter.add(raw)
             self._write_stats(raw.log_ns)
 
     def _write_message(self, number: int, raw: RawMessage) -> None:
         self._writer.add(number, (raw.log_ns, raw.publish_ns), raw.sequence, b"", bytes(raw.data))
-        if self._chunk_ns is None:
-            self._chunk_ns = raw.log_ns
-        if self._writer.pending_bytes >= CHUNK_BYTES or raw.log_ns - self._chunk_ns >= _FLUSH_INTERVAL_NS:
+        if self._chunk_start_ns is None:
+            self._chunk_start_ns = raw.log_ns
+        if (
+            self._writer.pending_bytes >= CHUNK_BYTES
+            or raw.log_ns - self._chunk_start_ns >= _FLUSH_INTERVAL_NS
+        ):
             self._writer.flush()
-            self._chunk_ns = None
+            self._chunk_start_ns = None
 
     def _copy_entry(self, raw: RawMessage) -> None:
         # Repeated values, such as a running behaviour, are copied only when they change.
@@ -124,7 +131,11 @@ class _PartCopier:
             self._write_message(self._channel_id(raw.channel), raw)
 
     def _write_stats(self, at_ns: int, *, is_final: bool = False) -> None:
-        record = None if self._stats_counter is None else self._stats_counter.record(at_ns, is_final=is_final)
+        record = (
+            None
+            if self._stats_counter is None
+            else self._stats_counter.encode_changes(at_ns, is_final=is_final)
+        )
         number = None if record is None else self._writer.table.channel_id(recorder_channel("figures"))
         if record is not None and number is not None:
             self._writer.add(number, (at_ns, at_ns), 0, b"", record)
@@ -164,7 +175,7 @@ class _StatsCounter:
         is_decodable = encoding_of(message, raw.log_ns).is_decodable
         counter.add(message.publisher, message.seq, message.size_bytes, is_decodable=is_decodable)
 
-    def record(self, at_ns: int, *, is_final: bool) -> bytes | None:
+    def encode_changes(self, at_ns: int, *, is_final: bool) -> bytes | None:
         # Changed counts once a second; all of them at the end.
         if self._next_ns is None:
             self._next_ns = at_ns + _STATS_INTERVAL_NS

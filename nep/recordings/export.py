@@ -106,18 +106,18 @@ def export(
     """
     if kind not in FORMATS:
         raise ValueError(_("unknown format '{kind}'").format(kind=kind))
-    topics, counted = _exportable_topics(recording, kind, part, progress)
+    topics, export_progress = _exportable_topics(recording, kind, part, progress)
     if kind == "mcap":
-        return [_write_mcap(recording, folder, replace(part, topics=topics), counted)]
-    make: Callable[[_Source, Path, float], int]
+        return [_write_mcap(recording, folder, replace(part, topics=topics), export_progress)]
+    write_file: Callable[[_Source, Path, float], int]
     exported, used_names = [], set[str]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if kind == "mp4":
             container = available_container(_import_opencv(), folder)
-            make, suffix = partial(_write_video, container=container), container.suffix
+            write_file, suffix = partial(_write_video, container=container), container.suffix
         else:
-            make, suffix = (
+            write_file, suffix = (
                 {"csv": _write_csv, "parquet": _write_parquet, "pictures": _write_pictures}[kind],
                 _SUFFIXES[kind],
             )
@@ -125,13 +125,13 @@ def export(
             path = folder / _file_name(topic, used_names, suffix)
             if path.exists():
                 raise RecordingError(str(path), _("the file already exists; choose another name"))
-            unfinished = path.with_name(f"{path.name}.part")
-            source = _Source(recording, topic, part, counted)
+            part_path = path.with_name(f"{path.name}.part")
+            source = _Source(recording, topic, part, export_progress)
             try:
-                count = make(source, unfinished, fps)
-                replace_file(unfinished, path)
+                count = write_file(source, part_path, fps)
+                replace_file(part_path, path)
             except BaseException:
-                _remove(unfinished)
+                _remove(part_path)
                 raise
             exported.append(ExportedFile(topic, path, count, source.undecodable_count))
     except OSError as error:
@@ -174,8 +174,12 @@ def _exportable_topics(
     if kind != "mcap":
         topics = [name for name in topics if counts.get(name)]
     if not any(counts.values()):
-        is_all = part.start_ns is None and part.end_ns is None
-        reason = _("no message can be decoded") if is_all else _("there are no messages in the selected part")
+        is_full_recording = part.start_ns is None and part.end_ns is None
+        reason = (
+            _("no message can be decoded")
+            if is_full_recording
+            else _("there are no messages in the selected part")
+        )
         raise RecordingError(str(recording.path), reason)
     return topics, _Progress(sum(counts.values()), progress)
 
@@ -186,11 +190,11 @@ def _estimate_counts(recording: Recording, topics: list[str], part: Part) -> dic
         return {name: recording.topics[name].message_count for name in topics}
     start_ns = recording.start_ns if part.start_ns is None else part.start_ns
     end_ns = recording.end_ns + 1 if part.end_ns is None else part.end_ns
-    counted = recording.densities(start_ns, end_ns, 1, topics)
+    densities = recording.densities(start_ns, end_ns, 1, topics)
     counts = {}
     for name in topics:
         first_message = next(recording.read(start_ns, end_ns, (name,)), None) if start_ns < end_ns else None
-        counts[name] = max(1, sum(counted.get(name, ()))) if first_message is not None else 0
+        counts[name] = max(1, sum(densities.get(name, ()))) if first_message is not None else 0
     return counts
 
 
@@ -230,20 +234,20 @@ class _Progress:
 class _Source:
     """Messages of one topic in the part that is exported."""
 
-    def __init__(self, recording: Recording, topic: str, part: Part, counted: _Progress) -> None:
-        self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
+    def __init__(self, recording: Recording, topic: str, part: Part, export_progress: _Progress) -> None:
+        self._recording, self.topic, self._part, self._progress = recording, topic, part, export_progress
         self.undecodable_count = 0
 
-    def messages(self, *, is_counted: bool = True) -> Iterator[RecordedMessage]:
+    def messages(self, *, reports_progress: bool = True) -> Iterator[RecordedMessage]:
         for record in self._recording.read(self._part.start_ns, self._part.end_ns, (self.topic,)):
-            if is_counted:
-                self._counted.add()
+            if reports_progress:
+                self._progress.add()
             yield record
 
-    def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
+    def rows(self, *, reports_progress: bool = True) -> Iterator[dict[str, object]]:
         # Flat values with the times first; a field of the payload with the same name becomes "payload.seq".
         self.undecodable_count = 0
-        for record in self.messages(is_counted=is_counted):
+        for record in self.messages(reports_progress=reports_progress):
             try:
                 values = flatten(record.message.payload)
             except (DecodeError, RecursionError):
@@ -302,7 +306,7 @@ def _flatten(value: object, path: str, columns: dict[str, object], depth: int) -
 def _columns(source: _Source) -> dict[str, set[type]]:
     # Columns with their value types. Raises `RecordingError` for too many.
     columns: dict[str, set[type]] = {name: set() for name in _FIRST_COLUMNS}
-    for row in source.rows(is_counted=False):
+    for row in source.rows(reports_progress=False):
         for name, value in row.items():
             columns.setdefault(name, set())
             if value is not None:
@@ -318,10 +322,10 @@ def _columns(source: _Source) -> dict[str, set[type]]:
 # ---- MCAP
 
 
-def _write_mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) -> ExportedFile:
+def _write_mcap(recording: Recording, folder: Path, part: Part, export_progress: _Progress) -> ExportedFile:
     # Copies bytes, sequence numbers, times, and the recorder's own entries. Raises `RecordingError`.
     path = folder / f"{recording.path.stem}.mcap"
-    unfinished = path.with_name(f"{path.name}.part")
+    part_path = path.with_name(f"{path.name}.part")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -330,10 +334,10 @@ def _write_mcap(recording: Recording, folder: Path, part: Part, counted: _Progre
         raise RecordingError(str(path), _("the file already exists; choose another name"))
     try:
         span = (part.start_ns, part.end_ns)
-        count = copy_part(recording, unfinished, span, part.topics or (), counted.add)
-        replace_file(unfinished, path)
+        count = copy_part(recording, part_path, span, part.topics or (), export_progress.add)
+        replace_file(part_path, path)
     except BaseException as error:
-        _remove(unfinished)
+        _remove(part_path)
         if isinstance(error, OSError):
             raise disk_error(path, error) from error
         raise
@@ -350,12 +354,12 @@ def _write_csv(source: _Source, path: Path, _fps: float) -> int:
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         for row in source.rows():
-            writer.writerow({name: _cell(value) for name, value in row.items()})
+            writer.writerow({name: _format_cell(value) for name, value in row.items()})
             count += 1
     return count
 
 
-def _cell(value: object) -> object:
+def _format_cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -370,28 +374,30 @@ def _write_parquet(source: _Source, path: Path, _fps: float) -> int:
     except ImportError as error:
         raise RecordingsUnavailableError("pip install 'nep-studio[parquet]'") from error
     columns = _columns(source)
-    kinds = {name: _column_type(name, types) for name, types in columns.items()}
-    arrow = {
+    column_types = {name: _column_type(name, types) for name, types in columns.items()}
+    arrow_types = {
         "bool": pa.bool_(),
         "int": pa.int64(),
         "uint": pa.uint64(),
         "float": pa.float64(),
         "text": pa.string(),
     }
-    schema = pa.schema([(name, arrow[kind]) for name, kind in kinds.items()])
-    count, at_once = 0, max(1, _CELLS_PER_BATCH // len(columns))
+    schema = pa.schema([(name, arrow_types[kind]) for name, kind in column_types.items()])
+    count, rows_per_batch = 0, max(1, _CELLS_PER_BATCH // len(columns))
     with pq.ParquetWriter(path, schema) as writer:
         rows: list[dict[str, object]] = []
 
         def write() -> None:
-            table = {name: [_convert(kinds[name], row.get(name)) for row in rows] for name in kinds}
+            table = {
+                name: [_convert(column_types[name], row.get(name)) for row in rows] for name in column_types
+            }
             writer.write_table(pa.table(table, schema=schema))
             rows.clear()
 
         for row in source.rows():
             rows.append(row)
             count += 1
-            if len(rows) >= at_once:
+            if len(rows) >= rows_per_batch:
                 write()
         if rows:
             write()
@@ -455,10 +461,10 @@ def _picture_file(message: Message) -> tuple[str, bytes] | None:
         return None
     opencv = _import_opencv()
     try:
-        is_made, buffer = opencv.imencode(".png", frame)
+        is_encoded, buffer = opencv.imencode(".png", frame)
     except opencv.error:
-        is_made, buffer = False, None
-    return ("png", buffer.tobytes()) if is_made else ("raw", data)
+        is_encoded, buffer = False, None
+    return ("png", buffer.tobytes()) if is_encoded else ("raw", data)
 
 
 def _import_opencv() -> Any:  # noqa: ANN401 - a module
@@ -472,7 +478,7 @@ def _import_opencv() -> Any:  # noqa: ANN401 - a module
 def _write_video(source: _Source, path: Path, fps: float, container: Container) -> int:
     # Constant frame rate in recording time: each frame is the newest image.
     opencv = _import_opencv()
-    film = VideoFile(opencv, path, fps, container)
+    video = VideoFile(opencv, path, fps, container)
     count = 0
     try:
         for record in source.messages():
@@ -480,11 +486,11 @@ def _write_video(source: _Source, path: Path, fps: float, container: Container) 
             if frame is None:
                 source.undecodable_count += 1
                 continue
-            film.add(record.log_ns, frame)
+            video.add(record.log_ns, frame)
             count += 1
-        film.finish()
+        video.finish()
     finally:
-        film.remove()
+        video.remove()
     if not count:
         raise RecordingError(str(path), _("none of the images can be read"))
     return count

@@ -94,7 +94,7 @@ class RawFile(Protocol):
         start_ns: int | None,
         end_ns: int | None,
         channels: Collection[int],
-        pieces: Collection[int] | None = None,
+        chunk_indexes: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
         """Iterate over the messages of some channels, sorted by log time.
 
@@ -102,7 +102,7 @@ class RawFile(Protocol):
             start_ns: Start in ns since 1970 (inclusive); None for no limit.
             end_ns: End in ns since 1970 (exclusive); None for no limit.
             channels: Ids of the channels.
-            pieces: Indexes of the chunks to read, as returned by `chunks_with`; None for all.
+            chunk_indexes: Indexes of the chunks to read, as returned by `chunks_with`; None for all.
         """
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
@@ -161,9 +161,9 @@ class _LoadedChunk:
             if len(channel_offsets) == 1
             else sorted(each for offset_group in channel_offsets for each in offset_group)
         ):
-            found_there = next(records_in(self.data, offset), None)
-            if isinstance(found_there, RawMessage):
-                yield found_there
+            indexed_record = next(records_in(self.data, offset), None)
+            if isinstance(indexed_record, RawMessage):
+                yield indexed_record
 
     def _index(self) -> dict[int, array[int]]:
         offsets: dict[int, array[int]] = {}
@@ -204,8 +204,8 @@ class FileReader:
         self.path = Path(path)
         self._lock = threading.RLock()
         self._budget = budget
-        self._damaged: dict[int, CorruptRange] = {}
-        self._unreadable: set[int] = set()
+        self._corrupt_ranges: dict[int, CorruptRange] = {}
+        self._unreadable_chunks: set[int] = set()
         self._cache: OrderedDict[int, _LoadedChunk] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
         try:
@@ -217,7 +217,7 @@ class FileReader:
             self._chunks = self._index.chunks
             self._starts = array("Q", [each.start_ns for each in self._chunks])
             self._latest_ends = array("Q")
-            self._in_chunks: dict[int, array[int]] = {}
+            self._chunks_by_channel: dict[int, array[int]] = {}
             self._index_chunks()
             self._info = self._read_info()
         except OSError as error:
@@ -233,9 +233,9 @@ class FileReader:
             latest = max(latest, chunk.end_ns)
             self._latest_ends.append(latest)
             for channel in chunk.channels:
-                if channel not in self._in_chunks:
-                    self._in_chunks[channel] = array("L")
-                self._in_chunks[channel].append(number)
+                if channel not in self._chunks_by_channel:
+                    self._chunks_by_channel[channel] = array("L")
+                self._chunks_by_channel[channel].append(number)
 
     def _read_info(self) -> FileInfo:
         index, compressions = self._index, dict[str, int]()
@@ -273,7 +273,7 @@ class FileReader:
         with self._lock:
             return tuple(
                 sorted(
-                    (*self._index.corruption, *self._damaged.values()),
+                    (*self._index.corruption, *self._corrupt_ranges.values()),
                     key=lambda each: (each.start_ns, each.offset),
                 )
             )
@@ -289,30 +289,30 @@ class FileReader:
         start_ns: int | None,
         end_ns: int | None,
         channels: Collection[int],
-        pieces: Collection[int] | None = None,
+        chunk_indexes: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
         """Iterate over the messages of some channels, sorted by log time. See `RawFile.read_raw`."""
-        numbers = self._chunks_in(start_ns, end_ns, channels, pieces)
+        numbers = self._chunks_in(start_ns, end_ns, channels, chunk_indexes)
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         pending: list[tuple[int, int, RawMessage]] = []
-        order = buffered_bytes = 0
+        sequence = buffered_bytes = 0
         for position, number in enumerate(numbers):
             messages = [
                 message for message in self._messages(number, channels) if first <= message.log_ns < last
             ]
             messages.sort(key=_log_ns)  # usually sorted, which costs no time
-            following = numbers[position + 1] if position + 1 < len(numbers) else None
-            limit = 2**64 if following is None else self._starts[following]
+            next_number = numbers[position + 1] if position + 1 < len(numbers) else None
+            limit_ns = 2**64 if next_number is None else self._starts[next_number]
             buffered_bytes += self._chunk_size(number)
-            if following is None or buffered_bytes + self._chunk_size(following) > _MAX_OVERLAP_BYTES:
-                limit = 2**64
-            until = 0 if pending else bisect_left(messages, limit, key=_log_ns)
-            yield from messages[:until]
-            for message in messages[until:]:
-                order += 1
-                heappush(pending, (message.log_ns, order, message))
+            if next_number is None or buffered_bytes + self._chunk_size(next_number) > _MAX_OVERLAP_BYTES:
+                limit_ns = 2**64
+            split_index = 0 if pending else bisect_left(messages, limit_ns, key=_log_ns)
+            yield from messages[:split_index]
+            for message in messages[split_index:]:
+                sequence += 1
+                heappush(pending, (message.log_ns, sequence, message))
             del messages
-            while pending and pending[0][0] < limit:
+            while pending and pending[0][0] < limit_ns:
                 yield heappop(pending)[2]
             if not pending:
                 buffered_bytes = 0
@@ -325,7 +325,7 @@ class FileReader:
         start_ns: int | None,
         end_ns: int | None,
         channels: Collection[int],
-        pieces: Collection[int] | None,
+        chunk_indexes: Collection[int] | None,
     ) -> list[int]:
         # Chunks that may contain such messages.
         first = 0 if start_ns is None else bisect_left(self._latest_ends, max(0, start_ns))
@@ -337,12 +337,12 @@ class FileReader:
             for channel in channels
             for number in self._chunks_of(channel, first, last)
             if (start_ns is None or self._chunks[number].end_ns >= start_ns)
-            and (pieces is None or number in pieces)
+            and (chunk_indexes is None or number in chunk_indexes)
         }
         return sorted(chunk_numbers)
 
     def _chunks_of(self, channel: int, first: int, last: int) -> Sequence[int]:
-        numbers = self._in_chunks.get(channel, ())
+        numbers = self._chunks_by_channel.get(channel, ())
         return numbers[bisect_left(numbers, first) : bisect_left(numbers, last)]
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
@@ -364,7 +364,7 @@ class FileReader:
 
     def _last_before(self, channel: int, at_ns: int) -> tuple[int, int, int] | None:
         # (time, chunk, offset)
-        numbers = self._in_chunks.get(channel, array("L"))
+        numbers = self._chunks_by_channel.get(channel, array("L"))
         position = (
             bisect_right(numbers, bisect_right(self._starts, max(-1, min(at_ns, 2**64 - 1))) - 1)
             if at_ns >= 0
@@ -433,7 +433,7 @@ class FileReader:
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
         """Return the indexes of the chunks with messages of these channels. See `RawFile.chunks_with`."""
-        return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
+        return sorted({number for channel in channels for number in self._chunks_by_channel.get(channel, ())})
 
     def _chunk_counts(self, number: int) -> Mapping[int, int]:
         # Reads the chunk if it has no indexes.
@@ -448,22 +448,22 @@ class FileReader:
     # ---- chunks
 
     def check(
-        self, progress: Callable[[int, int], object] | None = None, most_bytes: int | None = None
+        self, progress: Callable[[int, int], object] | None = None, max_bytes: int | None = None
     ) -> bool:
         """Read every chunk once, so that `corruption` becomes complete.
 
         Args:
             progress: Called with bytes done and in total.
-            most_bytes: Maximum decompressed size to read; None for no limit.
+            max_bytes: Maximum decompressed size to read; None for no limit.
 
         Returns:
-            False if the check stopped at `most_bytes`.
+            False if the check stopped at `max_bytes`.
         """
         done, total = 0, sum(each.length for each in self._chunks)
-        expanded = 0
+        expanded_bytes = 0
         for number, chunk in enumerate(self._chunks):
-            expanded += chunk.uncompressed_bytes
-            if most_bytes is not None and expanded > most_bytes:
+            expanded_bytes += chunk.uncompressed_bytes
+            if max_bytes is not None and expanded_bytes > max_bytes:
                 return False
             self._chunk(number)
             done += chunk.length
@@ -490,7 +490,7 @@ class FileReader:
             if cached is not None:
                 self._cache.move_to_end(number)
                 return cached
-            if number in self._unreadable:
+            if number in self._unreadable_chunks:
                 return None
             info = self._chunks[number]
             if self._budget is not None:
@@ -499,11 +499,11 @@ class FileReader:
             try:
                 chunk = _LoadedChunk(read_chunk(self._file, info))
             except (ValueError, OSError) as error:
-                self._damaged[number] = self._corrupt_range(info)
+                self._corrupt_ranges[number] = self._corrupt_range(info)
                 if isinstance(error, ValueError):  # an I/O error may be temporary
-                    self._unreadable.add(number)
+                    self._unreadable_chunks.add(number)
                 return None
-            self._damaged.pop(number, None)
+            self._corrupt_ranges.pop(number, None)
             self._cache[number] = chunk
             self._cached_bytes += len(chunk.data)
             return chunk

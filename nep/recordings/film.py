@@ -64,10 +64,10 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
         RecordingError: OpenCV can't write any container.
         OSError: The folder is not writable.
     """
-    with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
+    with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as test_folder:
         for container in CONTAINERS:
             writer = container.new_writer(
-                opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TEST_FRAME_SIZE_PX
+                opencv, Path(test_folder) / f"trial{container.suffix}", 30.0, _TEST_FRAME_SIZE_PX
             )
             is_open = writer.isOpened()
             writer.release()
@@ -113,12 +113,12 @@ class VideoFile:
     ) -> None:
         self._opencv, self._path, self._fps = opencv, path, fps
         self._container = container
-        self._film: Any = None
+        self._writer: Any = None
         self._size = (0, 0)
-        self._start_ns = self._frames = 0
-        self._last: Any = None
+        self._start_ns = self._frame_count = 0
+        self._last_frame: Any = None
         # OpenCV determines the container from the suffix
-        self._written = path.with_name(f"{path.name}{container.suffix}")
+        self._video_path = path.with_name(f"{path.name}{container.suffix}")
 
     def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
         """Add an image, and repeat the previous one until that time.
@@ -130,22 +130,22 @@ class VideoFile:
         Raises:
             RecordingError: The video can't be written or is too long.
         """
-        if self._film is None:
+        if self._writer is None:
             height, width = frame.shape[:2]
             self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
-            self._film = self._container.new_writer(self._opencv, self._written, self._fps, self._size)
-            if not self._film.isOpened():
+            self._writer = self._container.new_writer(self._opencv, self._video_path, self._fps, self._size)
+            if not self._writer.isOpened():
                 raise RecordingError(str(self._path), _("OpenCV can't write videos on this computer"))
             self._start_ns = log_ns
         if log_ns - self._start_ns > MAX_DURATION_S * 1e9:
             raise RecordingError(str(self._path), _("the images span more than a day; choose a shorter part"))
-        until = int((log_ns - self._start_ns) * self._fps / 1e9)
-        while self._last is not None and self._frames < until:
-            self._film.write(self._last)
-            self._frames += 1
+        frame_index = int((log_ns - self._start_ns) * self._fps / 1e9)
+        while self._last_frame is not None and self._frame_count < frame_index:
+            self._writer.write(self._last_frame)
+            self._frame_count += 1
         if (frame.shape[1], frame.shape[0]) != self._size:
             frame = self._opencv.resize(frame, self._size)
-        self._last = frame
+        self._last_frame = frame
 
     def finish(self) -> None:
         """Write the last frame and complete the file; do nothing if no image was added.
@@ -153,25 +153,25 @@ class VideoFile:
         Raises `RecordingError` if frames are missing: OpenCV does not report a full disk, so the frames
         in the file are counted.
         """
-        if self._film is None:
+        if self._writer is None:
             return
-        self._film.write(self._last)
-        self._frames += 1
+        self._writer.write(self._last_frame)
+        self._frame_count += 1
         self.close()
-        film = self._opencv.VideoCapture(str(self._written), getattr(self._opencv, self._container.api))
-        count = int(film.get(self._opencv.CAP_PROP_FRAME_COUNT))
-        film.release()
-        if count != self._frames:
+        capture = self._opencv.VideoCapture(str(self._video_path), getattr(self._opencv, self._container.api))
+        count = int(capture.get(self._opencv.CAP_PROP_FRAME_COUNT))
+        capture.release()
+        if count != self._frame_count:
             raise RecordingError(str(self._path), _("the video can't be written; the disk may be full"))
-        replace_file(self._written, self._path)
+        replace_file(self._video_path, self._path)
 
     def close(self) -> None:
         """Close the file without completing the video. Idempotent."""
-        if self._film is not None:
-            self._film.release()
+        if self._writer is not None:
+            self._writer.release()
 
     def remove(self) -> None:
         """Close and delete the incomplete file."""
         self.close()
         with suppress(OSError):
-            self._written.unlink(missing_ok=True)
+            self._video_path.unlink(missing_ok=True)

@@ -51,7 +51,7 @@ _MAX_LAG_S = 0.25
 When it is exceeded, playback slows down (see `PlayerStatus.measured_speed`) instead of catching up with a
 burst.
 """
-_MAX_BATCH = 2_000
+_MAX_BATCH_MESSAGES = 2_000
 _MAX_WAIT_S = 0.05
 _SPEED_WINDOW_S = 1.0
 _MAX_CACHED_KINDS = 10_000
@@ -125,16 +125,16 @@ class Playback:
         self._kinds: dict[int, tuple[MessageKind, MessageKind]] = {}
         self._speed = 1.0
         self._is_playing = self._is_looping = False
-        self._loop: tuple[int, int] | None = None
+        self._loop_range_ns: tuple[int, int] | None = None
         self._position_ns = recording.start_ns
         self._anchor = (clock(), self._position_ns)
         self._progress: deque[tuple[float, int]] = deque()
-        self._jump: list[Message] | None = None
+        self._jump_messages: list[Message] | None = None
         self._shown_ns = recording.start_ns
         self._from_ns = recording.start_ns
         """Time in ns from which messages have not been returned yet."""
         self._upcoming: Iterator[RecordedMessage] = iter(())
-        self._next: RecordedMessage | None = None
+        self._next_message: RecordedMessage | None = None
         self._read_from(recording.start_ns)
 
     # ---- controls
@@ -165,7 +165,9 @@ class Playback:
         # The state at `shown_ns` becomes due at once, later messages at their time.
         self._position_ns, self._shown_ns = at_ns, shown_ns
         newest = self._recording.newest(shown_ns, self._topics)
-        self._jump = [self._rename_topic(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        self._jump_messages = [
+            self._rename_topic(each.message) for each in sorted(newest.values(), key=_log_ns)
+        ]
         self._read_from(shown_ns + 1)
         self._set_anchor()
 
@@ -186,13 +188,13 @@ class Playback:
             The newest message of each added topic; empty while a jump is due, because the jump includes
             them.
         """
-        new = set(topics) if self._topics is None else set(topics).difference(self._topics)
+        added_topics = set(topics) if self._topics is None else set(topics).difference(self._topics)
         self._topics = frozenset(topics)
-        if self._jump is not None:
+        if self._jump_messages is not None:
             self._jump_to(self._shown_ns, self._position_ns)
             return ()
         self._read_from(self._from_ns)
-        newest = self._recording.newest(self._from_ns - 1, new) if new else {}
+        newest = self._recording.newest(self._from_ns - 1, added_topics) if added_topics else {}
         return [self._rename_topic(each.message) for each in sorted(newest.values(), key=_log_ns)]
 
     @property
@@ -222,20 +224,20 @@ class Playback:
             ValueError: The part is empty or outside the recording.
         """
         if start_ns is None or end_ns is None:
-            self._loop = None
+            self._loop_range_ns = None
         else:
             start_ns = max(start_ns, self._recording.start_ns)
             end_ns = min(end_ns, self._recording.end_ns)
             if start_ns >= end_ns:
                 raise ValueError(_("the start of the part must be before its end and within the recording"))
-            self._loop = (start_ns, end_ns)
+            self._loop_range_ns = (start_ns, end_ns)
             if not start_ns <= self._position_ns <= end_ns:
                 self.seek(start_ns)
         self._is_looping = True
 
     def clear_loop(self) -> None:
         """Stop repeating and deselect the part; playback continues beyond its end."""
-        self._is_looping, self._loop = False, None
+        self._is_looping, self._loop_range_ns = False, None
 
     def play_once(self) -> None:
         """Stop repeating; playback stops at the end of the part."""
@@ -243,7 +245,7 @@ class Playback:
 
     def rewind(self) -> None:
         """Move before the first message of the part, without a jump."""
-        self._position_ns, self._jump = self._first_ns(), None
+        self._position_ns, self._jump_messages = self._first_ns(), None
         self._read_from(self._position_ns)
         self._set_anchor()
 
@@ -257,7 +259,7 @@ class Playback:
             self._is_at_end(),
             self._speed,
             self._measured_speed(),
-            self._loop,
+            self._loop_range_ns,
             self._is_looping,
         )
 
@@ -267,14 +269,18 @@ class Playback:
         Must be called again within `DueMessages.wait_s` seconds unless that is None. After a seek,
         returns the messages at the new position, even while paused.
         """
-        if self._jump is not None:
-            messages, self._jump = self._jump, None
+        if self._jump_messages is not None:
+            messages, self._jump_messages = self._jump_messages, None
             return DueMessages(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
         if not self._is_playing:
             return DueMessages((), is_jump=False, wait_s=None)
         target = min(self._target_ns(), self._last_ns())
         due = self._pop_due(target)
-        if len(due) >= _MAX_BATCH and self._next is not None and self._next.log_ns <= target:
+        if (
+            len(due) >= _MAX_BATCH_MESSAGES
+            and self._next_message is not None
+            and self._next_message.log_ns <= target
+        ):
             self._position_ns = due[-1].log_ns
             self._set_anchor(is_measured=False)
         else:
@@ -312,46 +318,52 @@ class Playback:
 
     def _pop_due(self, until_ns: int) -> list[RecordedMessage]:
         due: list[RecordedMessage] = []
-        while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MAX_BATCH:
-            due.append(self._next)
-            self._next = next(self._upcoming, None)
-        if self._next is None or self._next.log_ns > until_ns:
-            given_ns = until_ns
+        while (
+            self._next_message is not None
+            and self._next_message.log_ns <= until_ns
+            and len(due) < _MAX_BATCH_MESSAGES
+        ):
+            due.append(self._next_message)
+            self._next_message = next(self._upcoming, None)
+        if self._next_message is None or self._next_message.log_ns > until_ns:
+            returned_ns = until_ns
         else:  # several messages with the same time; a cut between them repeats some
-            given_ns = due[-1].log_ns - (self._next.log_ns == due[-1].log_ns)
-        self._from_ns = max(self._from_ns, given_ns + 1)
+            returned_ns = due[-1].log_ns - (self._next_message.log_ns == due[-1].log_ns)
+        self._from_ns = max(self._from_ns, returned_ns + 1)
         return due
 
     def _handle_end(self) -> None:
         if self._is_looping and self._last_ns() > self._first_ns():
             self._jump_to(self._first_ns() - 1, self._first_ns())
-        elif self._next is None or self._next.log_ns > self._last_ns():
+        elif self._next_message is None or self._next_message.log_ns > self._last_ns():
             self._is_playing = False
             self._progress.clear()
 
     def _wait_s(self) -> float | None:
         if not self._is_playing:
             return None
-        if self._jump is not None:
+        if self._jump_messages is not None:
             return 0.0
-        next_ns = self._last_ns() if self._next is None else min(self._next.log_ns, self._last_ns())
+        next_ns = (
+            self._last_ns() if self._next_message is None else min(self._next_message.log_ns, self._last_ns())
+        )
         return max(0.0, min(_MAX_WAIT_S, (next_ns - self._position_ns) / 1e9 / self._speed))
 
     def _first_ns(self) -> int:
-        return self._recording.start_ns if self._loop is None else self._loop[0]
+        return self._recording.start_ns if self._loop_range_ns is None else self._loop_range_ns[0]
 
     def _last_ns(self) -> int:
-        return self._recording.end_ns if self._loop is None else self._loop[1]
+        return self._recording.end_ns if self._loop_range_ns is None else self._loop_range_ns[1]
 
     def _is_at_end(self) -> bool:
         return self._position_ns >= self._last_ns() and (
-            self._next is None or self._next.log_ns > self._last_ns()
+            self._next_message is None or self._next_message.log_ns > self._last_ns()
         )
 
     def _read_from(self, at_ns: int) -> None:
         self._from_ns = at_ns
         self._upcoming = self._recording.read(at_ns, None, self._topics)
-        self._next = next(self._upcoming, None)
+        self._next_message = next(self._upcoming, None)
 
     def _set_anchor(self, *, is_measured: bool = True) -> None:
         self._anchor = (self._clock(), self._position_ns)
@@ -372,14 +384,14 @@ class Playback:
 
     def _rename_topic(self, message: Message) -> Message:
         # Applies `remap`.
-        new = self._remap.get(message.topic)
-        if new is None:
+        new_topic = self._remap.get(message.topic)
+        if new_topic is None:
             return message
         cached = self._kinds.get(id(message.kind))
         if cached is None:
             if len(self._kinds) >= _MAX_CACHED_KINDS:
                 self._kinds.clear()
-            cached = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
+            cached = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new_topic))
         copy = new_message(Message)
         copy.kind = cached[1]
         copy.raw, copy.stamp_ns, copy.seq = message.raw, message.stamp_ns, message.seq
@@ -396,15 +408,17 @@ def moving_topics(recording: Recording) -> MovingTopics:
 
     Names are used because a robot that receives commands may not be described in the recording.
     """
-    described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
+    description_topics = {
+        each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE
+    }
     robots = dict[RobotControls, None]()
-    for _at, message in recording.read(topics=described) if described else ():
+    for _at, message in recording.read(topics=description_topics) if description_topics else ():
         with suppress(NepError):
             controls = parse_controls(message.payload, robot_name_of(message.topic))
             if controls is not None and len(robots) < _MAX_DESCRIPTIONS:
                 robots[controls] = None
-    typed = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)
-    return MovingTopics(robots, unidentified=typed, uses_names=True)
+    command_topics = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)
+    return MovingTopics(robots, unidentified=command_topics, matches_command_names=True)
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:

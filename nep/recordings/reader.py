@@ -106,10 +106,10 @@ class Recording:
             if (role := dict(channel.metadata).get("nep.role")) is not None
         }
         self.topics: Mapping[str, RecordedTopic] = self._topics()
-        self._channels_of: dict[str, list[int]] = {}
+        self._channels_by_topic: dict[str, list[int]] = {}
         for number, channel in self.info.channels.items():
             if number not in self._roles:
-                self._channels_of.setdefault(channel.topic, []).append(number)
+                self._channels_by_topic.setdefault(channel.topic, []).append(number)
 
     def _topics(self) -> dict[str, RecordedTopic]:
         topics: dict[str, RecordedTopic] = {}
@@ -207,33 +207,35 @@ class Recording:
         return self.file.chunks_with(self._channels_with("figures"))
 
     def stats_over_time(
-        self, pieces: Collection[int] | None = None
+        self, chunk_indexes: Collection[int] | None = None
     ) -> Iterator[tuple[int, dict[str, TopicStats]]]:
         """Iterate over the message counts in the recording, to locate losses in time.
 
         Args:
-            pieces: Indexes of the chunks to read, from `stats_chunks`; None for the whole file.
+            chunk_indexes: Indexes of the chunks to read, from `stats_chunks`; None for the whole file.
 
         Yields:
             Time in ns since 1970, and the changed counts by topic.
         """
-        for log_ns, value in self.entries("figures", pieces):
+        for log_ns, value in self.entries("figures", chunk_indexes):
             topics = value.get("topics") if isinstance(value, dict) else None
             if isinstance(topics, dict):
                 parsed = {str(topic): parse_stats(each) for topic, each in topics.items()}
                 yield log_ns, {topic: each for topic, each in parsed.items() if each is not None}
 
-    def entries(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
+    def entries(
+        self, role: Role, chunk_indexes: Collection[int] | None = None
+    ) -> Iterator[tuple[int, object]]:
         """Iterate over the entries of one role that the recorder itself wrote.
 
         Args:
             role: Role of the entries, such as "alerts" or "notes".
-            pieces: Indexes of the chunks to read; None for the whole file.
+            chunk_indexes: Indexes of the chunks to read; None for the whole file.
 
         Yields:
             Time in ns since 1970, and the value of the entry.
         """
-        for raw in self.file.read_raw(None, None, self._channels_with(role), pieces):
+        for raw in self.file.read_raw(None, None, self._channels_with(role), chunk_indexes):
             try:
                 yield raw.log_ns, orjson.loads(raw.data)
             except orjson.JSONDecodeError:
@@ -276,8 +278,8 @@ class Recording:
 
     def _channels(self, topics: Collection[str] | None) -> set[int]:
         if topics is None:
-            return {number for numbers in self._channels_of.values() for number in numbers}
-        return {number for topic in topics for number in self._channels_of.get(topic, ())}
+            return {number for numbers in self._channels_by_topic.values() for number in numbers}
+        return {number for topic in topics for number in self._channels_by_topic.get(topic, ())}
 
     def newest(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, RecordedMessage]:
         """Return the newest message at or before a time, by topic. Topics without such a message are omitted.
@@ -287,7 +289,7 @@ class Recording:
             topics: Names of topics; None for all.
         """
         selected = [topic for topic in self._known_topics(topics) if self.topics[topic].message_count]
-        raw_messages = self.file.newest(at_ns, [self._channels_of[topic] for topic in selected])
+        raw_messages = self.file.newest(at_ns, [self._channels_by_topic[topic] for topic in selected])
         return {
             topic: RecordedMessage(raw.log_ns, self._decoders[raw.channel].message(raw))
             for topic, raw in zip(selected, raw_messages, strict=True)
@@ -296,9 +298,9 @@ class Recording:
 
     def _known_topics(self, topics: Collection[str] | None) -> list[str]:
         return (
-            list(self._channels_of)
+            list(self._channels_by_topic)
             if topics is None
-            else [each for each in topics if each in self._channels_of]
+            else [each for each in topics if each in self._channels_by_topic]
         )
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:

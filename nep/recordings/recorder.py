@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-_GRAPH_POLL_S = 1.0
+_GRAPH_POLL_INTERVAL_S = 1.0
 _MASTER_TIMEOUT_S = 0.5
 """Time limit in seconds of requests to the master, so that a missing master doesn't delay the recorder."""
 _MAX_CACHED_TOPICS = 20_000
@@ -92,7 +92,7 @@ class Recorder:
         writer: _Writer,
         selection: TopicSelection = TopicSelection(),
         *,
-        look_s: float = _GRAPH_POLL_S,
+        poll_interval_s: float = _GRAPH_POLL_INTERVAL_S,
     ) -> None:
         """Subscribe to the topics. Raises the exceptions of `Node.new_sub`.
 
@@ -100,15 +100,15 @@ class Recorder:
             node: Node that subscribes; stays open after `close`.
             writer: Receiver of the messages.
             selection: Topics to record; all by default.
-            look_s: Interval in seconds at which the graph is polled.
+            poll_interval_s: Interval in seconds at which the graph is polled.
         """
         self._node, self._writer, self._selection = node, writer, selection
         self._subscriptions = selection.subscriptions
-        self._owners: dict[str, int] = {}
+        self._owning_subscriptions: dict[str, int] = {}
         self._subscribers: list[Subscriber] = []
-        self._exact: set[str] = set()
+        self._exact_topics: set[str] = set()
         self._last_alerts: object = None
-        self._end = threading.Event()
+        self._stop_event = threading.Event()
         self._has_patterns = True
         try:
             for number, topic in enumerate(self._subscriptions):
@@ -117,7 +117,7 @@ class Recorder:
             self._unsubscribe()
             raise
         self._thread = threading.Thread(
-            target=self._poll_graph, args=(look_s,), name="recorder-look", daemon=True
+            target=self._poll_graph, args=(poll_interval_s,), name="recorder-graph", daemon=True
         )
         self._thread.start()
 
@@ -150,24 +150,24 @@ class Recorder:
 
     def _owning_subscription(self, topic: str) -> int:
         # -1 if the topic is not selected.
-        owner = self._owners.get(topic)
+        owner = self._owning_subscriptions.get(topic)
         if owner is None:
-            if len(self._owners) >= _MAX_CACHED_TOPICS:
-                self._owners.clear()
+            if len(self._owning_subscriptions) >= _MAX_CACHED_TOPICS:
+                self._owning_subscriptions.clear()
             owner = -1
             if self._selection.has(topic):
                 subscriptions = enumerate(self._subscriptions)
                 owner = next((index for index, each in subscriptions if glob_matches(each, topic)), -1)
-            self._owners[topic] = owner
+            self._owning_subscriptions[topic] = owner
         return owner
 
     # ---- once a second
 
-    def _poll_graph(self, look_s: float) -> None:
-        while not self._end.is_set():
+    def _poll_graph(self, poll_interval_s: float) -> None:
+        while not self._stop_event.is_set():
             with suppress(NepError):
                 self._handle_graph(self._node.graph(_MASTER_TIMEOUT_S))
-            self._end.wait(look_s)
+            self._stop_event.wait(poll_interval_s)
 
     def _handle_graph(self, graph: GraphView) -> None:
         alerts = [asdict(each) for each in graph.alerts]
@@ -178,17 +178,22 @@ class Recorder:
             # descriptions are recorded in any case, unless excluded explicitly
             is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.is_excluded(name)
             is_chosen = self._selection.has(name)
-            is_heard = is_chosen and (self._has_patterns or name in self._subscriptions)
-            if is_heard or not (is_chosen or is_description) or name in self._exact or not topic.publishers:
+            is_covered = is_chosen and (self._has_patterns or name in self._subscriptions)
+            if (
+                is_covered
+                or not (is_chosen or is_description)
+                or name in self._exact_topics
+                or not topic.publishers
+            ):
                 continue
-            self._exact.add(name)
+            self._exact_topics.add(name)
             self._subscribers.append(
                 self._node.new_sub(name, topic.msg_type, sink=self._writer.post, wildcards=False)
             )
 
     def close(self) -> None:
         """Stop recording. The writer and the node stay open. Idempotent."""
-        self._end.set()
+        self._stop_event.set()
         self._thread.join(10.0)
         self._unsubscribe()
 

@@ -127,27 +127,27 @@ def repair(
     target = repaired_path(path) if target is None else target
     if target.exists():
         raise RecordingError(str(target), _("the file already exists; choose another name"))
-    unfinished = target.with_name(f"{target.name}.part")
+    part_path = target.with_name(f"{target.name}.part")
     try:
         file = path.open("rb")
     except OSError as error:
         raise disk_error(path, error) from error
     try:
         with file:
-            repairer = _Repair(file, path, unfinished, progress or _no_progress)
+            repairer = _Repair(file, path, part_path, progress or _no_progress)
             try:
                 counts = repairer.run()
-                first_ns, last_ns = _verify(unfinished, repairer.writer)
+                first_ns, last_ns = _verify(part_path, repairer.writer)
                 if not counts.recovered:
                     raise RecordingError(str(path), _("no message can be decoded"))
-                replace_file(unfinished, target)
+                replace_file(part_path, target)
             finally:
                 repairer.writer.close()
     except OSError as error:
         raise disk_error(target, error) from error
     finally:
         with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
+            part_path.unlink(missing_ok=True)
     return RepairReport(
         target,
         counts.recovered,
@@ -200,7 +200,7 @@ class _Repair:
         self._table = ChannelTable(self._definitions.channels)
         self._counts = _Counts()
         self._corrupt_chunk: ChunkHead | None = None
-        self._others = RecordCounter(path)
+        self._record_counter = RecordCounter(path)
         self.writer = FileWriter(target, self._table, is_new=False)
 
     def _known_definitions(self, path: Path) -> Definitions:
@@ -218,7 +218,7 @@ class _Repair:
             self._progress(offset, self._size)
             location = self._record_location(offset)
             if location is not None:
-                self._others.add(location.opcode)
+                self._record_counter.add(location.opcode)
             if location is not None and location.opcode == Opcode.DATA_END:
                 break
             if location is not None and self._copy(location):
@@ -338,8 +338,8 @@ class _Repair:
             header.data_bytes,
             header.uncompressed_bytes,
         )
-        packed = {number: pack_message_index(number, entries) for number, entries in indexes.items()}
-        self.writer.copy_chunk(record, info, packed)
+        encoded_indexes = {number: pack_message_index(number, entries) for number, entries in indexes.items()}
+        self.writer.copy_chunk(record, info, encoded_indexes)
         self._counts.recovered += sum(
             len(entries) // 2 for number, entries in indexes.items() if not self._is_recorder_channel(number)
         )
@@ -397,8 +397,8 @@ class _Repair:
         self._counts.corrupt_range_count += 1
         self._counts.is_unknown = True
         if chunk_offset is None:
-            copied = self._copy_truncated_chunk(offset)
-            self._count_discarded_bytes(self._size - offset - copied)
+            copied_bytes = self._copy_truncated_chunk(offset)
+            self._count_discarded_bytes(self._size - offset - copied_bytes)
             return self._size
         self._count_discarded_bytes(chunk_offset - offset)
         return chunk_offset
@@ -441,24 +441,24 @@ class _Repair:
     def _copy_truncated_chunk(self, offset: int) -> int:
         # Returns the number of its bytes in the file.
         self._file.seek(offset)
-        begin = self._file.read(CHUNK_HEAD_BYTES)
-        if len(begin) < HEAD_BYTES or begin[0] != Opcode.CHUNK:
+        head = self._file.read(CHUNK_HEAD_BYTES)
+        if len(head) < HEAD_BYTES or head[0] != Opcode.CHUNK:
             return 0
-        _opcode, length = RECORD_HEAD.unpack_from(begin)
-        header = read_chunk_head(begin, length)
+        _opcode, length = RECORD_HEAD.unpack_from(head)
+        header = read_chunk_head(head, length)
         if header is None or offset + HEAD_BYTES + length <= self._size:
             return 0
         self._file.seek(offset)
         record = memoryview(self._file.read(HEAD_BYTES + length))
         self._counts.last_ns = max(self._counts.last_ns, header.end_ns)
-        before = self._counts.recovered
+        recovered_before = self._counts.recovered
         for item in records_in(decompress_partial(record[header.data_offset :], header)):
             if isinstance(item, RawMessage):
                 is_plausible = header.start_ns <= item.log_ns <= header.end_ns
                 if not is_plausible or item.channel not in self._definitions.channels:
                     break
             self._copy_record(item)
-        return len(record) if self._counts.recovered > before else 0
+        return len(record) if self._counts.recovered > recovered_before else 0
 
     # ---- finishing
 

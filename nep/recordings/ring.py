@@ -101,16 +101,16 @@ class _Segment:
 class _Segments:
     """Destination of the ring's writer. `select`, `release` and `status` are thread-safe."""
 
-    def __init__(self, folder: Path, seconds: float, size_bytes: int, least_free_bytes: int) -> None:
+    def __init__(self, folder: Path, seconds: float, size_bytes: int, min_free_bytes: int) -> None:
         self.table = ChannelTable()
         self._folder = folder
         self._span_ns, self._size_bytes = int(seconds * 1e9), size_bytes
-        self._least_free_bytes = least_free_bytes
+        self._min_free_bytes = min_free_bytes
         self._lock = threading.Lock()
         self._number = 0
         folder.mkdir(parents=True, exist_ok=True)
         _remove_stale_segments(folder)
-        self._all: list[_Segment] = [self._new_segment()]
+        self._segments: list[_Segment] = [self._new_segment()]
 
     def _new_segment(self) -> _Segment:
         self._number += 1
@@ -119,44 +119,44 @@ class _Segments:
 
     @property
     def file(self) -> FileWriter:
-        return self._all[-1].writer
+        return self._segments[-1].writer
 
     def on_flushed(self) -> None:
         # Starts a new segment when this one has its share, and removes the oldest.
-        writer = self._all[-1].writer
+        writer = self._segments[-1].writer
         if writer.start_ns is None:
             return
         is_old = writer.end_ns - writer.start_ns >= self._span_ns // _SEGMENT_COUNT
         if is_old or writer.size_bytes >= self._size_bytes // _SEGMENT_COUNT:
-            new = self._new_segment()
+            new_segment = self._new_segment()
             with self._lock:
-                self._all.append(new)
+                self._segments.append(new_segment)
             writer.close()
         with self._lock:
             self._trim_locked()
 
     def _trim_locked(self) -> None:
-        newest = max(each.writer.end_ns for each in self._all)
-        while len(self._all) > 1:
-            oldest = self._all[0]
-            total = sum(each.writer.size_bytes for each in self._all)
+        newest = max(each.writer.end_ns for each in self._segments)
+        while len(self._segments) > 1:
+            oldest = self._segments[0]
+            total = sum(each.writer.size_bytes for each in self._segments)
             if oldest.writer.end_ns >= newest - self._span_ns and total <= self._size_bytes:
                 return
             self._remove_oldest_locked()
 
     def _remove_oldest_locked(self) -> None:
-        oldest = self._all.pop(0)
+        oldest = self._segments.pop(0)
         oldest.is_removed = True
         if not oldest.user_count:
             _remove(oldest.path)
 
     def check_file(self) -> None:
         # Frees space before it raises.
-        while shutil.disk_usage(self._folder).free < self._least_free_bytes:
+        while shutil.disk_usage(self._folder).free < self._min_free_bytes:
             with self._lock:
-                if len(self._all) == 1:
+                if len(self._segments) == 1:
                     raise RecordingError(str(self._folder), _("the disk is full"))
-                if self._all[0].user_count:  # removing it would free nothing until the copy is done
+                if self._segments[0].user_count:  # removing it would free nothing until the copy is done
                     return
                 self._remove_oldest_locked()
 
@@ -167,32 +167,32 @@ class _Segments:
 
     def finish(self) -> None:
         with self._lock:
-            for segment in self._all:
+            for segment in self._segments:
                 with suppress(OSError):
                     segment.writer.close()
                 segment.is_removed = True
                 if not segment.user_count:
                     _remove(segment.path)
-            self._all = self._all[-1:]
+            self._segments = self._segments[-1:]
 
     abort = finish
 
     def status(self) -> tuple[float, int]:
         with self._lock:
-            starts = [each.writer.start_ns for each in self._all if each.writer.start_ns is not None]
-            size = sum(each.writer.size_bytes for each in self._all)
+            starts = [each.writer.start_ns for each in self._segments if each.writer.start_ns is not None]
+            size = sum(each.writer.size_bytes for each in self._segments)
             return (self._newest_ns_locked() - min(starts)) / 1e9 if starts else 0.0, size
 
     def _newest_ns_locked(self) -> int:
-        return max(each.writer.end_ns for each in self._all)
+        return max(each.writer.end_ns for each in self._segments)
 
     def select(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
         # Call `release` afterwards.
         with self._lock:
-            since = self._newest_ns_locked() - int(seconds * 1e9)
+            since_ns = self._newest_ns_locked() - int(seconds * 1e9)
             segments = []
-            for segment in self._all:
-                chunks = [each for each in segment.writer.chunks or () if each.end_ns >= since]
+            for segment in self._segments:
+                chunks = [each for each in segment.writer.chunks or () if each.end_ns >= since_ns]
                 if chunks:
                     segment.user_count += 1
                     segments.append((segment, chunks))
@@ -323,16 +323,16 @@ class FlightRecorder:
         writer = FileWriter(target, self._segments.table)
         try:
             chunk_stats = _ChunkStats(self._segments.table)
-            damaged = 0
+            damaged_count = 0
             for segment, chunks in segments:
                 with segment.path.open("rb") as file:
                     for chunk in chunks:
-                        damaged += not _copy_chunk(file, chunk, writer, chunk_stats)
-            if damaged and writer.start_ns is None:
+                        damaged_count += not _copy_chunk(file, chunk, writer, chunk_stats)
+            if damaged_count and writer.start_ns is None:
                 raise ValueError("nothing is left")
             metadata = {"note": note, "started_ns": str(writer.start_ns or 0), "ended_ns": str(writer.end_ns)}
             writer.add_metadata(
-                "nep.recording", {**metadata, "end": "", "kept": "1", "damaged": str(damaged)}
+                "nep.recording", {**metadata, "end": "", "kept": "1", "damaged": str(damaged_count)}
             )
             totals = chunk_stats.stats(writer.counts)
             if totals:
@@ -428,6 +428,6 @@ class _ChunkStats:
         return {topic: self._difference(topic, count) for topic, count in counts_by_topic.items()}
 
     def _difference(self, topic: str, count: int) -> TopicStats:
-        nothing = TopicStats()
-        difference = self._last.get(topic, nothing).difference(self._first.get(topic, nothing))
+        no_stats = TopicStats()
+        difference = self._last.get(topic, no_stats).difference(self._first.get(topic, no_stats))
         return replace(difference, received=count + difference.unkept)

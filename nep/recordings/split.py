@@ -63,9 +63,9 @@ class SplitFiles:
 
     def next_file(self) -> None:
         """Open the next file and finish the current one. Raises `RecordingError` or `OSError`."""
-        full = self._part
+        full_part = self._part
         self._part = self._new_file()
-        full.finish()
+        full_part.finish()
 
     def check_file(self) -> None:
         """Raise `RecordingError` if the current file no longer exists or the disk is full."""

@@ -62,11 +62,11 @@ class LogClock:
     """
 
     def __init__(self) -> None:
-        self._add_ns = time.time_ns() - time.monotonic_ns()
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def __call__(self) -> int:
         """Return the current time in ns since 1970."""
-        return time.monotonic_ns() + self._add_ns
+        return time.monotonic_ns() + self._offset_ns
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,9 @@ class _Part:
     number: int = 1
     messages_before: int = 0
     bytes_before: int = 0
-    repeated: int = 0
+    repeated_count: int = 0
     """Number of latched messages in this file that were repeated from earlier files."""
-    before: Mapping[str, TopicStats] = field(default_factory=dict)
+    stats_before: Mapping[str, TopicStats] = field(default_factory=dict)
     """Message counts by topic at the start of the file."""
     latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
     latched_bytes: int = 0
@@ -130,17 +130,18 @@ class _Part:
         # A latched message is repeated in the next file; bounded.
         key = (message.topic, message.publisher)
         old = self.latched.get(key)
-        grown = message.size_bytes - (old.size_bytes if old is not None else 0)
+        growth_bytes = message.size_bytes - (old.size_bytes if old is not None else 0)
         if old is None and len(self.latched) >= _MAX_LATCHED:
             return
-        if self.latched_bytes + grown <= _MAX_LATCHED_BYTES:
+        if self.latched_bytes + growth_bytes <= _MAX_LATCHED_BYTES:
             self.latched[key] = message
-            self.latched_bytes += grown
+            self.latched_bytes += growth_bytes
 
     def stats_of_part(self, stats_by_topic: Mapping[str, TopicStats]) -> dict[str, TopicStats]:
-        nothing = TopicStats()
+        no_stats = TopicStats()
         return {
-            topic: each.difference(self.before.get(topic, nothing)) for topic, each in stats_by_topic.items()
+            topic: each.difference(self.stats_before.get(topic, no_stats))
+            for topic, each in stats_by_topic.items()
         }
 
     def next_part(self, stats_by_topic: Mapping[str, TopicStats], messages: int, size_bytes: int) -> _Part:
@@ -218,8 +219,8 @@ class RecordingWriter:
         self._first_ns: int | None = None
         self._own_sequence = 0
         self._part = _Part()
-        self._own_numbers: set[int] = set()
-        self._unwritten: list[Sequence[Message]] = []
+        self._own_channels: set[int] = set()
+        self._unwritten_batches: list[Sequence[Message]] = []
         """Batches taken from the queue whose messages were not added to the file when writing failed."""
         self._message_count = self._size_bytes = 0
         self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
@@ -240,14 +241,14 @@ class RecordingWriter:
                 or self._queued_messages + len(messages) > self._limits.queue_messages
             )
             if self._is_closing or self._problem or is_full:
-                self._post_part_locked(messages, now, may_fit=not (self._is_closing or self._problem))
+                self._post_part_locked(messages, now, can_accept=not (self._is_closing or self._problem))
                 return
             self._queue.append((now, messages))
             self._queued_bytes += size
             self._queued_messages += len(messages)
             self._lock.notify_all()
 
-    def _post_part_locked(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
+    def _post_part_locked(self, messages: Sequence[Message], now: int, *, can_accept: bool) -> None:
         # Called with the lock held, when there is not room for all.
         accepted = []
         for message in messages:
@@ -256,7 +257,7 @@ class RecordingWriter:
                 self._queued_bytes + size <= self._limits.queue_bytes
                 and self._queued_messages < self._limits.queue_messages
             )
-            if may_fit and has_room:
+            if can_accept and has_room:
                 accepted.append(message)
                 self._queued_bytes += size
                 self._queued_messages += 1
@@ -264,9 +265,9 @@ class RecordingWriter:
             key = (message.topic, message.publisher)
             if key not in self._dropped_counts and len(self._dropped_counts) >= MAX_TOPICS:
                 key = (_OTHER_TOPICS, None)
-            count = self._dropped_counts.setdefault(key, [0, 0])
-            count[0] += 1
-            count[1] += size
+            totals = self._dropped_counts.setdefault(key, [0, 0])
+            totals[0] += 1
+            totals[1] += size
         if accepted:
             self._queue.append((now, accepted))
             self._lock.notify_all()
@@ -315,13 +316,13 @@ class RecordingWriter:
         """Current state of the writer. The counts by topic are at most a second old."""
         with self._lock:
             first = self._first_ns
-            waiting = sum(count for count, _size in self._dropped_counts.values())
+            unreported_count = sum(count for count, _size in self._dropped_counts.values())
             return RecordingStatus(
                 self._message_count,
                 self._size_bytes,
                 0.0 if first is None else max(0, self._last_ns - first) / 1e9,
                 self._queued_bytes,
-                waiting + sum(each.unkept for each in self._stats.values()),
+                unreported_count + sum(each.unkept for each in self._stats.values()),
                 dict(self._stats),
                 self._problem,
             )
@@ -348,7 +349,7 @@ class RecordingWriter:
             self._lock.notify_all()
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            raise ClosedError(_("a recording whose disk doesn't respond"))
+            raise ClosedError(_("the recording (its disk doesn't respond)"))
         return self.status
 
     def __enter__(self) -> Self:
@@ -385,7 +386,7 @@ class RecordingWriter:
 
     def _write_until_closed(self) -> None:
         flush_at = time.monotonic() + self._limits.flush_interval_s
-        look_at = time.monotonic() + self._limits.stats_interval_s
+        stats_at = time.monotonic() + self._limits.stats_interval_s
         while True:
             with self._lock:
                 if (
@@ -393,7 +394,7 @@ class RecordingWriter:
                     and not self._is_closing
                     and self._last_completed_flush >= self._last_requested_flush
                 ):
-                    self._lock.wait(max(0.0, min(flush_at, look_at) - time.monotonic()))
+                    self._lock.wait(max(0.0, min(flush_at, stats_at) - time.monotonic()))
                 batch = list(self._queue)
                 self._queue.clear()
                 is_closing, flush_number = self._is_closing, self._last_requested_flush
@@ -405,27 +406,27 @@ class RecordingWriter:
                 with self._lock:
                     self._last_completed_flush = flush_number
                     self._lock.notify_all()
-            if now >= look_at:
-                look_at = now + self._limits.stats_interval_s
+            if now >= stats_at:
+                stats_at = now + self._limits.stats_interval_s
                 self._write_stats()
                 self._destination.check_file()
             if is_closing and not self._queue:
                 return
 
     def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Entry]) -> None:
-        for number, part in enumerate(batch):
-            if isinstance(part, _Entry):
-                self._write_recorder_entry(part.role, part.text)
-                size, count = len(part.text), 1
+        for number, item in enumerate(batch):
+            if isinstance(item, _Entry):
+                self._write_recorder_entry(item.role, item.text)
+                size, count = len(item.text), 1
             else:
-                now, messages = part
+                now, messages = item
                 size, count = 0, len(messages)
                 for index, message in enumerate(messages):
                     size += message.size_bytes
                     try:
                         self._write_message(message, self._log_ns(message, now))
                     except Exception:
-                        self._unwritten = [
+                        self._unwritten_batches = [
                             messages[index + 1 :],
                             *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Entry)),
                         ]
@@ -463,7 +464,7 @@ class RecordingWriter:
         if message.kind.is_latched:
             self._part.store_latched(message)
         file = self._destination.file
-        file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.before, message.raw)
+        file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.prefix, message.raw)
         cached.counter.add(
             message.publisher, message.seq, message.size_bytes, is_decodable=encoding.is_decodable
         )
@@ -497,7 +498,7 @@ class RecordingWriter:
         file = self._destination.file
         number = file.table.channel_id(recorder_channel(role))
         if number is not None:
-            self._own_numbers.add(number)
+            self._own_channels.add(number)
             file.add(number, (now, now), self._own_sequence & 0xFFFFFFFF, b"", text)
 
     def _flush(self) -> None:
@@ -510,7 +511,7 @@ class RecordingWriter:
 
     def _start_next_file(self) -> None:
         # The counts of the full file are written before it is finished.
-        self._write_stats(all_of_them=True)
+        self._write_stats(is_final=True)
         file = self._destination.file
         self._add_metadata(file, "")
         self._destination.next_file()
@@ -521,15 +522,15 @@ class RecordingWriter:
             number, encoding = self._channel(message, encoding, self._last_ns)
             if number is not None:
                 times = (self._last_ns, encoding.publish_ns)
-                self._destination.file.add(number, times, encoding.sequence, encoding.before, message.raw)
-                self._part.repeated += 1
+                self._destination.file.add(number, times, encoding.sequence, encoding.prefix, message.raw)
+                self._part.repeated_count += 1
 
-    def _write_stats(self, *, all_of_them: bool = False) -> None:
+    def _write_stats(self, *, is_final: bool = False) -> None:
         with self._lock:
             dropped, self._dropped_counts = self._dropped_counts, {}
         for (topic, publisher), (count, size) in dropped.items():
             self._counter(topic).count_dropped(publisher, count, size)
-        counters = dict(self._counters) if all_of_them else dict(changed_counters(self._counters))
+        counters = dict(self._counters) if is_final else dict(changed_counters(self._counters))
         if not counters:
             return
         stats_by_topic = {topic: counter.stats() for topic, counter in counters.items()}
@@ -540,12 +541,12 @@ class RecordingWriter:
         part_stats = {
             topic: each.to_plain() for topic, each in self._part.stats_of_part(stats_by_topic).items()
         }
-        self._write_recorder_entry("figures", orjson.dumps({"topics": part_stats, "is_final": all_of_them}))
+        self._write_recorder_entry("figures", orjson.dumps({"topics": part_stats, "is_final": is_final}))
 
     # ---- finishing
 
     def _finish(self, reason: str = "") -> None:
-        self._write_stats(all_of_them=True)
+        self._write_stats(is_final=True)
         file = self._destination.file
         file.flush()
         self._update_counts(file)
@@ -575,10 +576,10 @@ class RecordingWriter:
 
     def _update_counts(self, file: FileWriter) -> None:
         part = self._part
-        own_count = sum(file.counts.get(each, 0) for each in self._own_numbers)
+        own_count = sum(file.counts.get(each, 0) for each in self._own_channels)
         with self._lock:
             self._message_count = part.messages_before + max(
-                0, file.message_count - own_count - part.repeated
+                0, file.message_count - own_count - part.repeated_count
             )
             self._size_bytes = part.bytes_before + file.size_bytes
 
@@ -594,12 +595,12 @@ class RecordingWriter:
         # Nothing more can be written: the file ends with its last whole record.
         file = self._destination.file
         with self._lock:
-            for messages in self._unwritten:
+            for messages in self._unwritten_batches:
                 self._count_dropped_locked(messages)
             for number, count in file.pending_counts.items():  # received, but only in memory
                 definition = file.table.definitions[number]
                 dropped = self._dropped_counts.setdefault((definition.topic, None), [0, 0])
-                dropped[0] += 0 if number in self._own_numbers else count
+                dropped[0] += 0 if number in self._own_channels else count
         self._update_counts(file)
         self._close_after_error()
         self._stop(error.reason)
@@ -611,9 +612,9 @@ class RecordingWriter:
     def _stop(self, reason: str) -> None:
         with self._lock:
             self._problem = reason
-            for part in self._queue:
-                if not isinstance(part, _Entry):
-                    self._count_dropped_locked(part[1])
+            for item in self._queue:
+                if not isinstance(item, _Entry):
+                    self._count_dropped_locked(item[1])
             self._queue.clear()
             self._queued_bytes = self._queued_messages = 0
             self._lock.notify_all()
@@ -621,4 +622,4 @@ class RecordingWriter:
             self._on_problem(reason)
 
     def _count_dropped_locked(self, messages: Sequence[Message]) -> None:
-        self._post_part_locked(messages, 0, may_fit=False)
+        self._post_part_locked(messages, 0, can_accept=False)

@@ -150,12 +150,12 @@ class OwnAddress(NamedTuple):
 
 def own_addresses() -> tuple[OwnAddress, ...]:
     """Return the addresses at which other computers may reach this one; tunnels and containers come last."""
-    up = {name for name, stats in psutil.net_if_stats().items() if stats.isup}
+    active_interfaces = {name for name, stats in psutil.net_if_stats().items() if stats.isup}
     candidates = [
         OwnAddress(each.address, name)
         for name, addresses in psutil.net_if_addrs().items()
         for each in addresses
-        if name in up and each.family == socket.AF_INET and not _is_hidden(each.address)
+        if name in active_interfaces and each.family == socket.AF_INET and not _is_hidden(each.address)
     ]
     return tuple(sorted(candidates, key=lambda own: (_is_tunnel(own.interface), own.interface, own.host)))
 
@@ -265,8 +265,8 @@ class MasterNameResolver:
         Args:
             now: Current time of the monotonic clock in seconds.
         """
-        is_asking = self._thread is not None and self._thread.is_alive()
-        if _is_numeric(self._host) or self._host in _LOCAL_NAMES or is_asking or now < self._retry_at:
+        is_resolving = self._thread is not None and self._thread.is_alive()
+        if _is_numeric(self._host) or self._host in _LOCAL_NAMES or is_resolving or now < self._retry_at:
             return
         self._retry_at = now + _RETRY_INTERVAL_S
         thread = threading.Thread(target=self._resolve, name=f"nep-name-{self._host}", daemon=True)

@@ -147,7 +147,7 @@ def check_time_limit(name: str, value: object) -> float:
 
 
 def check_function(name: str, value: F) -> F:
-    """Validate a callable and return it. Raises `ValueError`."""
+    """Check that a value is callable and return it. Raises `ValueError` otherwise."""
     if not callable(value):
         raise WrongTypeError(
             _("{name} must be a function, not '{kind}'").format(name=name, kind=_type_name(value))
@@ -156,7 +156,10 @@ def check_function(name: str, value: F) -> F:
 
 
 def check_plain_function(name: str, value: F) -> F:
-    """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
+    """Check that a value is callable and not a coroutine function, and return it.
+
+    Raises `ValueError` otherwise.
+    """
     if is_coroutine_function(check_function(name, value)):
         raise ValueError(
             _("{name} is a coroutine function, which isn't awaited here; use a regular function").format(

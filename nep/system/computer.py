@@ -11,7 +11,7 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
-_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+_BOOT_ID_FILE = Path("/proc/sys/kernel/random/boot_id")
 
 
 @cache
@@ -21,8 +21,8 @@ def computer_id() -> str:
     Containers on one computer have the same id, because they share its clock; a virtual machine has a
     different one. The digits are a hash, so that the system's identifier is not published.
     """
-    name = system_identifier()
-    return sha256(f"nep clock {name}".encode("utf-8", "replace")).hexdigest()[:16] if name else ""
+    identifier = system_identifier()
+    return sha256(f"nep clock {identifier}".encode("utf-8", "replace")).hexdigest()[:16] if identifier else ""
 
 
 def system_identifier() -> str:
@@ -36,15 +36,15 @@ def system_identifier() -> str:
 
 def _boot_id() -> str:
     # Linux: new at each boot, the same in all containers.
-    return _BOOT_ID.read_text("ascii").strip()
+    return _BOOT_ID_FILE.read_text("ascii").strip()
 
 
 def _boot_session() -> str:
     # macOS: new at each boot.
     buffer, size = ctypes.create_string_buffer(64), ctypes.c_size_t(64)
     sysctl = ctypes.CDLL(None).sysctlbyname
-    failed = sysctl(b"kern.bootsessionuuid", buffer, ctypes.byref(size), None, ctypes.c_size_t(0))
-    return "" if failed else buffer.value.decode("ascii")
+    error_code = sysctl(b"kern.bootsessionuuid", buffer, ctypes.byref(size), None, ctypes.c_size_t(0))
+    return "" if error_code else buffer.value.decode("ascii")
 
 
 def _machine_guid() -> str:

@@ -40,7 +40,7 @@ class CpuLoad:
             self._last_reading = self._ratio = None
             return None
         if self._last_reading is not None:
-            previous_s, before = self._last_reading
-            self._ratio = max(0.0, used_s - before) / (now - previous_s)
+            previous_at, previous_used_s = self._last_reading
+            self._ratio = max(0.0, used_s - previous_used_s) / (now - previous_at)
         self._last_reading = (now, used_s)
         return self._ratio

@@ -76,12 +76,12 @@ class _DescriptorCheck:
             if self._polled_limit != limit:
                 self._polled_limit = limit
                 self._pollers.clear()
-            last = self._pollers.get(needed)
-            if last is None:
-                last = self._pollers[needed] = select.poll()
+            poller = self._pollers.get(needed)
+            if poller is None:
+                poller = self._pollers[needed] = select.poll()
                 for number in range(max(0, limit - needed), limit):
-                    last.register(number, 0)
-            return sum(event == select.POLLNVAL for _number, event in last.poll(0))
+                    poller.register(number, 0)
+            return sum(event == select.POLLNVAL for _number, event in poller.poll(0))
 
 
 _descriptor_check = _DescriptorCheck()

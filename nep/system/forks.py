@@ -88,12 +88,12 @@ def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
 def _close_sockets(exact: set[object], ports: set[object]) -> None:
     # With a default timeout (rospy sets one) Python makes each inspected socket non-blocking, which the
     # parent shares: its blocking `accept` would fail.
-    usual = socket.getdefaulttimeout()
+    default_timeout_s = socket.getdefaulttimeout()
     socket.setdefaulttimeout(None)
     try:
         _close_matching(exact, ports)
     finally:
-        socket.setdefaulttimeout(usual)
+        socket.setdefaulttimeout(default_timeout_s)
 
 
 def _close_matching(exact: set[object], ports: set[object]) -> None:

@@ -50,14 +50,14 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
         TypeError: A module binds an object of another type.
     """
     plugins: dict[str, T] = {}
-    home = importlib.import_module(package)
-    for info in pkgutil.iter_modules(home.__path__, f"{package}."):
-        bound = getattr(importlib.import_module(info.name), attribute, None)
-        if bound is None:
+    package_module = importlib.import_module(package)
+    for info in pkgutil.iter_modules(package_module.__path__, f"{package}."):
+        plugin = getattr(importlib.import_module(info.name), attribute, None)
+        if plugin is None:
             continue
-        if not isinstance(bound, kind):
+        if not isinstance(plugin, kind):
             raise TypeError(f"'{info.name}.{attribute}' is not a '{kind.__name__}'")
-        plugins[bound.name] = bound
+        plugins[plugin.name] = plugin
     if not plugins:
         raise PluginsMissingError(package, attribute)
     return plugins
@@ -81,12 +81,12 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
     plugins = dict(discover_own(package, attribute, kind))
     for point in metadata.entry_points(group=package):
         try:
-            bound = point.load()
+            plugin = point.load()
         except (Exception, SystemExit):
             _logger.exception("can't load the plug-in '%s' of '%s'", point.name, package)
             continue
-        if isinstance(bound, kind):
-            plugins.setdefault(bound.name, bound)
+        if isinstance(plugin, kind):
+            plugins.setdefault(plugin.name, plugin)
         else:
             _logger.error("the plug-in '%s' of '%s' is not a '%s'", point.name, package, kind.__name__)
     return plugins

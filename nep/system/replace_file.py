@@ -37,13 +37,13 @@ def replace_file(
         OSError: The file can't be replaced; `old` is unchanged.
     """
     wait = pause or threading.Event().wait
-    for tried in range(1, _MAX_ATTEMPTS + 1):
+    for attempt in range(1, _MAX_ATTEMPTS + 1):
         try:
             replace(new, old)
         except PermissionError as error:
             if getattr(error, "winerror", None) not in _OPEN_FILE_ERRORS:
                 raise
-            if tried == _MAX_ATTEMPTS:
+            if attempt == _MAX_ATTEMPTS:
                 reason = _("another program has the file open; close the file there")
                 raise PermissionError(error.errno, reason, str(old)) from error
             wait(_RETRY_DELAY_S)

@@ -13,6 +13,8 @@ import sys
 from contextlib import suppress
 from io import RawIOBase, TextIOWrapper
 
+from nep.i18n import _
+
 _REPLACEMENTS = {
     **dict.fromkeys("\u2010\u2011\u2013\u2014\u2212─━·", "-"),  # dashes, minus, lines
     **dict.fromkeys("\u2018\u2019", "'"), **dict.fromkeys("“”„", '"'), **dict.fromkeys("\u00a0\u202f", " "),
@@ -39,8 +41,8 @@ def prepare_streams() -> None:
     for name, flags in open_flags.items():
         stream = getattr(sys, name)
         if stream is None:
-            mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, flags)
-            setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - stays open
+            mode, null_descriptor = "r" if name == "stdin" else "w", os.open(os.devnull, flags)
+            setattr(sys, name, open(null_descriptor, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - stays open
         elif name != "stdin" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_ERROR_HANDLER)
 
@@ -69,8 +71,8 @@ def command_line_arguments() -> list[str]:
 def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    letters = error.object[error.start : error.end]
-    return "".join(_REPLACEMENTS.get(letter, "?") for letter in letters), error.end
+    characters = error.object[error.start : error.end]
+    return "".join(_REPLACEMENTS.get(character, "?") for character in characters), error.end
 
 
 def print_error(text: str) -> None:
@@ -79,13 +81,13 @@ def print_error(text: str) -> None:
         print(text, file=sys.stderr, flush=True)  # noqa: T201 - output of a command
 
 
-def output_problem(raised: OSError | None = None) -> str | None:
+def output_problem(write_error: OSError | None = None) -> str | None:
     """Return the reason why stdout can't be written, or None if stdout works.
 
     The reason is "" if the reader of stdout has exited or stdout is closed.
 
     Unwritten text stays in the buffer, so a failed write is detected by flushing again. Text larger
-    than the buffer is lost; pass the exception of that write as `raised`, because it is the only
+    than the buffer is lost; pass the exception of that write as `write_error`, because it is the only
     evidence.
     """
     try:
@@ -94,14 +96,18 @@ def output_problem(raised: OSError | None = None) -> str | None:
         return _write_error_reason(error)
     except ValueError:  # closed
         return ""
-    if raised is not None and raised.filename is None and raised.errno in _READER_GONE_ERRNOS | _DISK_ERRNOS:
-        return _write_error_reason(raised)
+    if (
+        write_error is not None
+        and write_error.filename is None
+        and write_error.errno in _READER_GONE_ERRNOS | _DISK_ERRNOS
+    ):
+        return _write_error_reason(write_error)
     return None
 
 
 def _write_error_reason(error: OSError) -> str:
     if error.errno == errno.EBADF:
-        return "it is closed"
+        return _("it is closed")
     return "" if error.errno in _READER_GONE_ERRNOS else (error.strerror or str(error)).lower()
 
 
@@ -112,6 +118,6 @@ def flush_streams() -> None:
             stream.flush()
         except (OSError, ValueError):
             with suppress(OSError, ValueError):
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, stream.fileno())
-                os.close(nowhere)
+                null_descriptor = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(null_descriptor, stream.fileno())
+                os.close(null_descriptor)

@@ -42,12 +42,12 @@ class Terminal(io.TextIOBase):
         self._stream = stream
         self._max_characters = max_characters
         self._queue: deque[str] = deque()
-        self._size = 0
-        self._lines_dropped = 0
+        self._queued_characters = 0
+        self._dropped_lines = 0
         self._has_failed = stream is None
         self._is_closing = False
         self._is_writing = False
-        self._changed = threading.Condition()
+        self._condition = threading.Condition()
         self._thread: threading.Thread | None = None
         notify_after_fork(self)
 
@@ -66,17 +66,17 @@ class Terminal(io.TextIOBase):
 
     def write(self, text: str) -> int:
         """Queue text; drop it if the queue is full or the stream has failed."""
-        with self._changed:
+        with self._condition:
             if self._has_failed or self._is_closing or not text:
                 return len(text)
-            if self._queue and self._size + len(text) > self._max_characters:
-                self._lines_dropped += max(1, text.count("\n"))
+            if self._queue and self._queued_characters + len(text) > self._max_characters:
+                self._dropped_lines += max(1, text.count("\n"))
                 return len(text)
             self._queue.append(text)
-            self._size += len(text)
+            self._queued_characters += len(text)
             if self._thread is None:
                 self._start_thread_locked()
-            self._changed.notify_all()
+            self._condition.notify_all()
         return len(text)
 
     def flush(self) -> None:
@@ -84,14 +84,14 @@ class Terminal(io.TextIOBase):
 
     def drain(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
         """Wait until all queued text is written; return False after the time limit."""
-        with self._changed:
-            return self._changed.wait_for(lambda: not self._queue and not self._is_writing, timeout_s)
+        with self._condition:
+            return self._condition.wait_for(lambda: not self._queue and not self._is_writing, timeout_s)
 
     def close(self, timeout_s: float = CLOSE_TIMEOUT_S) -> None:
         """Write the queued text for at most `timeout_s` seconds, then stop the thread. Idempotent."""
-        with self._changed:
+        with self._condition:
             self._is_closing = True
-            self._changed.notify_all()
+            self._condition.notify_all()
             thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(timeout_s)
@@ -104,10 +104,10 @@ class Terminal(io.TextIOBase):
 
     def forked(self) -> None:
         """Reset in a forked child process; the queued text belongs to the parent. See `nep.system.forks`."""
-        self._changed = threading.Condition()
+        self._condition = threading.Condition()
         self._thread = None
         self._queue.clear()
-        self._size = self._lines_dropped = 0
+        self._queued_characters = self._dropped_lines = 0
         self._is_writing = False
 
     def _start_thread_locked(self) -> None:
@@ -125,26 +125,26 @@ class Terminal(io.TextIOBase):
             try:
                 self._write_all(text)
             except (OSError, ValueError):  # the reader is gone, or the stream is closed
-                with self._changed:
+                with self._condition:
                     self._has_failed = True
                     self._is_writing = False
                     self._queue.clear()
-                    self._changed.notify_all()
+                    self._condition.notify_all()
                 return
 
     def _next_text(self) -> str | None:
         # Blocks until there is text; None at the end.
-        with self._changed:
+        with self._condition:
             self._is_writing = False
-            self._changed.notify_all()
-            self._changed.wait_for(lambda: self._queue or self._lines_dropped or self._is_closing)
-            if not self._queue and not self._lines_dropped:
+            self._condition.notify_all()
+            self._condition.wait_for(lambda: self._queue or self._dropped_lines or self._is_closing)
+            if not self._queue and not self._dropped_lines:
                 return None
             text = "".join(self._queue)
             self._queue.clear()
-            self._size = 0
+            self._queued_characters = 0
             self._is_writing = True
-            dropped, self._lines_dropped = self._lines_dropped, 0
+            dropped, self._dropped_lines = self._dropped_lines, 0
         if dropped:
             text += ngettext(
                 "… {count} line dropped because the output wasn't read",

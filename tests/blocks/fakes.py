@@ -31,11 +31,11 @@ class FakeLink:
         self.answers: dict[str, tuple[str, dict[str, object], str]] = {}
         self.held: set[str] = set()
         self.told: dict[object, list[Callable[[object], None]]] = {}
-        self.poke: Callable[[], None] = lambda: None
-        self.stopped_outside: Callable[[str], None] = lambda _: None
+        self.on_change: Callable[[], None] = lambda: None
+        self.on_external_stop: Callable[[str], None] = lambda _: None
 
-    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        self.poke, self.stopped_outside = poke, stopped_outside
+    def set_callbacks(self, on_change: Callable[[], None], on_external_stop: Callable[[str], None]) -> None:
+        self.on_change, self.on_external_stop = on_change, on_external_stop
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         self.invoked.append((robot, action, dict(input)))
@@ -53,7 +53,7 @@ class FakeLink:
         call.output, call.error = output or {}, error
         call.state = state
         if call.action in self.held:
-            self.poke()
+            self.on_change()
 
     def cancel(self, call: RobotCall) -> None:
         self.canceled.append(call)
@@ -80,7 +80,7 @@ class FakeLink:
         """Simulate the arrival of an event, a sensor value or a message."""
         for told in self.told.get(where, ()):
             told(data)
-        self.poke()
+        self.on_change()
 
 
 class Play:

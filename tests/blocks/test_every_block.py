@@ -184,7 +184,7 @@ def test_block_descriptions_are_valid():
         assert all(described.tooltip.endswith(".") for described in category.blocks)
 
 
-def test_every_program_command_exists_in_exported_file_module():
+def test_module_imported_by_exported_programs_defines_every_command():
     import app.blocks.commands as commands
 
     assert set(commands.__all__) == COMMANDS

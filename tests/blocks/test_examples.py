@@ -216,7 +216,7 @@ def test_finder_example_reports_detected_ball_and_face():
     assert actions(link).count("look_at") == 2
 
 
-def test_weather_station_example_receives_its_own_messages():
+def test_weather_station_example_publishes_temperatures_and_reacts_to_messages():
     play, link = run(7)
     until(lambda: bool(link.published))
     topic, message = link.published[0]

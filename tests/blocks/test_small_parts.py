@@ -111,14 +111,14 @@ def test_exceptions_are_explained():
 
 
 def test_event_block_keeps_newest_events_and_counts_dropped_ones():
-    hat = ScriptTrigger("x", max_waiting=3)
+    hat = ScriptTrigger("x", max_queued=3)
     for number in range(5):
         hat.enqueue((number,))
-    assert hat.dropped == 2
-    lone = ScriptTrigger("x", max_waiting=1)
+    assert hat.dropped_count == 2
+    lone = ScriptTrigger("x", max_queued=1)
     lone.enqueue(())
     lone.enqueue(())
-    assert lone.dropped == 0  # a queue of one replaces the waiting event, which isn't counted as a drop
+    assert lone.dropped_count == 0  # a queue of one replaces the waiting event, which isn't counted as a drop
 
 
 def test_threshold_fires_only_when_crossed():

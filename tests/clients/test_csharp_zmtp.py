@@ -314,7 +314,7 @@ def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignSer
         ("it does not speak ZMTP", b"HTTP/1.1 400 Bad Request\r\n\r\n" + bytes(60), False),
         ("it does not speak ZMTP", b"SSH-2.0-OpenSSH\r\n", True),
         ("it sent nothing", b"", True),
-        ("it sent half a handshake", GREETING, True),
+        ("it sent an incomplete handshake", GREETING, True),
         ("it speaks a version of ZMTP before 3", GREETING.replace(b"\x03\x00NULL", b"\x01\x00NULL"), True),
         ("it reports an error: too?hot", GREETING + b"\x04\x0e\x05ERROR\x07too\nhot", True),
         ("it sent a malformed handshake", GREETING + b"\x00\x01x", True),

@@ -286,7 +286,7 @@ def test_call_ends_when_its_server_is_killed(program):
     with running(MORTAL_SERVER) as server:
         assert server.line() == "ready"
         ended = program.reply(program.begin("call", service="/die", value=1, timeout_s=LONG_S))
-    assert "ended" in ended["error"]
+    assert "exited" in ended["error"]
 
 
 def test_programs_of_the_readme_exchange_messages(python, tmp_path):
@@ -415,7 +415,7 @@ def test_robot_declared_in_javascript_is_parsed_with_its_types_in_python(tmp_pat
     assert [each.kind for each in go.parameters] == [
         "number", "integer", "colour", "image", "list", "object", "choice", "choice", "boolean", "text",
     ]  # fmt: skip
-    assert [each.name for each in go.parameters if each.required] == ["image", "object", "named", "text"]
+    assert [each.name for each in go.parameters if each.is_required] == ["image", "object", "named", "text"]
     assert [(each.kind, each.topic) for each in robot.sensors] == [
         ("image", "/My_robot/camera"), ("object", "/My_robot/pose"),
     ]  # fmt: skip

@@ -56,7 +56,7 @@ def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Sessi
             "call": "restart replied",
             "send": "sent to /say",
             "keep": "nothing saved: the flight recorder is off",
-            "run": "“Greeting” wasn't run: no window is open",
+            "run": "“Greeting” wasn't started: no window is open",
         }
         said = alert(session, rule)
         assert said.title == "Range of /distance is 0.36, below 0.4."
@@ -91,7 +91,7 @@ def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, mast
         tick_until(session, lambda: session.alarms.history.records[0].action_results)
         assert (
             session.alarms.history.records[0].action_results[0].text
-            == "not sent: Rover isn't allowed to move"
+            == "not sent: no permission to move Rover"
         )
         session.alarms.set_rule(AlarmRule("e", BELOW, rule.actions))
         publisher.publish({"range": 0.1})

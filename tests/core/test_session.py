@@ -137,7 +137,7 @@ def test_alert_about_a_crashed_virtual_robot_offers_a_restart(session: Session) 
     session.launcher._robots["Pepper"][0].kill()
     tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
-    assert (alert.button, alert.action) == ("Restart it", "connect:Pepper")
+    assert (alert.button, alert.action) == ("Restart the robot", "connect:Pepper")
     tick_until(session, lambda: not session.fleet.connected)
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
@@ -215,7 +215,7 @@ def test_virtual_robot_whose_process_ended_needs_no_manual_switch_off(session: S
     assert not session.alerts.has("stop")
     assert session.alerts.has("companion:Pepper")
     session.launcher.start_virtual_robot("Pepper")
-    assert session.launcher.ended == frozenset()
+    assert session.launcher.ended_robots == frozenset()
 
 
 def test_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:

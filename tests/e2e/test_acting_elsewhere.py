@@ -78,7 +78,7 @@ def test_click_in_an_image_publishes_its_pixel_only_after_arming(studio: Studio,
         assert (point["width"], point["height"], point["topic"]) == (WIDTH, HEIGHT, "/webcam")
         assert abs(point["x"] - WIDTH / 2) <= 2
         assert abs(point["y"] - HEIGHT / 2) <= 2
-        studio.says("1 point sent, received by 1")
+        studio.says("1 point sent, 1 subscriber")
         Fingers(studio).press("F12")
         studio.says("Clicks aren't sent until you arm sending")
         studio.screen.click(*middle(picture["rect"]))

@@ -44,7 +44,7 @@ def test_ctrl_c_stops_the_program_and_the_robot(pepper: Program, tmp_path: Path)
 def test_missing_robot_is_reported_with_exit_code_3(master: Master, tmp_path: Path) -> None:
     with run(write(tmp_path / "Hello.nepb", started(say("Hello"))), "--robot-wait", "0.5") as program:
         assert program.wait(20) == 3, program.lines
-        program.says("Pepper not found. Switch it on, or start the virtual robot.")
+        program.says("Not found: Pepper. Switch on the robots or start virtual ones.")
 
 
 def test_invalid_behaviour_file_exits_with_code_2_without_traceback(master: Master, tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_plot_shows_a_value_dragged_from_the_inspector_and_a_typed_field_path(
         studio.screen.key("Return")
         until(lambda: len(curves(studio)) == 2, "what was typed is plotted")
         studio.screen.key(" ")
-        studio.says("paused; data is still recorded")
+        studio.says("paused; still collecting data")
         studio.screen.key("m")
         studio.says("Min, max and mean between A and B")
         studio.click("Resume")

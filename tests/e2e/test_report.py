@@ -60,7 +60,7 @@ def test_native_crash_is_offered_once_and_its_report_is_written(
     again.screen.key("a", ["Ctrl"])
     again.screen.type(str(documents / "report.zip"))
     again.screen.key("Return")
-    again.says("The report is in")
+    again.says("Report saved to")
     with zipfile.ZipFile(documents / "report.zip") as archive:
         found = {name: archive.read(name).decode("utf-8", "replace") for name in archive.namelist()}
     assert found["what-happened.txt"] == "it went away"

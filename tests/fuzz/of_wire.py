@@ -62,7 +62,7 @@ def split(data: bytes) -> None:
 
 
 def notices() -> Iterator[bytes]:
-    for kind in ({}, {"one_part": True}, {"acknowledges_echoes": True}, {"batches": True}):
+    for kind in ({}, {"reads_one_part": True}, {"acknowledges_echoes": True}, {"reads_batches": True}):
         yield wire.hello_part(0x1234, "tö/pic", **kind)
     yield wire.acknowledgement_part(wire.Acknowledgement(1, 2, 3, 2**64 - 1))
     yield wire.acceptance_part(wire.OfferAcceptance(1, 2, 3))
@@ -78,9 +78,9 @@ def filters(data: bytes) -> None:
         made = wire.hello_part(
             hello.subscriber,
             hello.topic,
-            one_part=hello.reads_one_part,
-            acknowledges_echoes=hello.acknowledges,
-            batches=hello.reads_batches,
+            reads_one_part=hello.reads_one_part,
+            acknowledges_echoes=hello.acknowledges_echoes,
+            reads_batches=hello.reads_batches,
         )
         assert made.lower() == data.lower()
     read = wire.parse_acknowledgement(data)

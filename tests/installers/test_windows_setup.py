@@ -186,7 +186,7 @@ def test_failed_update_keeps_the_old_version_intact(windows: Windows) -> None:
     finally:
         subprocess.run(["chattr", "-i", last], check=True)
     assert code == IMPOSSIBLE
-    assert "can't be replaced: another program uses them" in said
+    assert "can't be replaced because another program uses them" in said
     assert {path.name: path.read_bytes() for path in windows.folder.glob("*.*")} == before
     assert (windows.folder / "_internal/a.dll").read_text("utf-8") == "_internal/a.dll 1.2.3"
     assert not (windows.folder / "new~").exists()
@@ -208,7 +208,7 @@ def test_update_succeeds_after_an_interrupted_update(windows: Windows) -> None:
 def test_unwritable_install_folder_is_reported(computer: Windows) -> None:
     code, said = computer.run(computer.setups["1.2.3"], "/S", r"/D=Z:\proc\studio")
     assert code == IMPOSSIBLE
-    assert r"You may not write into this folder: Z:\proc\studio" in said
+    assert r"Setup can't write to this folder: Z:\proc\studio" in said
     assert computer.registry(UNINSTALL, "DisplayVersion") == ""
 
 

@@ -81,7 +81,9 @@ def test_log_command_shows_hostile_records_and_the_next_valid_record(master, typ
         publishing(master.address, LOG_TOPIC, LOG_TYPE, payloads),
     ):
         latched = node.new_pub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, latched=True)
-        latched.publish_bytes(json.dumps([RECORD] * 2).replace('"x"', hostile.VALUES["half letter"]).encode())
+        latched.publish_bytes(
+            json.dumps([RECORD] * 2).replace('"x"', hostile.VALUES["lone surrogate"]).encode()
+        )
         done = type_in("log", "--level", "debug", "--node", "honest", "-n", "1", "--master", master.address)
     assert done.returncode == 0
     assert "honest" in done.stdout
@@ -135,7 +137,7 @@ def test_recorder_and_exports_keep_the_next_message_after_hostile_messages(tmp_p
         nep.node("recorder", "memory", master="hostile") as node,
         nep.node("evil", "memory", master="hostile") as evil,
         RecordingWriter(tmp_path / "a.mcap", limits=limits()) as writer,
-        Recorder(node, writer, TopicSelection(("/pose", LOG_TOPIC)), look_s=0.05),
+        Recorder(node, writer, TopicSelection(("/pose", LOG_TOPIC)), poll_interval_s=0.05),
     ):
         for publisher in (evil.new_pub("/pose"), evil.new_pub(LOG_TOPIC, LOG_TYPE)):
             eventually(lambda publisher=publisher: publisher.subscribers > 0)

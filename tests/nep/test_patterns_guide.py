@@ -39,4 +39,7 @@ def test_guide_program_prints_the_documented_output(master: Master, head: str) -
 
 
 def test_patterns_guide_has_one_program_per_pattern() -> None:
-    assert len(_programs()) == 6
+    sections = dict(_SECTION.findall(_GUIDE))
+    assert sections
+    assert {head: text.count("```python\n") for head, text in sections.items()} == dict.fromkeys(sections, 1)
+    assert _programs().keys() == sections.keys()

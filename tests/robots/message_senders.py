@@ -101,7 +101,7 @@ def answer(id: object, state: str, op: str = "invoke", **more: object) -> dict[s
     return {**told, **more}
 
 
-class WhoseWordsCount:
+class MessageSenderContract:
     """Test cases; a subclass provides the fixture `side`."""
 
     @pytest.fixture

@@ -91,7 +91,7 @@ def test_safe_stop_is_read_from_the_description():
     robot = parse(model("pepper"))
     assert robot.safe_stop.action == "stop"
     assert (robot.safe_stop.watchdog_s, robot.safe_stop.within_s) == (1.0, 0.2)
-    assert robot.safe_stop.confirmed
+    assert robot.safe_stop.can_confirm
     assert robot.virtual
 
 

@@ -32,7 +32,7 @@ def Topic(name: str, msg_type: str = "json", codec: str = "json", **more: object
     }
     made = topics_module.Topic(name, msg_type, codec, **(given | more))  # type: ignore[arg-type]
     if made.gone_s is not None:
-        made.gone_since = -made.gone_s
+        made.gone_since_s = -made.gone_s
     return made
 
 
@@ -116,8 +116,8 @@ FOUND = (
     Finding(
         "port:7000",
         "warning",
-        "The AirPlay Receiver uses port 7000, where programs of nep up to 0.5.4.5, nep-js and C# ask.",
-        "Turn it off in System Settings, under General > AirDrop & Handoff.",
+        "The AirPlay Receiver uses port 7000, which programs of nep up to 0.5.4.5, nep-js and C# connect to.",
+        "Turn off AirPlay Receiver in System Settings, under General > AirDrop & Handoff.",
     ),
     Finding("versions", "info", "NEP Studio 0.1.0, Python 3.11.7, pyzmq 27.3.0, libzmq 4.3.5, Linux 6.18."),
     Finding("loopback", "ok", "Programs on this computer can reach each other (127.0.0.1)."),
@@ -250,29 +250,29 @@ def _choices(*pairs: tuple[str, str]) -> tuple[Choice, ...]:
 
 ACTIONS = (
     _action("say", "say", "message-circle", [
-        Parameter("text", "text", "text", default="Nice to meet you, Aiko.", required=True, min_length=1,
+        Parameter("text", "text", "text", default="Nice to meet you, Aiko.", is_required=True, min_length=1,
             max_length=300),
         Parameter("volume", "volume", "integer", 0, 100, 5, "%", 60),
         Parameter("language", "language", "choice", default="en",
                   choices=_choices(("en", "English"), ("fr", "French"), ("ja", "Japanese"))),
     ], category="Speech", cancellable=True),
     _action("turn", "turn", "rotate-ccw", [
-        Parameter("angle", "angle", "angle", -180, 180, 5, "°", 30, required=True),
-        Parameter("speed", "speed", "number", 10, 90, 1, "°/s", 40, advanced=False),
+        Parameter("angle", "angle", "angle", -180, 180, 5, "°", 30, is_required=True),
+        Parameter("speed", "speed", "number", 10, 90, 1, "°/s", 40, is_advanced=False),
     ], cancellable=True),
     _action("light", "light", "lightbulb", [
         Parameter("where", "where", "choice", default="eyes",
                   choices=_choices(("eyes", "Eyes"), ("shoulders", "Shoulders"), ("both", "Both"))),
-        Parameter("colour", "colour", "colour", default="#3ab7ff", required=True),
+        Parameter("colour", "colour", "colour", default="#3ab7ff", is_required=True),
     ], category="Face and lights"),
     _action("walk", "walk", "footprints", [
-        Parameter("distance", "distance", "number", -1, 1, 0.05, "m", 0.5, required=True),
+        Parameter("distance", "distance", "number", -1, 1, 0.05, "m", 0.5, is_required=True),
     ], risk="moves", cancellable=True),
     _action("emotion", "show emotion", "smile", [
         Parameter("emotion", "emotion", "choice", default="happy", choices=_choices(
             ("neutral", "neutral"), ("happy", "happy"), ("sad", "sad"), ("surprised", "surprised"),
             ("angry", "angry"))),
-        Parameter("seconds", "for", "number", 0, 60, 0.5, "s", 2, advanced=True),
+        Parameter("seconds", "for", "number", 0, 60, 0.5, "s", 2, is_advanced=True),
         Parameter("gestures", "gestures", "boolean", default=True),
     ], category="Face and lights"),
     _action("listen", "listen for", "ear", [
@@ -280,7 +280,7 @@ ACTIONS = (
         Parameter("picture", "picture", "image"),
         Parameter("count", "count", "integer", default=1),
     ], category="Speech"),
-    _action("stop", "stop everything", "square", [], synchronous=True),
+    _action("stop", "stop everything", "square", [], is_synchronous=True),
 )  # fmt: skip
 
 SENSORS = (

@@ -95,7 +95,7 @@ def show(name: str, session: Session, theme: Theme, folder: Path, suffix: str) -
     dock.resize(width, height)
     dock.show()
     wait(10)  # until exposed: hidden panels aren't updated
-    dock.front = True
+    dock.is_front = True
     prepare(name, widget)
     for _ in range(8):
         session.tick()
@@ -119,7 +119,7 @@ def shown_panel(
     dock.resize(width, height)
     with qtbot.waitExposed(dock):  # hidden panels aren't updated
         dock.show()
-    dock.front = True
+    dock.is_front = True
     qtbot.waitUntil(dock.is_displayed)
     if session.fleet.links:
         prepare(name, widget)

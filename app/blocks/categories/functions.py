@@ -82,7 +82,7 @@ CATEGORY = Category(
             python="",
             arguments=(_INPUTS,),
             mutator="call",
-            in_toolbox=False,
+            is_in_toolbox=False,
             search_words="call, run, do, use, procedure, own block",
         ),
         _value(
@@ -93,7 +93,7 @@ CATEGORY = Category(
             python="",
             arguments=(_INPUTS,),
             mutator="call",
-            in_toolbox=False,
+            is_in_toolbox=False,
             search_words="call, run, use, result, procedure, own block",
         ),
         _value(
@@ -104,7 +104,7 @@ CATEGORY = Category(
             python="%INPUT",
             arguments=(InputField("INPUT"),),
             can_fail=False,
-            in_toolbox=False,
+            is_in_toolbox=False,
             search_words="input, parameter, argument, value",
         ),
     ),

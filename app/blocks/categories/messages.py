@@ -22,7 +22,7 @@ CATEGORY = Category(
             tooltip="Sends a value to all programs that subscribe to this topic.",
             python="publish(%TOPIC, %VALUE)",
             arguments=(ValueInput("VALUE", None, "hello"), TopicField("TOPIC")),
-            publishes=True,
+            is_publisher=True,
             search_words="send, topic, tell, transmit, post, message, network, share",
         ),
         Block(
@@ -34,7 +34,7 @@ CATEGORY = Category(
             tooltip="Sends a message with one named field, such as {“name”: “Ada”}.",
             python="publish(%TOPIC, {%FIELD: %VALUE})",
             arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
-            publishes=True,
+            is_publisher=True,
             search_words="send, topic, json, key, named, field, message, network",
         ),
         Block(

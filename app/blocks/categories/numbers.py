@@ -116,8 +116,8 @@ _FURTHER_BLOCKS = (
         "%FUNCTION of %NUMBER",
         icon="square-radical",
         tooltip="Calculates a mathematical function of a number.",
-        help="sin, cos and tan take an angle in degrees; asin, acos and atan return one. “log” is the "
-        "base-10 logarithm, “ln” the natural logarithm. The absolute value of −5 is 5; "  # noqa: RUF001
+        help="sin, cos and tan take an angle in degrees; asin, acos and atan return an angle in degrees. "
+        "“log” is the base-10 logarithm, “ln” the natural logarithm. The absolute value of −5 is 5; "  # noqa: RUF001
         "the sign is 1, 0 or −1.",  # noqa: RUF001
         python={value: python for _words, value, python in _FUNCTIONS},
         arguments=(

@@ -45,11 +45,11 @@ def robot_blocks(robot: Robot, all_robots: Sequence[Robot]) -> tuple[Block, ...]
         robot: Description of the robot.
         all_robots: All robots; the drop-down of the robot's blocks offers the robots of the same model.
     """
-    alike = [other.name for other in all_robots if other.model == robot.model] or [robot.name]
-    blocks = [_action_block(robot, action, alike) for action in robot.actions]
-    blocks += [_sensor_block(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
-    blocks += [_event_block(robot, event, alike) for event in robot.events if event.text]
-    return (*blocks, *_change_event_blocks(robot, alike))
+    robot_names = [other.name for other in all_robots if other.model == robot.model] or [robot.name]
+    blocks = [_action_block(robot, action, robot_names) for action in robot.actions]
+    blocks += [_sensor_block(robot, sensor, robot_names) for sensor in robot.sensors if _has_block(sensor)]
+    blocks += [_event_block(robot, event, robot_names) for event in robot.events if event.text]
+    return (*blocks, *_change_event_blocks(robot, robot_names))
 
 
 def robot_groups(robot: Robot, all_robots: Sequence[Robot]) -> tuple[Group, ...]:
@@ -85,15 +85,15 @@ def _has_block(sensor: Sensor) -> bool:
     )
 
 
-def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
-    parts = BlockTemplate(action.text, [parameter.name for parameter in action.parameters])
-    arguments = [robot_field(robot.model, alike)]
+def _action_block(robot: Robot, action: Action, robot_names: Sequence[str]) -> Block:
+    template = BlockTemplate(action.text, [parameter.name for parameter in action.parameters])
+    arguments = [robot_field(robot.model, robot_names)]
     inputs = [
-        (parameter, input_of(parameter, parts.arguments[parameter.name]))
+        (parameter, input_of(parameter, template.arguments[parameter.name]))
         for parameter in action.parameters
-        if parameter.name in parts.shown
+        if parameter.name in template.shown_parameters
     ]
-    returns = _result_field(robot, action)
+    result_field = _result_field(robot, action)
     names_and_titles = [action.name, action.title, *_semantic_types(robot, "actions", action.name)]
     names_and_titles += [parameter.name for parameter in action.parameters]
     keywords = action_search_words(names_and_titles, action.uses)
@@ -101,31 +101,33 @@ def _action_block(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
     request_code = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
     return Block(
         type=block_type_of(robot.model, "do", action.name),
-        text=parts.text,
-        shape="statement" if returns is None else "value",
+        text=template.text,
+        shape="statement" if result_field is None else "value",
         style="robot",
         icon=action.icon or "bot",
         tooltip=_tooltip(robot, action),
-        python=action_code if returns is None else request_code,
+        python=action_code if result_field is None else request_code,
         arguments=(*arguments, *(argument for _, argument in inputs)),
-        constants={"X_NAME": action.name} | ({} if returns is None else {"X_FIELD": returns}),
+        constants={"X_NAME": action.name} | ({} if result_field is None else {"X_FIELD": result_field}),
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
-        about={argument.name: (parameter.title, format_limits(parameter)) for parameter, argument in inputs},
+        slot_texts={
+            argument.name: (parameter.title, format_limits(parameter)) for parameter, argument in inputs
+        },
         search_words=", ".join((keywords.words, translate("category", _group_title(action)))),
         english_search_words=keywords.english,
     )
 
 
 def _tooltip(robot: Robot, action: Action) -> str:
-    document = display_text(_member(robot, "actions", action.name), "description")
-    document = document or f"{robot.title}: {action.title}."
-    return _("{what_it_does} The next block waits until it is done.").format(what_it_does=document)
+    description = display_text(_member(robot, "actions", action.name), "description")
+    description = description or f"{robot.title}: {action.title}."
+    return _("{what_it_does} The next block waits until it is done.").format(what_it_does=description)
 
 
-def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
-    parts = BlockTemplate(sensor.text, [])
-    robots = robot_field(robot.model, alike)
+def _sensor_block(robot: Robot, sensor: Sensor, robot_names: Sequence[str]) -> Block:
+    template = BlockTemplate(sensor.text, [])
+    robots = robot_field(robot.model, robot_names)
     keywords = sensor_search_words(
         (sensor.name, sensor.title, *_semantic_types(robot, "properties", sensor.name))
     )
@@ -133,7 +135,7 @@ def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
         return Block(
             type=block_type_of(robot.model, "get", sensor.name),
-            text=f"{parts.text} %FIELD %LIVE",
+            text=f"{template.text} %FIELD %LIVE",
             shape="value",
             style="sensors",
             icon=sensor.icon or "eye",
@@ -145,17 +147,17 @@ def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
             search_words=keywords.words,
             english_search_words=keywords.english,
         )
-    boolean = sensor.kind == "boolean"
+    is_boolean = sensor.kind == "boolean"
     return Block(
         type=block_type_of(robot.model, "get", sensor.name),
-        text=parts.text if boolean else f"{parts.text} %LIVE",
-        shape="boolean" if boolean else "value",
+        text=template.text if is_boolean else f"{template.text} %LIVE",
+        shape="boolean" if is_boolean else "value",
         style="sensors",
         icon=sensor.icon or "eye",
         tooltip=_("Value reported by the robot: {sensor}.").format(sensor=sensor.title),
         python="robot(%ROBOT).get(%X_NAME)",
-        arguments=(robots,) if boolean else (robots, LiveField("LIVE")),
-        check="Boolean" if boolean else "Number" if sensor.kind in _NUMBER_KINDS else "String",
+        arguments=(robots,) if is_boolean else (robots, LiveField("LIVE")),
+        check="Boolean" if is_boolean else "Number" if sensor.kind in _NUMBER_KINDS else "String",
         constants={"X_NAME": sensor.name},
         robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
         search_words=keywords.words,
@@ -163,24 +165,24 @@ def _sensor_block(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
     )
 
 
-def _event_block(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
-    parts = BlockTemplate(event.text, list(event.filters))
+def _event_block(robot: Robot, event: Event, robot_names: Sequence[str]) -> Block:
+    template = BlockTemplate(event.text, list(event.filters))
     fields = {field.name: field for field in event.fields}
     filters = [
-        (name, field_of(fields.get(name), parts.arguments[name]))
+        (name, field_of(fields.get(name), template.arguments[name]))
         for name in event.filters
-        if name in parts.shown
+        if name in template.shown_parameters
     ]
     keywords = sensor_search_words((event.name, event.title, *_semantic_types(robot, "events", event.name)))
     return Block(
         type=block_type_of(robot.model, "when", event.name),
-        text=parts.text,
+        text=template.text,
         shape="hat",
         style="events",
         icon=event.icon or "zap",
         tooltip=_("The blocks below run each time the robot reports: {event}.").format(event=event.title),
         python="robot(%ROBOT).on(%X_NAME, **%X_INPUT)",
-        arguments=(robot_field(robot.model, alike), *(argument for _, argument in filters)),
+        arguments=(robot_field(robot.model, robot_names), *(argument for _, argument in filters)),
         constants={"X_NAME": event.name},
         keywords={"X_INPUT": tuple((argument.name, name) for name, argument in filters)},
         robot=RobotUse("event", event.name, event.title, robot.model),
@@ -189,7 +191,7 @@ def _event_block(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
     )
 
 
-def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
+def _change_event_blocks(robot: Robot, robot_names: Sequence[str]) -> tuple[Block, ...]:
     observable_sensors = [
         sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS
     ]
@@ -205,7 +207,7 @@ def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...
                 icon="activity",
                 tooltip=_("The blocks below run each time the value of this sensor changes."),
                 python="robot(%ROBOT).on_change(%SENSOR)",
-                arguments=(robot_field(robot.model, alike), _sensor_field(observable_sensors)),
+                arguments=(robot_field(robot.model, robot_names), _sensor_field(observable_sensors)),
                 robot=RobotUse("sensor", "", "changes", robot.model),
                 search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).words,
                 english_search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).english,
@@ -222,7 +224,7 @@ def _change_event_blocks(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...
                 tooltip=_("The blocks below run each time the value of this sensor crosses the limit."),
                 python="robot(%ROBOT).on_pass(%SENSOR, %SIDE, %LIMIT)",
                 arguments=(
-                    robot_field(robot.model, alike),
+                    robot_field(robot.model, robot_names),
                     _sensor_field(numbers),
                     ChoiceField(
                         "SIDE",

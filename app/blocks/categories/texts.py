@@ -111,7 +111,7 @@ _PART_BLOCKS = (
         "texts_change",
         "%TEXT %CHANGE",
         icon="case-upper",
-        tooltip="The text in capital letters, in small ones, without spaces around it, or backwards.",
+        tooltip="The text in capital letters, in small letters, without spaces around it, or backwards.",
         python={
             "capitals": "in_capitals(%TEXT)",
             "small": "in_small_letters(%TEXT)",

@@ -70,7 +70,7 @@ class _UsedResources:
                 self.events[robot, name] = None
         for argument in block.arguments:
             if isinstance(argument, TopicField):
-                topics = self.publishes if block.publishes else self.listens
+                topics = self.publishes if block.is_publisher else self.listens
                 topics[str(saved_value(block, placed_block, argument.name))] = None
 
 
@@ -144,9 +144,11 @@ class _Compiler:
         self._numbers: set[str] = set()  # blocks that must return a number
 
     def program(self) -> Program:
-        definitions = self._definitions()
+        definitions = self._compile_definitions()
         functions = [
-            function for script in self._workspace.scripts if (function := self._script(script)) is not None
+            function
+            for script in self._workspace.scripts
+            if (function := self._compile_script(script)) is not None
         ]
         self._problems.check_starts(len(functions))
         self._name_usage.report(self._problems, self._workspace)
@@ -193,9 +195,9 @@ class _Compiler:
 
     # ---- scripts and statements
 
-    def _script(self, script: tuple[PlacedBlock, ...]) -> ast.stmt | None:
+    def _compile_script(self, script: tuple[PlacedBlock, ...]) -> ast.stmt | None:
         first = script[0]
-        if not first.enabled:
+        if not first.is_enabled:
             return None
         block = self._usable_block(first)
         if block is None or block.shape == "definition":
@@ -207,7 +209,7 @@ class _Compiler:
             return None
         self._has_message = bool(block.parameters)
         try:
-            expressions = self._expressions(first, block)
+            expressions = self._compile_arguments(first, block)
         except _SkippedBlock:
             return None
         decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
@@ -217,7 +219,7 @@ class _Compiler:
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
             {"DECORATOR": decorator},
-            {"BODY": self._statements(script[1:])},
+            {"BODY": self._compile_statements(script[1:])},
         )
         if isinstance(function, ast.FunctionDef):
             function.name = self._names.new_name(self._store_block_text(first), "script")
@@ -225,21 +227,23 @@ class _Compiler:
         self._block_ids[function] = first.id
         return function
 
-    def _definitions(self) -> list[ast.stmt]:
+    def _compile_definitions(self) -> list[ast.stmt]:
         definitions: list[ast.stmt] = []
         for script in self._workspace.scripts:
             self._function = self._lowering.function(script[0])
             if self._function is not None and self._usable_block(script[0]) is not None:
-                definitions.append(self._definition(script[0], self._function))
+                definitions.append(self._compile_definition(script[0], self._function))
         self._function = None
         return definitions
 
-    def _definition(self, placed_block: PlacedBlock, function: Function) -> ast.stmt:
+    def _compile_definition(self, placed_block: PlacedBlock, function: Function) -> ast.stmt:
         self._has_message = False
         self._store_block_text(placed_block)
-        body = self._statements(placed_block.inputs.get("BODY", ()) if placed_block.enabled else ())
+        body = self._compile_statements(
+            placed_block.inputs.get("BODY", ()) if placed_block.is_enabled else ()
+        )
         if function.has_result:
-            body += self._statement(replace(placed_block, type=f"{END_BLOCK}:{placed_block.id}"))
+            body += self._compile_statement(replace(placed_block, type=f"{END_BLOCK}:{placed_block.id}"))
         (definition,) = statements("def script():\n    %BODY", {}, {"BODY": body})
         if isinstance(definition, ast.FunctionDef):
             definition.name = function.python_name
@@ -250,22 +254,22 @@ class _Compiler:
 
     def _declare_globals(self, function: ast.FunctionDef) -> None:
         variable_names = set(self._variables.values())
-        stored = {
+        assigned_names = {
             node.id
             for node in ast.walk(function)
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in variable_names
         }
-        if stored:
-            function.body.insert(0, ast.Global(sorted(stored)))
+        if assigned_names:
+            function.body.insert(0, ast.Global(sorted(assigned_names)))
 
-    def _statements(self, chain: Sequence[PlacedBlock]) -> list[ast.stmt]:
+    def _compile_statements(self, chain: Sequence[PlacedBlock]) -> list[ast.stmt]:
         body: list[ast.stmt] = []
         for placed_block in chain:
-            if placed_block.enabled:
-                body += self._statement(placed_block)
+            if placed_block.is_enabled:
+                body += self._compile_statement(placed_block)
         return body
 
-    def _statement(self, placed_block: PlacedBlock) -> list[ast.stmt]:
+    def _compile_statement(self, placed_block: PlacedBlock) -> list[ast.stmt]:
         if placed_block.has_breakpoint:
             self._breakpoints[placed_block.id] = None
         block = self._usable_block(placed_block)
@@ -275,28 +279,28 @@ class _Compiler:
             self._problems.report_misplaced(placed_block, block)
             return []
         self._store_block_text(placed_block)
-        missing = self._problems.report_empty_slot(placed_block, block)
-        if missing is not None:
+        slot_error = self._problems.report_empty_slot(placed_block, block)
+        if slot_error is not None:
             return self._record_block_id(
-                statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed_block
+                statements("fail(%SENTENCE)", {"SENTENCE": literal(slot_error)}), placed_block
             )
         try:
-            expressions = self._expressions(placed_block, block)
+            expressions = self._compile_arguments(placed_block, block)
         except _SkippedBlock:
             return []
         self._uses.add(placed_block, block)
         self._name_usage.add(placed_block, block)
         self._problems.report_hints(placed_block, block)
-        if block.publishes:
+        if block.is_publisher:
             self._record_moved_robots(placed_block, block)
         bodies = {
-            argument.name: self._statements(placed_block.inputs.get(argument.name, ()))
+            argument.name: self._compile_statements(placed_block.inputs.get(argument.name, ()))
             for argument in block.arguments
             if isinstance(argument, StatementInput)
         }
         text = self._template(block, placed_block)
         compiled = statements(text, expressions, bodies, keywords(block, expressions))
-        if block.calls_function and isinstance(compiled[0], ast.Expr):
+        if block.is_function_call and isinstance(compiled[0], ast.Expr):
             self._block_ids[compiled[0].value] = placed_block.id
             self._calls.add(placed_block.id)
         return self._record_block_id(compiled, placed_block)
@@ -320,20 +324,20 @@ class _Compiler:
 
     # ---- values
 
-    def _expressions(self, placed_block: PlacedBlock, block: Block) -> dict[str, ast.expr]:
+    def _compile_arguments(self, placed_block: PlacedBlock, block: Block) -> dict[str, ast.expr]:
         expressions = {name: literal(constant) for name, constant in block.constants.items()} | dict(
             block.constant_trees
         )
         for argument in block.arguments:
             if isinstance(argument, ValueInput):
-                expressions[argument.name] = self._value(placed_block, argument)
+                expressions[argument.name] = self._compile_value(placed_block, argument)
             elif isinstance(argument, Field) and not argument.is_display_only:
-                expressions[argument.name] = self._field(placed_block, block, argument)
+                expressions[argument.name] = self._compile_field(placed_block, block, argument)
         return expressions
 
-    def _value(self, parent: PlacedBlock, argument: ValueInput) -> ast.expr:
+    def _compile_value(self, parent: PlacedBlock, argument: ValueInput) -> ast.expr:
         inner = parent.inputs.get(argument.name, ())
-        if not inner or not inner[0].enabled:
+        if not inner or not inner[0].is_enabled:
             return literal(argument.default)
         placed_block = inner[0]
         block = self._usable_block(placed_block, parent)
@@ -346,44 +350,44 @@ class _Compiler:
             self._problems.report_no_message(placed_block, block)
             return literal(None)
         self._store_block_text(placed_block)
-        missing = self._problems.report_empty_slot(placed_block, block)
-        expressions = self._expressions(placed_block, block)
-        if missing is not None:
-            compiled = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
+        slot_error = self._problems.report_empty_slot(placed_block, block)
+        expressions = self._compile_arguments(placed_block, block)
+        if slot_error is not None:
+            compiled = expression("fail(%SENTENCE)", {"SENTENCE": literal(slot_error)})
         else:
             self._uses.add(placed_block, block)
             self._name_usage.add(placed_block, block)
             compiled = expression(
                 self._template(block, placed_block), expressions, keywords(block, expressions)
             )
-        if block.can_fail or missing is not None:
+        if block.can_fail or slot_error is not None:
             self._block_ids[compiled] = placed_block.id
-            if block.check == "Number" and missing is None:
+            if block.check == "Number" and slot_error is None:
                 self._numbers.add(placed_block.id)
-            if block.calls_function:
+            if block.is_function_call:
                 self._calls.add(placed_block.id)
         return compiled
 
-    def _field(self, placed_block: PlacedBlock, block: Block, field: Field) -> ast.expr:
+    def _compile_field(self, placed_block: PlacedBlock, block: Block, field: Field) -> ast.expr:
         try:
             value = field.read(placed_block.fields.get(field.name))
         except FieldError as error:
             self._problems.report_invalid_field(placed_block, block, error)
             raise _SkippedBlock from None
         if isinstance(field, InputField):
-            return self._input(placed_block, block, str(value))
+            return self._compile_input(placed_block, block, str(value))
         if isinstance(field, VariableField):
-            return ast.Name(self._variable(str(value)), ast.Load())
+            return ast.Name(self._variable_name(str(value)), ast.Load())
         return literal(value)
 
-    def _input(self, placed_block: PlacedBlock, block: Block, id: str) -> ast.expr:
+    def _compile_input(self, placed_block: PlacedBlock, block: Block, id: str) -> ast.expr:
         name = self._function.parameters.get(id) if self._function is not None else None
         if name is None:
             self._problems.report_unknown_input(placed_block, block)
             raise _SkippedBlock
         return ast.Name(name, ast.Load())
 
-    def _variable(self, id: str) -> str:
+    def _variable_name(self, id: str) -> str:
         if id not in self._variables:
             is_nameless = id in self._workspace.nameless_variables
             name = id if is_nameless else self._workspace.variables.get(id, id)
@@ -424,21 +428,21 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
         expressions: Expression of each argument by name.
     """
     keywords_by_placeholder: dict[str, list[ast.keyword]] = {}
-    for hole, pairs in block.keywords.items():
+    for placeholder, pairs in block.keywords.items():
         arguments = [
             ast.keyword(name, expressions[argument_name])
             for argument_name, name in pairs
             if _is_keyword_name(name)
         ]
-        odd = [
+        other_names = [
             (literal(name), expressions[argument_name])
             for argument_name, name in pairs
             if not _is_keyword_name(name)
         ]
-        if odd:
-            table = ast.Dict([key for key, _ in odd], [value for _, value in odd])
-            arguments.append(ast.keyword(None, table))
-        keywords_by_placeholder[hole] = arguments
+        if other_names:
+            dict_node = ast.Dict([key for key, _ in other_names], [value for _, value in other_names])
+            arguments.append(ast.keyword(None, dict_node))
+        keywords_by_placeholder[placeholder] = arguments
     return keywords_by_placeholder
 
 

@@ -79,7 +79,7 @@ class ConflictFinder:
         scripts = [
             script
             for script in self._workspace.scripts
-            if script[0].type == START_BLOCK and script[0].enabled
+            if script[0].type == START_BLOCK and script[0].is_enabled
         ]
         if len(scripts) < 2:
             return
@@ -100,36 +100,39 @@ class ConflictFinder:
     def _find_action_uses(
         self,
         chain: Sequence[PlacedBlock],
-        when: int = IMMEDIATE,
+        timing: int = IMMEDIATE,
         *,
-        endless: bool = False,
+        is_endless: bool = False,
         call_stack: tuple[str, ...] = (),
     ) -> tuple[list[ActionUse], int]:
         uses: list[ActionUse] = []
         for placed_block in chain:
-            if not placed_block.enabled:
+            if not placed_block.is_enabled:
                 continue
             robot_action = self._robot_action(placed_block)
             if robot_action is not None:
-                uses.append(ActionUse(placed_block, *robot_action, when, endless))
-                when = max(when, LATER)  # actions take time
+                uses.append(ActionUse(placed_block, *robot_action, timing, is_endless))
+                timing = max(timing, LATER)  # actions take time
             is_condition = placed_block.type.partition(":")[0] in _CONDITIONAL_BLOCKS
-            loops = endless or placed_block.type in _ENDLESS_BLOCKS
+            is_endless_inside = is_endless or placed_block.type in _ENDLESS_BLOCKS
             for inner in placed_block.inputs.values():
                 inner_uses, after = self._find_action_uses(
-                    inner, UNCERTAIN if is_condition else when, endless=loops, call_stack=call_stack
+                    inner,
+                    UNCERTAIN if is_condition else timing,
+                    is_endless=is_endless_inside,
+                    call_stack=call_stack,
                 )
                 uses += inner_uses
-                when = max(when, (LATER if inner_uses else when) if is_condition else after)
+                timing = max(timing, (LATER if inner_uses else timing) if is_condition else after)
             function = self._function(placed_block)
             if function is not None and function.definition.id not in call_stack:
                 body = function.definition.inputs.get("BODY", ())
-                inner_uses, when = self._find_action_uses(
-                    body, when, endless=endless, call_stack=(*call_stack, function.definition.id)
+                inner_uses, timing = self._find_action_uses(
+                    body, timing, is_endless=is_endless, call_stack=(*call_stack, function.definition.id)
                 )
                 uses += inner_uses
-            when = max(when, _TIMING_OF_WAIT_BLOCKS.get(placed_block.type, IMMEDIATE))
-        return uses, when
+            timing = max(timing, _TIMING_OF_WAIT_BLOCKS.get(placed_block.type, IMMEDIATE))
+        return uses, timing
 
     def _robot_action(self, placed_block: PlacedBlock) -> tuple[str, Action] | None:
         block = self._catalogue.blocks.get(placed_block.type)

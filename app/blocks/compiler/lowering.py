@@ -57,18 +57,22 @@ class Lowering:
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: PythonNames) -> None:
         self._catalogue = catalogue
         self.variables = workspace.variables  # without inputs of functions
-        self._by_id: dict[str, Function] = {}
+        self._functions_by_id: dict[str, Function] = {}
         for script in workspace.scripts:
-            if script[0].type in _HAS_RESULT and script[0].enabled:
-                self._by_id[script[0].id] = _parse_function(script[0], names)
-        self._by_name = {function.name: function for function in reversed(self._by_id.values())}
+            if script[0].type in _HAS_RESULT and script[0].is_enabled:
+                self._functions_by_id[script[0].id] = _parse_function(script[0], names)
+        self._functions_by_name = {
+            function.name: function for function in reversed(self._functions_by_id.values())
+        }
         scripts = tuple(tuple(map(self._lower, script)) for script in workspace.scripts)
-        input_names = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
+        input_names = {
+            each.id: each.name for function in self._functions_by_id.values() for each in function.inputs
+        }
         self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **input_names})
 
     def function(self, definition: PlacedBlock) -> Function | None:
         """Return the function that a block defines; None for disabled blocks and other blocks."""
-        return self._by_id.get(definition.id)
+        return self._functions_by_id.get(definition.id)
 
     def called_function(self, placed_block: PlacedBlock) -> Function | None:
         """Return the function that a block of the rewritten `workspace` calls; None if there is none."""
@@ -83,8 +87,8 @@ class Lowering:
         )
 
     def _find_function(self, placed_block: PlacedBlock) -> Function | None:
-        function = self._by_id.get(str(placed_block.extra_state.get("function")))
-        function = function or self._by_name.get(function_name(placed_block))
+        function = self._functions_by_id.get(str(placed_block.extra_state.get("function")))
+        function = function or self._functions_by_name.get(function_name(placed_block))
         return (
             None
             if function is None or (placed_block.type == CALL_RESULT and not function.has_result)
@@ -108,16 +112,16 @@ class Lowering:
         )
 
     def _lower_list(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
-        growing = next(argument for argument in block.arguments if isinstance(argument, Items))
-        gaps = growing.slots(placed_block.extra_state)
-        holes = [f"%{gap.name}" for gap in gaps]
-        hole = f"%{growing.name}"
+        items = next(argument for argument in block.arguments if isinstance(argument, Items))
+        slots = items.slots(placed_block.extra_state)
+        placeholders = [f"%{slot.name}" for slot in slots]
+        placeholder = f"%{items.name}"
         expanded_block = replace(
             block,
-            type=f"{block.type}:{len(gaps)}",
-            text=block.text.replace(hole, " ".join(holes)),
-            python=str(block.python).replace(hole, ", ".join(holes)),
-            arguments=gaps,
+            type=f"{block.type}:{len(slots)}",
+            text=block.text.replace(placeholder, " ".join(placeholders)),
+            python=str(block.python).replace(placeholder, ", ".join(placeholders)),
+            arguments=slots,
         )
         return self._register_type(placed_block, expanded_block)
 
@@ -162,8 +166,8 @@ class Lowering:
         function = self._find_function(placed_block)
         inputs = inputs_of(placed_block.extra_state) if function is None else function.inputs
         name = _escape_placeholders(function_name(placed_block) if function is None else function.name)
-        gaps, filled = _fill_slots(placed_block, inputs)
-        text = " ".join((name, *(f"{_escape_placeholders(each.name)} %{gap.name}" for each, gap in gaps)))
+        slots, inputs_by_slot = _fill_slots(placed_block, inputs)
+        text = " ".join((name, *(f"{_escape_placeholders(each.name)} %{slot.name}" for each, slot in slots)))
         expanded_block = replace(block, type=f"{block.type}:{placed_block.id}", text=text)
         if function is None:
             message = _("The function “{name}” is missing. Define it, or delete this block.").format(
@@ -174,13 +178,15 @@ class Lowering:
                 constants={"X_SENTENCE": message}, undefined_message=message,
             )  # fmt: skip
         else:
-            holes = ", ".join(f"%{gap.name}" for _, gap in gaps)
+            placeholders = ", ".join(f"%{slot.name}" for _, slot in slots)
             expanded_block = replace(
-                expanded_block, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
+                expanded_block,
+                arguments=tuple(slot for _, slot in slots),
+                python=f"%X_FUNCTION({placeholders})",
                 constant_trees={"X_FUNCTION": ast.Name(function.python_name, ast.Load())},
-                calls_function=True,
-            )  # fmt: skip
-        return self._register_type(replace(placed_block, inputs=filled), expanded_block)
+                is_function_call=True,
+            )
+        return self._register_type(replace(placed_block, inputs=inputs_by_slot), expanded_block)
 
     def _register_type(self, placed_block: PlacedBlock, block: Block) -> PlacedBlock:
         self._catalogue.blocks[block.type] = block
@@ -198,13 +204,13 @@ def _parse_function(placed_block: PlacedBlock, names: PythonNames) -> Function:
 def _fill_slots(
     placed_block: PlacedBlock, inputs: tuple[FunctionInput, ...]
 ) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[PlacedBlock, ...]]]:
-    gaps: list[tuple[FunctionInput, Argument]] = []
-    filled: dict[str, tuple[PlacedBlock, ...]] = {}
-    for number, (function_input, gap) in enumerate(Inputs("INPUTS").slots(inputs)):
-        gaps.append((function_input, ValueInput(f"G{number}")))
-        filled[f"G{number}"] = placed_block.inputs.get(gap.name, ())
-    return gaps, filled
+    slots: list[tuple[FunctionInput, Argument]] = []
+    inputs_by_slot: dict[str, tuple[PlacedBlock, ...]] = {}
+    for number, (function_input, slot) in enumerate(Inputs("INPUTS").slots(inputs)):
+        slots.append((function_input, ValueInput(f"G{number}")))
+        inputs_by_slot[f"G{number}"] = placed_block.inputs.get(slot.name, ())
+    return slots, inputs_by_slot
 
 
 def _escape_placeholders(text: str) -> str:
-    return text.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)
+    return text.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a placeholder)

@@ -120,7 +120,7 @@ class ProblemCollector:
         """Report a call of an undefined function."""
         self._add(
             "error", placed_block, block, self.label(placed_block, block), block.undefined_message,
-            fix=_("Define it"), fix_action=f"define:{placed_block.id}",
+            fix=_("Define the function"), fix_action=f"define:{placed_block.id}",
         )  # fmt: skip
 
     def report_never_set(
@@ -159,16 +159,16 @@ class ProblemCollector:
     def report_conflict(self, conflict: Conflict) -> None:
         """Report two scripts that use the same resource of a robot, at the block of the second script."""
         placed_block, name = conflict.second.block, conflict.second.action.title
-        part = _RESOURCE_NAMES.get(conflict.resource)
+        resource = _RESOURCE_NAMES.get(conflict.resource)
         template = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
-        if part is not None or conflict.resource != "base":
+        if resource is not None or conflict.resource != "base":
             template = _(
                 "“{action}” and “{other}” both use {part} of {robot} at the same time: "
                 "one replaces the other."
             )
         message = template.format(
             action=conflict.first.action.title, other=name, robot=conflict.second.robot,
-            part=_("the {part}").format(part=conflict.resource) if part is None else _(part),
+            part=_("the {part}").format(part=conflict.resource) if resource is None else _(resource),
         )  # fmt: skip
         self._add(
             "warning", placed_block, self._catalogue.blocks.get(placed_block.type), name, message,
@@ -197,10 +197,12 @@ class ProblemCollector:
         """
         robot = placed_block.fields.get("ROBOT")
         name = self.label(placed_block, block)
-        skipped = name
+        skipped_blocks = name
         if parent is not None:
-            outer = self.label(parent, self._catalogue.blocks.get(parent.type))
-            skipped = _("{outer_block} with {inner_block}").format(outer_block=outer, inner_block=name)
+            parent_label = self.label(parent, self._catalogue.blocks.get(parent.type))
+            skipped_blocks = _("{outer_block} with {inner_block}").format(
+                outer_block=parent_label, inner_block=name
+            )
         if (
             isinstance(robot, str)
             and robot not in self._catalogue.connected
@@ -208,7 +210,7 @@ class ProblemCollector:
         ):
             message = _("{robot} isn't connected, so {block} will be skipped.")
             self._add(
-                "warning", placed_block, block, name, message.format(robot=robot, block=skipped),
+                "warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks),
                 fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
             return True
@@ -217,7 +219,7 @@ class ProblemCollector:
             return True
         if isinstance(robot, str) and block.robot is not None and not self._is_supported(robot, block):
             message = _("{robot} can't do this, so {block} will be skipped.")
-            self._add("warning", placed_block, block, name, message.format(robot=robot, block=skipped))
+            self._add("warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks))
             return True
         return False
 
@@ -261,15 +263,15 @@ class ProblemCollector:
                 self._report_unknown(placed_block, self.label(placed_block, None))
 
     def _enabled_blocks(self) -> Iterator[PlacedBlock]:
-        waiting = [
+        pending = [
             placed_block for script in reversed(self._workspace.scripts) for placed_block in reversed(script)
         ]
-        while waiting:
-            placed_block = waiting.pop()
-            if placed_block.enabled:
+        while pending:
+            placed_block = pending.pop()
+            if placed_block.is_enabled:
                 yield placed_block
                 inner = [each for chain in placed_block.inputs.values() for each in chain]
-                waiting += reversed(inner)
+                pending += reversed(inner)
 
     def check_names(self) -> None:
         """Report used variables that have no name in the file."""
@@ -288,7 +290,7 @@ class ProblemCollector:
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
                         "variable in the block."
                     ).format(block=name),
-                    fix=_("Name it"), fix_action=f"variable.rename:{id}",
+                    fix=_("Name the variable"), fix_action=f"variable.rename:{id}",
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
@@ -321,7 +323,7 @@ class ProblemCollector:
             if not isinstance(argument, ValueInput):
                 continue
             inner = placed_block.inputs.get(argument.name, ())
-            if (inner and inner[0].enabled) or not argument.is_present(placed_block.fields):
+            if (inner and inner[0].is_enabled) or not argument.is_present(placed_block.fields):
                 continue
             name = self.label(placed_block, block)
             message = _("{block} needs {what}. Drag one into its slot.").format(
@@ -355,9 +357,9 @@ class ProblemCollector:
             topic: Name of the topic.
             robots: Names of the moved robots; virtual robots are not reported.
         """
-        real = [name for name in robots if not self._catalogue.connected[name].virtual]
-        if real:
-            robot_names, name = format_list(real), self.label(placed_block, block)
+        real_robots = [name for name in robots if not self._catalogue.connected[name].virtual]
+        if real_robots:
+            robot_names, name = format_list(real_robots), self.label(placed_block, block)
             message = _(
                 "{block} on {topic} moves {robots}. Studio asks for permission first; Stop ends the movement."
             )
@@ -378,9 +380,9 @@ class ProblemCollector:
             if value is not None:
                 literal_values[name] = value
         # Skip problems that exist without these values: the missing ones are computed at run time.
-        without = set(action.problems(action.complete({})))
+        existing_problems = set(action.problems(action.complete({})))
         for problem in action.problems(action.complete(literal_values)):
-            if problem not in without:
+            if problem not in existing_problems:
                 name = self.label(placed_block, block)
                 self._add("error", placed_block, block, name, f"{name}: {problem.message}.")
 

@@ -21,9 +21,9 @@ def render_source(body: Sequence[ast.stmt], marks: BlockIdByNode) -> tuple[str, 
         marks: Block ids by node.
     """
     parts: list[str] = []
-    for before, statement in zip((None, *body[:-1]), body, strict=True):
+    for previous, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
-        parts += (_blank_lines_between(before, statement), ast.unparse(statement).strip("\n"), "\n")
+        parts += (_blank_lines_between(previous, statement), ast.unparse(statement).strip("\n"), "\n")
     text = "".join(parts)
     lines: dict[int, str] = {}
     for original, parsed in _matched_statements(body, parse_module(text).body):
@@ -45,17 +45,17 @@ def render_instrumented(
         numbers: Ids of blocks that must return a number.
         calls: Ids of blocks that call a function.
     """
-    stepper = _Instrumenter(marks, numbers, calls)
-    steps: list[ast.stmt] = []
+    instrumenter = _Instrumenter(marks, numbers, calls)
+    instrumented: list[ast.stmt] = []
     for statement in body:
-        steps += stepper.instrument_statement(statement)
-    return ast.unparse(ast.fix_missing_locations(ast.Module(steps, []))) + "\n"
+        instrumented += instrumenter.instrument_statement(statement)
+    return ast.unparse(ast.fix_missing_locations(ast.Module(instrumented, []))) + "\n"
 
 
-def _blank_lines_between(before: ast.stmt | None, statement: ast.stmt) -> str:
-    if before is None or (isinstance(before, ast.Assign) and isinstance(statement, ast.Assign)):
+def _blank_lines_between(previous: ast.stmt | None, statement: ast.stmt) -> str:
+    if previous is None or (isinstance(previous, ast.Assign) and isinstance(statement, ast.Assign)):
         return ""
-    return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
+    return "\n\n" if isinstance(previous, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
 
 
 def _matched_statements(
@@ -98,7 +98,7 @@ class _Instrumenter(ast.NodeTransformer):
         return [_step_call(id), instrumented]
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
-        # Visits expressions only; `statement` handles nested statements.
+        # Visits expressions only; `instrument_statement` handles nested statements.
         for name, value in ast.iter_fields(node):
             if isinstance(value, list):
                 if not any(isinstance(item, ast.stmt) for item in value):
@@ -112,10 +112,10 @@ class _Instrumenter(ast.NodeTransformer):
         id = self._block_ids.get(node)
         if id is None or not isinstance(visited, ast.expr):
             return visited
-        empty = ast.arguments([], [], None, [], [], None, [])
-        later = ast.Lambda(empty, visited)
+        no_parameters = ast.arguments([], [], None, [], [], None, [])
+        deferred_value = ast.Lambda(no_parameters, visited)
         name = "called" if id in self._calls else "number" if id in self._numbers else "value"
-        return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
+        return ast.Call(ast.Name(name, ast.Load()), [literal(id), deferred_value], [])
 
 
 def _step_call(id: str) -> ast.stmt:

@@ -98,6 +98,6 @@ class Stack:
             return {"type": "messages_write", "id": SHOW_BLOCK_ID, "inputs": {"VALUE": {"block": block}}}
         if self.kind != "hat":
             return block
-        below = block.get("next")
-        first = below.get("block") if isinstance(below, dict) else None
+        next_connection = block.get("next")
+        first = next_connection.get("block") if isinstance(next_connection, dict) else None
         return first if isinstance(first, dict) else None

@@ -1,5 +1,5 @@
 // Builds the block editor: `node build.mjs [folder]` (default: resources/blockly of the repository).
-// The result is committed, so Studio needs no node; a test rebuilds it and compares.
+// The bundle is committed, so that Studio doesn't need Node.js; a test builds it again and compares.
 import {build} from 'esbuild';
 import {chmod, cp, mkdir, mkdtemp, readFile, rename, rm, writeFile} from 'node:fs/promises';
 import {dirname, join, resolve} from 'node:path';
@@ -12,51 +12,54 @@ const languages = ['en', 'de', 'es', 'fr', 'ja', 'pt-br'];
 const media = ['sprites.svg', 'handclosed.cur', 'handdelete.cur', 'handopen.cur', 'dropdown-arrow.svg',
   'delete-icon.svg', 'foldout-icon.svg', 'resize-handle.svg', '1x1.gif'];
 
-/** The lines of an icon as one path: a page with a thousand blocks draws each shape by itself. Null: not only lines. */
-function onePath(markup) {
+/**
+ * Returns the icon as one path, because a page with a thousand blocks would draw each shape separately; null if the
+ * icon has other elements or attributes.
+ */
+function mergeIntoPath(markup) {
   const parts = [];
   for (const [, tag, text] of markup.matchAll(/<(\w+)([^>]*?)\/?>/g)) {
-    const given = Object.fromEntries([...text.matchAll(/([\w-]+)="([^"]*)"/g)].map(([, name, value]) => [name, value]));
-    const {d, points, ...numbers} = given;
-    const of = (name) => Number(numbers[name] ?? 0);
-    const only = (...names) => Object.keys(numbers).every((name) => names.includes(name));
-    const ring = (x, y, rx, ry) => `M${x - rx} ${y}a${rx} ${ry} 0 1 0 ${2 * rx} 0a${rx} ${ry} 0 1 0 ${-2 * rx} 0z`;
-    if (tag === 'path' && only()) parts.push(d);
-    else if (tag === 'line' && only('x1', 'y1', 'x2', 'y2')) parts.push(`M${of('x1')} ${of('y1')}L${of('x2')} ${of('y2')}`);
-    else if (tag === 'polyline' && only()) parts.push(`M${points}`);
-    else if (tag === 'polygon' && only()) parts.push(`M${points}z`);
-    else if (tag === 'circle' && only('cx', 'cy', 'r')) parts.push(ring(of('cx'), of('cy'), of('r'), of('r')));
-    else if (tag === 'ellipse' && only('cx', 'cy', 'rx', 'ry')) parts.push(ring(of('cx'), of('cy'), of('rx'), of('ry')));
-    else if (tag === 'rect' && only('x', 'y', 'width', 'height', 'rx', 'ry')) parts.push(box(numbers, of));
+    const attributes = Object.fromEntries([...text.matchAll(/([\w-]+)="([^"]*)"/g)].map(([, name, value]) => [name, value]));
+    const {d, points, ...numbers} = attributes;
+    const num = (name) => Number(numbers[name] ?? 0);
+    const hasOnly = (...names) => Object.keys(numbers).every((name) => names.includes(name));
+    const ellipsePath = (x, y, rx, ry) => `M${x - rx} ${y}a${rx} ${ry} 0 1 0 ${2 * rx} 0a${rx} ${ry} 0 1 0 ${-2 * rx} 0z`;
+    if (tag === 'path' && hasOnly()) parts.push(d);
+    else if (tag === 'line' && hasOnly('x1', 'y1', 'x2', 'y2')) parts.push(`M${num('x1')} ${num('y1')}L${num('x2')} ${num('y2')}`);
+    else if (tag === 'polyline' && hasOnly()) parts.push(`M${points}`);
+    else if (tag === 'polygon' && hasOnly()) parts.push(`M${points}z`);
+    else if (tag === 'circle' && hasOnly('cx', 'cy', 'r')) parts.push(ellipsePath(num('cx'), num('cy'), num('r'), num('r')));
+    else if (tag === 'ellipse' && hasOnly('cx', 'cy', 'rx', 'ry')) parts.push(ellipsePath(num('cx'), num('cy'), num('rx'), num('ry')));
+    else if (tag === 'rect' && hasOnly('x', 'y', 'width', 'height', 'rx', 'ry')) parts.push(rectPath(numbers, num));
     else return null;
   }
-  return `<path d="${parts.map(absolute).join('')}"/>`;
+  return `<path d="${parts.map(withAbsoluteStart).join('')}"/>`;
 }
 
-/** Where a path begins, not counted from the end of the one before; the lines after it are still relative. */
-function absolute(d) {
+/** Makes the start of a path independent of the path before it; the lines after it stay relative. */
+function withAbsoluteStart(d) {
   const number = '-?(?:\\d+\\.?\\d*|\\.\\d+)';
   return d.trim().replace(new RegExp(`^m\\s*(${number})[\\s,]*(${number})[\\s,]*(?=([-.\\d])?)`),
     (_all, x, y, more) => `M${x} ${y}${more ? 'l' : ''}`);
 }
 
-function box(numbers, of) {
+function rectPath(numbers, num) {
   const rx = Number(numbers.rx ?? numbers.ry ?? 0);
   const ry = Number(numbers.ry ?? numbers.rx ?? 0);
-  const [w, h] = [of('width') - 2 * rx, of('height') - 2 * ry];
+  const [w, h] = [num('width') - 2 * rx, num('height') - 2 * ry];
   const corner = (x, y) => rx ? `a${rx} ${ry} 0 0 1 ${x} ${y}` : '';
-  return `M${of('x') + rx} ${of('y')}h${w}${corner(rx, ry)}v${h}${corner(-rx, ry)}h${-w}${corner(-rx, -ry)}v${-h}` +
+  return `M${num('x') + rx} ${num('y')}h${w}${corner(rx, ry)}v${h}${corner(-rx, ry)}h${-w}${corner(-rx, -ry)}v${-h}` +
     `${corner(rx, -ry)}z`;
 }
 
-/** The chosen Lucide icons as one object: name -> the markup inside its <svg>. */
-async function icons() {
+/** Returns the Lucide icons in icon_names.json: the name and the markup inside its <svg>. */
+async function readIcons() {
   const names = JSON.parse(await readFile(join(here, 'src', 'icon_names.json'), 'utf8'));
   const result = {};
   for (const name of [...names].sort()) {
     const svg = await readFile(join(modules, 'lucide-static', 'icons', `${name}.svg`), 'utf8');
     const inside = svg.slice(svg.indexOf('>', svg.indexOf('<svg')) + 1, svg.lastIndexOf('</svg>'));
-    result[name] = onePath(inside) ?? inside.replace(/\s*\n\s*/g, '').replace(/ \/>/g, '/>');
+    result[name] = mergeIntoPath(inside) ?? inside.replace(/\s*\n\s*/g, '').replace(/ \/>/g, '/>');
   }
   return result;
 }
@@ -66,25 +69,25 @@ const iconPlugin = {
   setup(plugin) {
     plugin.onResolve({filter: /^virtual:icons$/}, () => ({path: 'icons', namespace: 'virtual'}));
     plugin.onLoad({filter: /.*/, namespace: 'virtual'}, async () => ({
-      contents: JSON.stringify(await icons()), loader: 'json',
+      contents: JSON.stringify(await readIcons()), loader: 'json',
     }));
   },
 };
 
-async function legal() {
+async function createLegalText() {
   const parts = [];
   for (const [name, file] of [['blockly', 'LICENSE'], ['lucide-static', 'LICENSE']]) {
-    const about = JSON.parse(await readFile(join(modules, name, 'package.json'), 'utf8'));
+    const packageInfo = JSON.parse(await readFile(join(modules, name, 'package.json'), 'utf8'));
     const text = await readFile(join(modules, name, file), 'utf8');
-    parts.push(`${about.name} ${about.version} (${about.license})\n\n${text.trim()}\n`);
+    parts.push(`${packageInfo.name} ${packageInfo.version} (${packageInfo.license})\n\n${text.trim()}\n`);
   }
   return `Third-party work inside this folder\n\n${parts.join('\n' + '-'.repeat(78) + '\n\n')}`;
 }
 
-async function messages(language) {
+async function readMessages(language) {
   const text = await readFile(join(modules, 'blockly', 'msg', `${language}.js`), 'utf8');
   const found = {};
-  // The files assign `Blockly.Msg["KEY"] = "text";`, one a line.
+  // The files contain one assignment `Blockly.Msg["KEY"] = "text";` per line.
   for (const match of text.matchAll(/Msg\["([A-Z0-9_a-z]+)"\]\s*=\s*("(?:[^"\\]|\\.)*");/g)) {
     found[match[1]] = JSON.parse(match[2]);
   }
@@ -92,7 +95,7 @@ async function messages(language) {
   return JSON.stringify(found, null, 0) + '\n';
 }
 
-async function fill(folder) {
+async function buildInto(folder) {
   await build({
     entryPoints: [join(here, 'src', 'main.ts')],
     outfile: join(folder, 'editor.js'),
@@ -103,26 +106,26 @@ async function fill(folder) {
   for (const name of media) await cp(join(modules, 'blockly', 'media', name), join(folder, 'media', name));
   await mkdir(join(folder, 'msg'));
   for (const language of languages) {
-    await writeFile(join(folder, 'msg', `${language}.json`), await messages(language));
+    await writeFile(join(folder, 'msg', `${language}.json`), await readMessages(language));
   }
   await cp(join(here, 'src', 'index.html'), join(folder, 'index.html'));
   await cp(join(here, 'src', 'style.css'), join(folder, 'style.css'));
-  await writeFile(join(folder, 'LEGAL.txt'), await legal());
+  await writeFile(join(folder, 'LEGAL.txt'), await createLegalText());
 }
 
-// Built beside the target and put in its place when it is whole: a build that fails leaves the old one as it was.
+// Built in a new folder that replaces the target at the end: a failed build leaves the old bundle unchanged.
 await mkdir(target, {recursive: true});
-const made = await mkdtemp(`${target}.new-`);
-const before = `${made}.before`;
+const newFolder = await mkdtemp(`${target}.new-`);
+const oldFolder = `${newFolder}.before`;
 try {
-  await fill(made);
-  await chmod(made, 0o755);
-  await rename(target, before);
-  await rename(made, target).catch(async (error) => {
-    await rename(before, target);
+  await buildInto(newFolder);
+  await chmod(newFolder, 0o755);
+  await rename(target, oldFolder);
+  await rename(newFolder, target).catch(async (error) => {
+    await rename(oldFolder, target);
     throw error;
   });
 } finally {
-  await rm(made, {recursive: true, force: true});
+  await rm(newFolder, {recursive: true, force: true});
 }
-await rm(before, {recursive: true, force: true});
+await rm(oldFolder, {recursive: true, force: true});

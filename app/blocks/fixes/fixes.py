@@ -11,8 +11,8 @@ from app.blocks.model.workspace import PlacedBlock, is_enabled, saved_blocks
 from app.blocks.toolbox.catalogue import categories
 
 DEFAULT_TIME_LIMIT_S = 10
-LEFT, TOP = 40, 40
-SCRIPT_SPACING = 420
+LEFT_PX, TOP_PX = 40, 40
+SCRIPT_SPACING_PX = 420
 """Horizontal offset in px of a new script; most existing scripts are narrower."""
 
 
@@ -33,48 +33,48 @@ def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | Non
         workspace: Saved workspace of Blockly; it is not modified.
         action: `Problem.fix_action` of a problem.
     """
-    verb, _, object_ = action.partition(":")
+    verb, _, target = action.partition(":")
     result: dict[str, object] = copy.deepcopy(dict(workspace))
     if verb == "limit":
         for block in saved_blocks(result):
-            if block.get("id") == object_ and block.get("type") == "control_wait_until":
+            if block.get("id") == target and block.get("type") == "control_wait_until":
                 _add_time_limit(block)
                 return result
     if verb == "define":
         for block in saved_blocks(result):
-            if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
+            if block.get("id") == target and block.get("type") in (CALL, CALL_RESULT):
                 return _with_definition(result, block)
-    return _fix_scripts(result, verb, object_)
+    return _fix_scripts(result, verb, target)
 
 
-def _fix_scripts(workspace: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
+def _fix_scripts(workspace: dict[str, object], verb: str, target: str) -> dict[str, object] | None:
     if verb == "begin":
-        kind, _, variable = object_.partition(":")
+        kind, _, variable = target.partition(":")
         return _with_initial_value(workspace, variable, is_list=kind == "list")
     if verb == "receive":
-        return _with_script(workspace, {"type": "events_received", "fields": {"NAME": object_}})
+        return _with_script(workspace, {"type": "events_received", "fields": {"NAME": target}})
     if verb == "after":
-        return _join_scripts(workspace, object_)
+        return _join_scripts(workspace, target)
     if verb == "add":
-        return _with_start(workspace, object_)
+        return _with_start(workspace, target)
     return None
 
 
 def _with_initial_value(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
-    empty: dict[str, object] = {"block": {"type": "lists_empty"}}
+    empty_list: dict[str, object] = {"block": {"type": "lists_empty"}}
     zero: dict[str, object] = {"shadow": {"type": "values_number", "fields": {"NUMBER": 0}}}
-    setting: dict[str, object] = {
+    set_block: dict[str, object] = {
         "type": "variables_set",
         "fields": {"VAR": {"id": variable}},
-        "inputs": {"VALUE": empty if is_list else zero},
+        "inputs": {"VALUE": empty_list if is_list else zero},
     }
     for top in _top_blocks(workspace):
         if isinstance(top, dict) and top.get("type") == "events_started" and is_enabled(top):
             if isinstance(top.get("next"), dict):
-                setting["next"] = top["next"]
-            top["next"] = {"block": setting}
+                set_block["next"] = top["next"]
+            top["next"] = {"block": set_block}
             return workspace
-    return _with_script(workspace, {"type": "events_started", "next": {"block": setting}})
+    return _with_script(workspace, {"type": "events_started", "next": {"block": set_block}})
 
 
 def _top_blocks(workspace: dict[str, object]) -> list[object]:
@@ -86,8 +86,8 @@ def _top_blocks(workspace: dict[str, object]) -> list[object]:
 def _with_script(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
     tops = _top_blocks(workspace)
     x_positions = [top.get("x") for top in tops if isinstance(top, dict)]
-    right = max((x for x in x_positions if isinstance(x, (int, float))), default=LEFT - SCRIPT_SPACING)
-    tops.append({**block, "x": right + SCRIPT_SPACING, "y": TOP})
+    right = max((x for x in x_positions if isinstance(x, (int, float))), default=LEFT_PX - SCRIPT_SPACING_PX)
+    tops.append({**block, "x": right + SCRIPT_SPACING_PX, "y": TOP_PX})
     return workspace
 
 
@@ -129,13 +129,20 @@ def _join_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] 
     parts = hats.split(":")
     pairs = ((":".join(parts[:index]), ":".join(parts[index:])) for index in range(1, len(parts)))
     matches = ((by_id[later], by_id[earlier]) for later, earlier in pairs if {later, earlier} <= by_id.keys())
-    moved, end = next(matches, (None, None))
-    if moved is None or end is None or moved is end or not isinstance(moved.get("next"), dict):
+    moved_hat, last_block = next(matches, (None, None))
+    if (
+        moved_hat is None
+        or last_block is None
+        or moved_hat is last_block
+        or not isinstance(moved_hat.get("next"), dict)
+    ):
         return None
-    while isinstance(below := end.get("next"), dict) and isinstance(below.get("block"), dict):
-        end = below["block"]
-    end["next"] = moved["next"]
-    tops.remove(moved)
+    while isinstance(next_connection := last_block.get("next"), dict) and isinstance(
+        next_connection.get("block"), dict
+    ):
+        last_block = next_connection["block"]
+    last_block["next"] = moved_hat["next"]
+    tops.remove(moved_hat)
     return workspace
 
 
@@ -144,14 +151,14 @@ def _with_start(workspace: dict[str, object], block_type: str) -> dict[str, obje
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):
         return workspace
-    starter: dict[str, object] = {"type": block_type, "x": 40, "y": 40}
+    start_block: dict[str, object] = {"type": block_type, "x": 40, "y": 40}
     for number, top in enumerate(tops):
         if isinstance(top, dict) and _can_follow(str(top.get("type", ""))):
-            starter |= {name: top.pop(name) for name in ("x", "y") if name in top}
-            starter["next"] = {"block": top}
-            tops[number] = starter
+            start_block |= {name: top.pop(name) for name in ("x", "y") if name in top}
+            start_block["next"] = {"block": top}
+            tops[number] = start_block
             return workspace
-    tops.append(starter)
+    tops.append(start_block)
     return workspace
 
 

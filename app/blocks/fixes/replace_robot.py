@@ -62,18 +62,18 @@ def supports_blocks(
 
 
 def with_robot_replaced(
-    workspace: Mapping[str, object], missing: str, model: str, robot: Robot
+    workspace: Mapping[str, object], missing_robot: str, model: str, robot: Robot
 ) -> dict[str, object]:
     """Return a copy of a workspace in which all blocks of a missing robot use another robot.
 
     Args:
         workspace: Saved workspace of Blockly.
-        missing: Name of the missing robot.
+        missing_robot: Name of the missing robot.
         model: Model of the missing robot.
         robot: Robot to use instead.
     """
     result: dict[str, object] = copy.deepcopy(dict(workspace))
-    for block in blocks_of(result, missing):
+    for block in blocks_of(result, missing_robot):
         block["type"] = _translated_type(str(block.get("type")), model, robot)
         fields = block["fields"]
         if isinstance(fields, dict):

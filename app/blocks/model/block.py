@@ -63,15 +63,15 @@ class Block:
     parameters: tuple[str, ...] = ()  # event blocks: parameters of the function
     can_fail: bool = True  # values: the Python code may raise
     needs_message: bool = False  # reads the message that started its script
-    publishes: bool = False  # publishes on its topics instead of subscribing
+    is_publisher: bool = False  # publishes on its topics instead of subscribing to them
     python_in_function: str = ""  # Python code inside a function, if different
     mutator: str = ""  # how the user changes its slots: "items", "branches", "function", "call"
     extra_state: Mapping[str, object] = field(default_factory=dict)  # initial extraState in the toolbox
     needs_function: str = ""  # only allowed in a function: "result" or "plain"
-    calls_function: bool = False  # runs blocks elsewhere
+    is_function_call: bool = False  # runs blocks elsewhere
     undefined_message: str = ""  # why it can't run: the function is undefined
-    in_toolbox: bool = True
-    about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
+    is_in_toolbox: bool = True
+    slot_texts: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
     help: str = ""  # longer description than the tooltip, with an example
     search_words: str = ""  # search words separated by commas; those with ! rank first
     english_search_words: str = ""  # English search words, if the language differs
@@ -93,14 +93,14 @@ class Block:
             *self.keywords,
         }
         keyword_arguments = {argument for pairs in self.keywords.values() for argument, _ in pairs}
-        missing = {hole for text in self.templates for hole in placeholders(text)} - argument_names
-        messages = [f"{self.type}: its Python needs %{name}" for name in sorted(missing)]
+        missing_names = {name for text in self.templates for name in placeholders(text)} - argument_names
+        messages = [f"{self.type}: its Python needs %{name}" for name in sorted(missing_names)]
         text_placeholders = set(_PLACEHOLDER.findall(self.text))
         messages += [
             f"{self.type}: its text needs %{name}" for name in sorted(text_placeholders - argument_names)
         ]
         used_names = (
-            {hole for text in self.templates for hole in placeholders(text)}
+            {name for text in self.templates for name in placeholders(text)}
             | keyword_arguments
             | {self.variant}
         )

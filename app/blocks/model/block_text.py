@@ -28,7 +28,7 @@ def block_text(
     blocks: Mapping[str, Block],
     variables: Mapping[str, str],
     *,
-    robot: bool = True,
+    with_robot: bool = True,
 ) -> str:
     """Return a block with its arguments as one line of text, truncated to 80 characters.
 
@@ -38,7 +38,7 @@ def block_text(
         placed_block: Block in the workspace.
         blocks: Descriptions of blocks by type.
         variables: Names of variables by id.
-        robot: False to omit the name of the robot.
+        with_robot: False to omit the name of the robot.
     """
     block = blocks.get(placed_block.type)
     if block is None:
@@ -48,7 +48,7 @@ def block_text(
         argument = block.argument(match[1])
         if argument is None:
             return match[0]
-        if match[1] == "ROBOT" and not robot:
+        if match[1] == "ROBOT" and not with_robot:
             return ""
         if isinstance(argument, VariableField):
             id = _variable_id(argument, placed_block)

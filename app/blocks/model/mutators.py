@@ -47,8 +47,8 @@ class Items(Argument):
             extra: Saved ``extraState`` of the block; the number of slots defaults to `count`.
         """
         count = extra.get("items")
-        sound = isinstance(count, int) and not isinstance(count, bool)
-        slot_count = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
+        is_valid = isinstance(count, int) and not isinstance(count, bool)
+        slot_count = min(max(int(count), 0), MAX_ITEMS) if is_valid and isinstance(count, int) else self.count
         return tuple(ValueInput(f"{self.name}{number}") for number in range(slot_count))
 
 
@@ -100,8 +100,8 @@ class Branches:
             has_else: Default for the "else" branch.
         """
         count, saved_has_else = extra.get("elseIfs"), extra.get("else")
-        sound = isinstance(count, int) and not isinstance(count, bool)
-        else_if_count = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
+        is_valid = isinstance(count, int) and not isinstance(count, bool)
+        else_if_count = min(max(int(count), 0), MAX_ELSE_IFS) if is_valid and isinstance(count, int) else 0
         return cls(else_if_count, saved_has_else if isinstance(saved_has_else, bool) else has_else)
 
     def arguments(self) -> tuple[Argument, ...]:

@@ -29,7 +29,7 @@ class BlockTemplate:
     Attributes:
         text: Text in which parameters are replaced by names of block arguments.
         arguments: Names of the block arguments by parameter.
-        shown: Parameters that occur in the text.
+        shown_parameters: Parameters that occur in the text.
     """
 
     def __init__(self, text: str, parameters: Sequence[str]) -> None:
@@ -37,7 +37,7 @@ class BlockTemplate:
         used_names = set(_RESERVED)
         for name in parameters:
             self.arguments[name] = _argument_name(name, used_names)
-        self.shown: frozenset[str] = frozenset(
+        self.shown_parameters: frozenset[str] = frozenset(
             name for name in _PLACEHOLDER.findall(text) if name in self.arguments
         )
         self._inserted_arguments: set[str] = set()
@@ -104,11 +104,11 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
         return ChoiceField(name, tuple(options))
     if parameter.kind == "boolean":
         title = parameter.title or parameter.name
-        options_yes = (
+        yes_no_options = (
             (_("{what}: yes").format(what=title), True),
             (_("{what}: no").format(what=title), False),
         )
-        return ChoiceField(name, options_yes if default is not False else options_yes[::-1])
+        return ChoiceField(name, yes_no_options if default is not False else yes_no_options[::-1])
     if parameter.kind == "colour":
         return ColourField(name, default if isinstance(default, str) else "#37b6ff")
     if parameter.kind in _NUMBER_KINDS:
@@ -121,13 +121,13 @@ def format_limits(parameter: Parameter) -> str:
     """Format the limits and the unit of a parameter, such as "from 0 to 100 %"; "" if there are none."""
     unit = f" {display_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else format_number(parameter.minimum)
-    upper = None if parameter.maximum is None else format_number(parameter.maximum)
-    if low is not None and upper is not None:
-        return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{upper}{unit}")
+    high = None if parameter.maximum is None else format_number(parameter.maximum)
+    if low is not None and high is not None:
+        return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{high}{unit}")
     if low is not None:
         return _("at least {number_and_unit}").format(number_and_unit=f"{low}{unit}")
-    if upper is not None:
-        return _("at most {number_and_unit}").format(number_and_unit=f"{upper}{unit}")
+    if high is not None:
+        return _("at most {number_and_unit}").format(number_and_unit=f"{high}{unit}")
     return pgettext("of a number", "in {unit}").format(unit=unit.strip()) if unit else ""
 
 

@@ -33,7 +33,7 @@ def literal(value: object) -> ast.expr:
         return ast.Constant(value)
     if isinstance(value, (int, float)):
         if not math.isfinite(value):
-            raise ValueError(f"{value} is not a number that a program can hold")
+            raise ValueError(f"{value} is not a finite number")
         # ast.Constant(-1) would unparse to "-1 ** 2", which differs: parse its repr instead.
         return parse_expression(repr(value)).body
     if isinstance(value, (list, tuple)):
@@ -41,7 +41,7 @@ def literal(value: object) -> ast.expr:
     if isinstance(value, Mapping):
         keys: list[ast.expr | None] = [literal(str(key)) for key in value]
         return ast.Dict(keys, [literal(item) for item in value.values()])
-    raise ValueError(f"a {type(value).__name__} can't stand in a program")
+    raise ValueError(f"a {type(value).__name__} can't be part of a program")
 
 
 def statements(
@@ -61,12 +61,12 @@ def statements(
     Raises:
         KeyError: A placeholder has no value.
     """
-    filled: list[ast.stmt] = []
+    filled_statements: list[ast.stmt] = []
     filler = _PlaceholderFiller(expressions, bodies or {}, keywords or {})
     for statement in _parse_template(text).body:
         result = filler.visit(_copy_node(statement))
-        filled.extend(result if isinstance(result, list) else [result])
-    return filled
+        filled_statements.extend(result if isinstance(result, list) else [result])
+    return filled_statements
 
 
 def expression(
@@ -134,9 +134,9 @@ class _PlaceholderFiller(ast.NodeTransformer):
         name = _placeholder_name(node)
         if name is None:
             return node
-        filling = self._expressions[name]
+        replacement = self._expressions[name]
         # A variable may fill several placeholders with different contexts: create one node for each.
-        return ast.Name(filling.id, node.ctx) if isinstance(filling, ast.Name) else filling
+        return ast.Name(replacement.id, node.ctx) if isinstance(replacement, ast.Name) else replacement
 
     def visit_Call(self, node: ast.Call) -> ast.Call:
         keywords: list[ast.keyword] = []

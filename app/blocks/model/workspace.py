@@ -26,17 +26,17 @@ class PlacedBlock:
         type: Type of the block.
         fields: Saved field values by name.
         inputs: Blocks in each slot by name; statements are in order.
-        enabled: False if the user has disabled the block.
-        shadow: True for a shadow block.
+        is_enabled: False if the user has disabled the block.
+        is_shadow: True for a shadow block.
     """
 
     id: str
     type: str
     fields: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, tuple[PlacedBlock, ...]] = field(default_factory=dict)
-    enabled: bool = True
-    has_breakpoint: bool = False  # has a breakpoint
-    shadow: bool = False
+    is_enabled: bool = True
+    has_breakpoint: bool = False
+    is_shadow: bool = False
     extra_state: Mapping[str, object] = field(default_factory=dict)  # the editor's extraState
     is_too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
@@ -64,28 +64,28 @@ class Workspace:
     def all_blocks(self) -> list[PlacedBlock]:
         """Return all blocks of all scripts, including shadow blocks."""
         blocks: list[PlacedBlock] = []
-        waiting = [block for script in self.scripts for block in script]
-        while waiting:
-            block = waiting.pop()
+        pending = [block for script in self.scripts for block in script]
+        while pending:
+            block = pending.pop()
             blocks.append(block)
             for inner in block.inputs.values():
-                waiting.extend(inner)
+                pending.extend(inner)
         return blocks
 
 
 def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
     """Yield all blocks of a saved workspace as JSON objects, including shadow blocks, outermost first."""
     blocks = saved.get("blocks")
-    waiting = deque(_as_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
-    while waiting:
-        block = waiting.popleft()
+    pending = deque(_as_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
+    while pending:
+        block = pending.popleft()
         if not isinstance(block, dict):
             continue
         yield block
         inputs = block.get("inputs")
         for connection in (*(inputs.values() if isinstance(inputs, Mapping) else ()), block.get("next")):
             if isinstance(connection, Mapping):
-                waiting.extend(connection[name] for name in ("block", "shadow") if name in connection)
+                pending.extend(connection[name] for name in ("block", "shadow") if name in connection)
 
 
 def parse_workspace(saved: Mapping[str, object]) -> Workspace:
@@ -93,7 +93,7 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     ids = UniqueTexts("~")
-    scripts = tuple(_parse_chain(top, 0, ids, shadow=False) for top in _as_list(tops))
+    scripts = tuple(_parse_chain(top, 0, ids, is_shadow=False) for top in _as_list(tops))
     variables: dict[str, str] = {}
     for variable in _as_list(saved.get("variables")):
         if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
@@ -103,57 +103,61 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
 
 def _with_unlisted_variables(workspace: Workspace) -> Workspace:
     names = dict(workspace.variables)
-    nameless: set[str] = set()
+    nameless_ids: set[str] = set()
     for block in workspace.all_blocks():
         for saved in block.fields.values():
             id = saved.get("id") if isinstance(saved, Mapping) else None
-            if not isinstance(id, str) or not id or (id in names and id not in nameless):
+            if not isinstance(id, str) or not id or (id in names and id not in nameless_ids):
                 continue
             name = saved.get("name") if isinstance(saved, Mapping) else None
             if isinstance(name, str) and name:
                 names[id] = name
-                nameless.discard(id)
+                nameless_ids.discard(id)
             else:
                 names[id] = _("unnamed variable")
-                nameless.add(id)
-    return replace(workspace, variables=names, nameless_variables=frozenset(nameless))
+                nameless_ids.add(id)
+    return replace(workspace, variables=names, nameless_variables=frozenset(nameless_ids))
 
 
 def _as_list(saved: object) -> Sequence[object]:
     return saved if isinstance(saved, (list, tuple)) else ()
 
 
-def _parse_chain(saved: object, depth: int, ids: UniqueTexts, *, shadow: bool) -> tuple[PlacedBlock, ...]:
+def _parse_chain(saved: object, depth: int, ids: UniqueTexts, *, is_shadow: bool) -> tuple[PlacedBlock, ...]:
     # A loop instead of recursion, because a script may be long.
     chain: list[PlacedBlock] = []
     while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
-        chain.append(_parse_block(saved, depth, ids, shadow=shadow))
-        following = saved.get("next")
-        saved = following.get("block") if isinstance(following, Mapping) else None
+        chain.append(_parse_block(saved, depth, ids, is_shadow=is_shadow))
+        next_connection = saved.get("next")
+        saved = next_connection.get("block") if isinstance(next_connection, Mapping) else None
     return tuple(chain)
 
 
-def _parse_block(saved: Mapping[str, object], depth: int, ids: UniqueTexts, *, shadow: bool) -> PlacedBlock:
+def _parse_block(
+    saved: Mapping[str, object], depth: int, ids: UniqueTexts, *, is_shadow: bool
+) -> PlacedBlock:
     fields = saved.get("fields")
-    raw = saved.get("inputs")
-    connections = raw if isinstance(raw, Mapping) else {}
+    saved_inputs = saved.get("inputs")
+    connections = saved_inputs if isinstance(saved_inputs, Mapping) else {}
     inputs: dict[str, tuple[PlacedBlock, ...]] = {}
     saved_id = saved.get("id")
     id = ids.make_unique(saved_id if isinstance(saved_id, str) and saved_id else "block")
     if depth < MAX_DEPTH:
         for name, connection in connections.items():
             if isinstance(connection, Mapping):
-                real = connection.get("block")
-                inner = real if isinstance(real, Mapping) else connection.get("shadow")
-                inputs[str(name)] = _parse_chain(inner, depth + 1, ids, shadow=not isinstance(real, Mapping))
+                block = connection.get("block")
+                inner = block if isinstance(block, Mapping) else connection.get("shadow")
+                inputs[str(name)] = _parse_chain(
+                    inner, depth + 1, ids, is_shadow=not isinstance(block, Mapping)
+                )
     return PlacedBlock(
         id=id,
         type=str(saved["type"]),
         fields=dict(fields) if isinstance(fields, Mapping) else {},
         inputs=inputs,
-        enabled=is_enabled(saved),
+        is_enabled=is_enabled(saved),
         has_breakpoint=_has_breakpoint(saved),
-        shadow=shadow,
+        is_shadow=is_shadow,
         extra_state=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
         is_too_deep=depth >= MAX_DEPTH and bool(connections),
     )

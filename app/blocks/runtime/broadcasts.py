@@ -37,17 +37,17 @@ class Receiver:
         name: Name of the broadcast.
         script: Function to run.
         pending: Delivery that waits for the script, or None.
-        runs_in: Script of the scheduler in which `serve` runs; None before.
+        scheduler_script: Script of the scheduler in which `serve` runs; None before.
     """
 
     def __init__(self, name: str, script: Callable[[], None]) -> None:
         self.name, self.script = name, script
         self.pending: Delivery | None = None
-        self.runs_in: Script | None = None
+        self.scheduler_script: Script | None = None
 
     def serve(self, scheduler: Scheduler) -> None:
         """Run the script for each broadcast until the program ends."""
-        self.runs_in = scheduler.current_script()
+        self.scheduler_script = scheduler.current_script()
         while True:
             scheduler.wait_for(lambda: self.pending is not None, idle=True)
             delivery: Delivery | None = None
@@ -93,7 +93,7 @@ class Broadcasts:
         if receiver.pending is not None:
             receiver.pending.finish()
         receiver.pending = delivery
-        if receiver.runs_in is not None:
-            self._scheduler.end_run(receiver.runs_in)
+        if receiver.scheduler_script is not None:
+            self._scheduler.end_run(receiver.scheduler_script)
         self._scheduler.wake_scripts()
         return delivery

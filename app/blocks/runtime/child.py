@@ -65,7 +65,7 @@ class RunnerOutput:
         self._remaining_lines = MAX_LINES
         self.on_print: Callable[[str], object] = lambda _line: None
         """Called with each line that the program prints."""
-        self._dropped = 0
+        self._dropped_count = 0
 
     def send(self, kind: str, **content: object) -> None:
         """Write one JSON object as a line; do nothing if the pipe is closed.
@@ -91,7 +91,7 @@ class RunnerOutput:
             try:
                 self._printed.put_nowait(line[:MAX_LINE_LENGTH])
             except queue.Full:
-                self._dropped += 1
+                self._dropped_count += 1
             self.on_print(line[:MAX_LINE_LENGTH])
 
     def send_printed(self) -> None:
@@ -109,11 +109,12 @@ class RunnerOutput:
                         count=MAX_LINES
                     ),
                 )
-        if self._dropped:
+        if self._dropped_count:
             self.send(
-                "print", text=_("{count} lines were dropped: too many at once").format(count=self._dropped)
+                "print",
+                text=_("{count} lines were dropped: too many at once").format(count=self._dropped_count),
             )
-            self._dropped = 0
+            self._dropped_count = 0
 
 
 class PrintStream(io.TextIOBase):
@@ -133,13 +134,13 @@ class Run:
     """Execution of one program.
 
     Args:
-        order: Command "start" of the runner.
+        command: Command "start" of the runner.
         out: Writer to the runner.
     """
 
-    def __init__(self, order: Mapping[str, object], out: RunnerOutput) -> None:
-        program = order["program"]
-        robots = order["robots"]
+    def __init__(self, command: Mapping[str, object], out: RunnerOutput) -> None:
+        program = command["program"]
+        robots = command["robots"]
         if not isinstance(program, Mapping) or not isinstance(robots, list):
             raise TypeError("a start needs a program and robots")
         self._program = Program.from_json(program)
@@ -148,10 +149,10 @@ class Run:
         self._robots: tuple[Robot, ...] = tuple(
             robot for robot in all_robots if robot.name in self._program.robots
         )
-        self._owners = _parse_string_map(order.get("owners"))
+        self._owners = _parse_string_map(command.get("owners"))
         self._guard = PublishGuard(guarded_topics(all_robots), self._program.moves)
-        self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
-        self._master = None if order.get("master") is None else str(order["master"])
+        self._id = str(command.get("id") or f"program-{uuid.uuid4().hex[:8]}")
+        self._master = None if command.get("master") is None else str(command["master"])
         self._out = out
         self._runtime = Runtime(
             out.print,
@@ -163,9 +164,9 @@ class Run:
         self._variables = VariableWatch({}, ())
         self._started_at = time.monotonic()
         self._stop_reply_timeout_s = STOP_REPLY_TIMEOUT_S
-        self.set_pace(order)
-        self._begins_paused = order.get("paused") is True
-        if self._begins_paused:
+        self.set_pace(command)
+        self._starts_paused = command.get("paused") is True
+        if self._starts_paused:
             self._runtime.scheduler.pause()
 
     def command_handlers(self) -> dict[str, Callable[[], None]]:
@@ -196,25 +197,25 @@ class Run:
         else:
             self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
 
-    def answer(self, order: Mapping[str, object]) -> None:
+    def answer(self, command: Mapping[str, object]) -> None:
         """Pass the user's answer to the open question; command "answer"."""
-        question, reply_text = order.get("question"), order.get("text")
+        question, reply_text = command.get("question"), command.get("text")
         if isinstance(question, int) and isinstance(reply_text, str):
             self._runtime.questions.set_answer(question, reply_text)
 
-    def set_pace(self, order: Mapping[str, object]) -> None:
+    def set_pace(self, command: Mapping[str, object]) -> None:
         """Set the delay before each block; command "pace"."""
-        pace_s = order.get("pace_s")
+        pace_s = command.get("pace_s")
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
-    def update_robots(self, order: Mapping[str, object]) -> None:
+    def update_robots(self, command: Mapping[str, object]) -> None:
         """Update the connected robots and the topics that move them; command "robots"."""
-        topics = order.get("guarded")
+        topics = command.get("guarded")
         if isinstance(topics, Mapping):
             self._guard.set_topics({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
         if self._network is not None:
-            self._network.update_owners(_parse_string_map(order.get("owners")))
+            self._network.update_owners(_parse_string_map(command.get("owners")))
 
     def stop(self) -> None:
         """Stop the scripts and make `run` return without waiting for the robots' replies.
@@ -229,7 +230,7 @@ class Run:
         """Run the program until it ends, then stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.on_print = partial(node.log.info, "%s")
-            silent = self._run_with_node(node)
+            silent_robots = self._run_with_node(node)
             error = self._runtime.error
             if error is not None:
                 node.log.error("%s", error.sentence)
@@ -238,7 +239,7 @@ class Run:
             self._out.send_printed()
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._started_at, 3)
-            self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
+            self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent_robots)
             node.close(FLUSH_TIMEOUT_S if self._stop_reply_timeout_s == 0.0 else 2 * STOP_REPLY_TIMEOUT_S)
         return error is None
 
@@ -255,16 +256,16 @@ class Run:
         )
         network.guard = self._guard
         self._network = network
-        if self._begins_paused:
+        if self._starts_paused:
             network.pause_robots()
         try:
             self._start_scripts(network)
             self._report_until_finished()
         finally:
             self._runtime.scheduler.stop()
-            silent = network.stop_robots(self._stop_reply_timeout_s)
+            silent_robots = network.stop_robots(self._stop_reply_timeout_s)
             network.close()
-        return silent if self._stop_reply_timeout_s else ()
+        return silent_robots if self._stop_reply_timeout_s else ()
 
     def _start_scripts(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}
@@ -287,17 +288,17 @@ class Run:
         else:
             self._runtime.step(block)
 
-    def set_breakpoints(self, order: Mapping[str, object]) -> None:
+    def set_breakpoints(self, command: Mapping[str, object]) -> None:
         """Replace the breakpoints; command "breakpoints"."""
-        blocks = order.get("blocks")
+        blocks = command.get("blocks")
         if isinstance(blocks, list):
             self._breakpoints = frozenset(map(str, blocks))
 
-    def set_variable(self, order: Mapping[str, object]) -> None:
+    def set_variable(self, command: Mapping[str, object]) -> None:
         """Set a variable to a value entered by the user; command "variable"."""
-        value = order.get("value")
+        value = command.get("value")
         if isinstance(value, (str, int, float)):
-            self._variables.set_value(str(order.get("python")), value)
+            self._variables.set_value(str(command.get("python")), value)
 
     def _send_variables(self) -> None:
         changes = self._variables.changes()
@@ -305,25 +306,25 @@ class Run:
             self._out.send("variables", values=[value.to_json() for value in changes])
 
     def _report_until_finished(self) -> None:
-        runtime, saying, before = self._runtime, self._runtime.status_text, None
+        runtime, status_text, last_report = self._runtime, self._runtime.status_text, None
         sample_counter = itertools.count()
         while not runtime.finished.wait(SAMPLE_INTERVAL_S):
             if next(sample_counter) % VARIABLES_PERIOD_SAMPLES == 0:
                 self._send_variables()
-            now = runtime.scheduler.snapshot()
-            status_text, warning = saying.text(now.blocks), saying.warning(now.blocks)
+            snapshot = runtime.scheduler.snapshot()
+            activity, warning = status_text.text(snapshot.blocks), status_text.warning(snapshot.blocks)
             self._out.send_printed()
             self._send_replacements()
-            if (now, status_text, warning) == before:
+            if (snapshot, activity, warning) == last_report:
                 continue
-            before = (now, status_text, warning)
-            if now.is_paused:
-                reading = saying.block_text(now.next_block)
+            last_report = (snapshot, activity, warning)
+            if snapshot.is_paused:
+                reading = status_text.block_text(snapshot.next_block)
                 self._out.send(
-                    "paused", block=now.next_block, blocks=now.blocks, says=reading, warning=warning
+                    "paused", block=snapshot.next_block, blocks=snapshot.blocks, says=reading, warning=warning
                 )
             else:
-                self._out.send("running", blocks=now.blocks, says=status_text)
+                self._out.send("running", blocks=snapshot.blocks, says=activity)
 
     def _send_replacements(self) -> None:
         for replacement in self._runtime.replacements.take_new():
@@ -340,11 +341,11 @@ def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
     """Yield the runner's commands until the pipe is closed; invalid lines are ignored."""
     for line in stream:
         try:
-            order = json.loads(line)
+            command = json.loads(line)
         except (ValueError, RecursionError):
             continue
-        if isinstance(order, Mapping):
-            yield order
+        if isinstance(command, Mapping):
+            yield command
 
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
@@ -359,15 +360,15 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
         the program can't be started.
     """
     out = RunnerOutput(stdout or sys.stdout)
-    incoming = read_commands(stdin or sys.stdin)
+    commands = read_commands(stdin or sys.stdin)
     sys.stdout = PrintStream(out)
     out.send("ready")
-    order = next((order for order in incoming if order.get("do") == "start"), None)
-    if order is None:
+    command = next((command for command in commands if command.get("do") == "start"), None)
+    if command is None:
         return 0
     try:
-        run = Run(order, out)
-        threading.Thread(target=_run_commands, args=(run, incoming), name="orders", daemon=True).start()
+        run = Run(command, out)
+        threading.Thread(target=_run_commands, args=(run, commands), name="orders", daemon=True).start()
         return 0 if run.run() else 1
     except BehaviourError as error:
         out.send("error", block=error.block, sentence=error.sentence)
@@ -379,22 +380,22 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     return 1
 
 
-def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
-    obeyed = run.command_handlers()
-    order_handlers: dict[str, Callable[[Mapping[str, object]], None]] = {
+def _run_commands(run: Run, commands: Iterator[Mapping[str, object]]) -> None:
+    handlers = run.command_handlers()
+    argument_handlers: dict[str, Callable[[Mapping[str, object]], None]] = {
         "pace": run.set_pace,
         "robots": run.update_robots,
         "variable": run.set_variable,
         "breakpoints": run.set_breakpoints,
         "answer": run.answer,
     }
-    for order in incoming:
-        order_handler = order_handlers.get(str(order.get("do")))
-        if order_handler is not None:
-            order_handler(order)
-        command = obeyed.get(str(order.get("do")))
-        if command is not None:
-            command()
+    for command in commands:
+        argument_handler = argument_handlers.get(str(command.get("do")))
+        if argument_handler is not None:
+            argument_handler(command)
+        handler = handlers.get(str(command.get("do")))
+        if handler is not None:
+            handler()
     run.stop()  # the runner has exited or closed the pipe
 
 

@@ -22,13 +22,13 @@ class BehaviourError(AppError):
 
     Attributes:
         block: Id of the block; None if it is not known.
-        unknown: True if the error is caused by a value that is not known yet.
+        is_value_unknown: True if the error is caused by a value that is not known yet.
     """
 
-    def __init__(self, message: str, block: str | None = None, *, unknown: bool = False) -> None:
+    def __init__(self, message: str, block: str | None = None, *, is_value_unknown: bool = False) -> None:
         super().__init__(message)
         self.block = block
-        self.unknown = unknown
+        self.is_value_unknown = is_value_unknown
 
 
 def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
@@ -58,7 +58,7 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
             return BehaviourError(
                 _("{name} can't run: one of its values isn't known yet.").format(name=name),
                 block,
-                unknown=True,
+                is_value_unknown=True,
             )
         return BehaviourError(
             _("{name} doesn't work with {kinds}.").format(name=name, kinds=_type_names_in(str(error))), block
@@ -72,7 +72,9 @@ def type_name(value: object) -> str:
 
 
 def _type_names_in(message: str) -> str:
-    display_names = [display_name for quoted, display_name in _TYPE_NAMES.items() if f"'{quoted}'" in message]
+    display_names = [
+        display_name for python_name, display_name in _TYPE_NAMES.items() if f"'{python_name}'" in message
+    ]
     return format_list([_(display_name) for display_name in dict.fromkeys(display_names)]) or _(
         "these values"
     )

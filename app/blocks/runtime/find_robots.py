@@ -83,7 +83,7 @@ class _DescriptionTopic:
     subscription: Subscription
     owner: Identity
     messages: list[Message] = field(default_factory=list)
-    read: Message | None = None
+    newest_read: Message | None = None
     duplicates: tuple[str, ...] = ()
     robot: Robot | None = None
     error: str = ""
@@ -113,7 +113,7 @@ def find_robots(
         wait: Sleeps for a number of seconds.
     """
     wait = wait or threading.Event().wait
-    until = clock() + timeout_s
+    deadline = clock() + timeout_s
     rize_robots: dict[str, Robot] = {}
     description_topics: dict[str, _DescriptionTopic] = {}
     senders = Senders()
@@ -137,10 +137,10 @@ def find_robots(
                 description_topic.robot is not None or bool(description_topic.error)
                 for description_topic in description_topics.values()
             )
-            missing = (
+            is_incomplete = (
                 set(expected) - connected.keys() if expected else received_count < len(description_topics)
             )
-            if not missing or clock() >= until:
+            if not is_incomplete or clock() >= deadline:
                 return _result(connected, description_topics)
             wait(POLL_INTERVAL_S)
     finally:
@@ -161,7 +161,7 @@ def _update_topics(
             )
         each = description_topics[topic]
         if each.owner.node_id not in nodes:
-            each.owner, each.robot, each.read = identity_of(view, nodes[0]), None, None
+            each.owner, each.robot, each.newest_read = identity_of(view, nodes[0]), None, None
         each.duplicates = tuple(
             identity_of(view, id).display_name for id in nodes if id != each.owner.node_id
         )
@@ -174,15 +174,15 @@ def _read_descriptions(description_topic: _DescriptionTopic, topic: str, senders
     while message is not None:
         description_topic.messages = [*description_topic.messages[1 - MAX_STORED_DESCRIPTIONS :], message]
         message = description_topic.subscription.receive(0.0)
-    its_own = (
+    own_messages = (
         announcement
         for announcement in reversed(description_topic.messages)
         if senders.node_of(announcement) == description_topic.owner.node_id
     )
-    newest = next(its_own, None)
-    if newest is None or newest is description_topic.read:
+    newest = next(own_messages, None)
+    if newest is None or newest is description_topic.newest_read:
         return
-    description_topic.read, description_topic.error = newest, ""
+    description_topic.newest_read, description_topic.error = newest, ""
     try:
         robot = parse_announcement(newest)
     except (NepError, DescriptionError) as error:

@@ -28,12 +28,12 @@ class RobotCall:
     action: str
     state: str = "sent"  # then accepted, running, succeeded, failed, canceled
     output: Mapping[str, object] = field(default_factory=dict)
-    feedback: Mapping[str, object] = field(default_factory=dict)  # the newest non-empty one
+    feedback: Mapping[str, object] = field(default_factory=dict)  # newest feedback that is not empty
     error: str = ""
-    has_started: bool = False  # the robot has started it
-    is_canceled_by_pause: bool = False  # canceled by a pause
+    has_started: bool = False  # the robot has started the action
+    is_canceled_by_pause: bool = False
     waits_for: tuple[str, ...] = ()  # actions that the robot finishes first
-    last_reply_s: float = field(default_factory=time.monotonic)  # time of its robot's last answer
+    last_reply_s: float = field(default_factory=time.monotonic)  # monotonic time of the robot's last reply
 
     @property
     def done(self) -> bool:
@@ -44,12 +44,12 @@ class RobotCall:
 class ProgramLink(Protocol):
     """Interface of a program to its robots and topics. Callbacks are called in the network's thread."""
 
-    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+    def set_callbacks(self, on_change: Callable[[], None], on_external_stop: Callable[[str], None]) -> None:
         """Set the callbacks.
 
         Args:
-            poke: Called after each reply and message.
-            stopped_outside: Called with the name of a robot when another program stops the robot.
+            on_change: Called after each reply and message.
+            on_external_stop: Called with the name of a robot when another program stops the robot.
         """
         ...
 

@@ -31,21 +31,21 @@ class Motions:
 
     Args:
         stop: Stops all actions of a robot.
-        stand: Stops a robot if it runs no action except such motions.
+        stop_motion: Stops a robot if it runs no action except such motions.
         invoke: Sends a command (robot, action, input) again.
     """
 
     def __init__(
         self,
         stop: Callable[[Robot], None],
-        stand: Callable[[Robot], None],
+        stop_motion: Callable[[Robot], None],
         invoke: Callable[[str, str, Mapping[str, object]], object],
     ) -> None:
-        self._stop, self._stop_motion, self._invoke = stop, stand, invoke
+        self._stop, self._stop_motion, self._invoke = stop, stop_motion, invoke
         self._lock = threading.Lock()
-        self._unanswered: dict[str, _Motion] = {}  # by command id, until it is answered
+        self._pending_motions: dict[str, _Motion] = {}  # by command id, until the final reply
         self._motions: dict[tuple[str, str], _Motion] = {}  # by robot and action
-        self._paused = False
+        self._is_paused = False
         self._delayed_scripts: set[int] = set()  # scripts waiting at a block
         self._script_override = threading.local()
 
@@ -68,12 +68,12 @@ class Motions:
                 if existing.robot.name != robot.name or not existing.uses & motion.uses
             }
             if action.repeat_s is not None:
-                self._unanswered[call.id] = motion
+                self._pending_motions[call.id] = motion
 
     def is_motion(self, call: RobotCall) -> bool:
         """Return True if a pending command starts a motion that continues after the command."""
         with self._lock:
-            return call.id in self._unanswered
+            return call.id in self._pending_motions
 
     def record_final_reply(self, call: RobotCall) -> None:
         """Record the final reply to a command, which may have started a motion.
@@ -81,23 +81,23 @@ class Motions:
         The motion is stopped at once if the program is paused or the script waits at a block.
         """
         with self._lock:
-            motion = self._unanswered.pop(call.id, None)
+            motion = self._pending_motions.pop(call.id, None)
             if motion is None:
                 return
-            slow = motion.script in self._delayed_scripts
-            if call.state != "succeeded" and not (slow and call.state == "canceled"):
+            is_delayed = motion.script in self._delayed_scripts
+            if call.state != "succeeded" and not (is_delayed and call.state == "canceled"):
                 return
             self._motions[motion.robot.name, motion.action] = motion
-            rests = self._paused
-        if rests:  # started by a single step of a paused program
+            is_paused = self._is_paused
+        if is_paused:  # started by a single step of a paused program
             self._stop(motion.robot)
-        elif slow:
+        elif is_delayed:
             self._stop_motion(motion.robot)
 
     def stop_all(self) -> tuple[str, ...]:
         """Stop all motions until `resume_all`, and return the names of the stopped robots."""
         with self._lock:
-            self._paused = True
+            self._is_paused = True
             moving = {motion.robot.name: motion.robot for motion in self._motions.values()}
         for robot in moving.values():
             self._stop(robot)
@@ -106,9 +106,9 @@ class Motions:
     def resume_all(self) -> None:
         """Resume the motions that `stop_all` stopped."""
         with self._lock:
-            if not self._paused:
+            if not self._is_paused:
                 return
-            self._paused = False
+            self._is_paused = False
             motions = [each for each in self._motions.values() if each.script not in self._delayed_scripts]
         self._resume(motions)
 
@@ -119,21 +119,21 @@ class Motions:
         with self._lock:
             moving = {
                 motion.robot.name: motion.robot
-                for motion in (*self._motions.values(), *self._unanswered.values())
+                for motion in (*self._motions.values(), *self._pending_motions.values())
                 if motion.script == script
             }
             self._delayed_scripts.add(script)
-            rests = self._paused
+            is_paused = self._is_paused
         for robot in moving.values():
-            if not rests:
+            if not is_paused:
                 self._stop_motion(robot)
         yield
         # Not reached if the program was stopped, so that nothing starts again.
         with self._lock:
             self._delayed_scripts.discard(script)
-            rests = self._paused
+            is_paused = self._is_paused
             motions = [motion for motion in self._motions.values() if motion.script == script]
-        if moving and not rests:
+        if moving and not is_paused:
             self._resume(motions)
 
     def _resume(self, motions: list[_Motion]) -> None:

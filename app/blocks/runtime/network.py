@@ -133,8 +133,8 @@ class Network:
         self._owners = dict(owners or {})
         self._senders = Senders()
         self._view = GraphView(0, 0)
-        self._answers_lock = threading.Lock()  # serializes the handling of answers
-        self._unknown = PendingMessages(per_publisher=MAX_PENDING_PER_PUBLISHER)
+        self._replies_lock = threading.Lock()  # serializes the handling of replies
+        self._unresolved_replies = PendingMessages(per_publisher=MAX_PENDING_PER_PUBLISHER)
         self._lookup_requested = threading.Event()
         self._lookup_thread: threading.Thread | None = None
         self._stop_errors: dict[str, str] = {}
@@ -144,19 +144,19 @@ class Network:
         self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
         self._lock = threading.RLock()
         self._calls: dict[str, RobotCall] = {}
-        # id of a stop -> robot, and nodes that must answer
+        # id of a stop -> robot, and nodes that must still reply
         self._stops: dict[str, tuple[str, set[str]]] = {}
         self._own_stops: set[str] = set()
-        self._newest: dict[str, Message] = {}
+        self._newest_messages: dict[str, Message] = {}
         self._callbacks: dict[str, list[Callback]] = {}
-        self._subscribed: set[str] = set()
+        self._subscribed_topics: set[str] = set()
         self._publishers: dict[str, ProgramPublisher] = {}
-        self._poke: Callable[[], None] = _do_nothing
-        self._stopped_outside: Callable[[str], None] = _ignore
-        self._arrived = threading.Condition()
+        self._on_change: Callable[[], None] = _do_nothing
+        self._on_external_stop: Callable[[str], None] = _ignore
+        self._stops_changed = threading.Condition()
         self._closed = threading.Event()
-        self._errors = SuppressedErrors(_log, "a message or answer of a robot")
-        self._ending = False
+        self._errors = SuppressedErrors(_log, "a message or reply of a robot")
+        self._is_ending = False
         self._motions = Motions(self._stop_for_pause, self._stop_motion, self.invoke)
         self._heartbeat = Heartbeat(program, "program alive")
         self._open((*sensors, *events), publishes, listens)
@@ -180,12 +180,12 @@ class Network:
 
     def _open_robot(self, robot: Robot) -> None:
         self._get_publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
-        type_ = "json" if robot.dialect == "rize" else "robot/answer"
+        msg_type = "json" if robot.dialect == "rize" else "robot/answer"
         with self._lock:
             topic = robot.topics.reply
-            if topic not in self._subscribed:
-                self._subscribed.add(topic)
-                self._node.new_sub(topic, type_, sink=self._receive_replies)
+            if topic not in self._subscribed_topics:
+                self._subscribed_topics.add(topic)
+                self._node.new_sub(topic, msg_type, sink=self._receive_replies)
 
     def close(self) -> None:
         """Stop the heartbeat and the look-up of publishers.
@@ -204,33 +204,33 @@ class Network:
         Args:
             owners: Node ids by robot name.
         """
-        with self._answers_lock:
+        with self._replies_lock:
             self._owners |= owners
 
-    # ---- Link
+    # ---- ProgramLink interface
 
-    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+    def set_callbacks(self, on_change: Callable[[], None], on_external_stop: Callable[[str], None]) -> None:
         """Set the callbacks; see `ProgramLink.set_callbacks`."""
-        self._poke, self._stopped_outside = poke, stopped_outside
+        self._on_change, self._on_external_stop = on_change, on_external_stop
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         """Send a command to a robot; the returned call is updated as replies arrive."""
-        described = self._robots[robot]
+        description = self._robots[robot]
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
-        self._motions.record_command(call, described, input)
-        if described.dialect == "rize":
-            self._send(described, rize.to_command(described, action, input, call.id))
+        self._motions.record_command(call, description, input)
+        if description.dialect == "rize":
+            self._send(description, rize.to_command(description, action, input, call.id))
         else:
-            self._send(described, self._make_command(call.id, "invoke", action, input))
+            self._send(description, self._make_command(call.id, "invoke", action, input))
         return call
 
     def cancel(self, call: RobotCall) -> None:
         """Cancel a command. Has no effect for robots of RIZE, which don't support it."""
-        described = self._robots[call.robot]
-        if described.dialect != "rize":
-            self._send(described, self._make_command(call.id, "cancel", call.action))
+        description = self._robots[call.robot]
+        if description.dialect != "rize":
+            self._send(description, self._make_command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
         """Return the newest value of a sensor; None if no value has been received yet or decoding fails.
@@ -240,13 +240,13 @@ class Network:
         """
         topic = self._topic(robot, name)
         self._subscribe(topic)
-        message = self._newest.get(topic)
+        message = self._newest_messages.get(topic)
         return None if message is None else value_of(payload_of(message))
 
     def newest(self, topic: str) -> object:
         """Return the payload of the newest message of a topic; None if there is none or decoding fails."""
         self._subscribe(topic)
-        message = self._newest.get(topic)
+        message = self._newest_messages.get(topic)
         return None if message is None else payload_of(message)
 
     def publish(self, topic: str, payload: object) -> None:
@@ -291,8 +291,8 @@ class Network:
         return self._motions.suspend()
 
     def _stop_motion(self, robot: Robot) -> None:
-        busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
-        if all(self._motions.is_motion(call) for call in busy):
+        pending_calls = [call for call in list(self._calls.values()) if call.robot == robot.name]
+        if all(self._motions.is_motion(call) for call in pending_calls):
             self._send_stop(robot)
 
     def _stop_for_pause(self, robot: Robot) -> None:
@@ -302,7 +302,7 @@ class Network:
 
     def _send_stop(self, robot: Robot) -> None:
         id = new_id("stop")
-        with self._arrived:
+        with self._stops_changed:
             self._own_stops.add(id)
             self._stops[id] = (robot.name, self._stop_nodes(robot))
         self._send(robot, self._make_command(id, "stop", robot.safe_stop.action))
@@ -316,7 +316,7 @@ class Network:
         Returns:
             Names of the robots that did not confirm the stop; see `stop_error` for the reasons.
         """
-        self._ending = True
+        self._is_ending = True
         if timeout_s:
             with suppress(NepError):
                 self._resolve_senders()
@@ -324,12 +324,12 @@ class Network:
             if robot.dialect == "rize":
                 continue
             self._send_stop(robot)
-        with self._arrived:
-            waiting = self._stops
-            self._arrived.wait_for(
-                lambda: all(name in self._stop_errors for name, _ in waiting.values()), timeout_s
+        with self._stops_changed:
+            pending_stops = self._stops
+            self._stops_changed.wait_for(
+                lambda: all(name in self._stop_errors for name, _ in pending_stops.values()), timeout_s
             )
-            return tuple(dict.fromkeys(name for name, _ in waiting.values()))
+            return tuple(dict.fromkeys(name for name, _ in pending_stops.values()))
 
     def stop_error(self, name: str) -> str:
         """Return the reason why a robot did not confirm its stop: the error in its reply, or no reply.
@@ -339,17 +339,17 @@ class Network:
         return self._stop_errors.get(name) or _("{robot} didn't reply").format(robot=name)
 
     def _stop_nodes(self, robot: Robot) -> set[str]:
-        # The robot's own node, and others that answer its commands, must answer a stop.
+        # The robot's own node, and others that reply to its commands, must reply to a stop.
         command_subscribers = set(subscriber_nodes(self._view, robot.topics.command))
-        others = command_subscribers & set(publisher_nodes(self._view, robot.topics.reply))
+        other_nodes = command_subscribers & set(publisher_nodes(self._view, robot.topics.reply))
         owner = self._owners.get(robot.name)
-        return {owner or "", *others}
+        return {owner or "", *other_nodes}
 
     # ---- internals
 
     def _topic(self, robot: str, name: str) -> str:
-        described = self._robots[robot]
-        sensor_or_event = described.sensor(name) or described.event(name)
+        description = self._robots[robot]
+        sensor_or_event = description.sensor(name) or description.event(name)
         if sensor_or_event is None:
             raise KeyError(name)
         return sensor_or_event.topic
@@ -362,9 +362,9 @@ class Network:
 
     def _subscribe(self, topic: str) -> None:
         with self._lock:
-            if topic in self._subscribed:
+            if topic in self._subscribed_topics:
                 return
-            self._subscribed.add(topic)
+            self._subscribed_topics.add(topic)
         self._node.new_sub(topic, sink=self._receive_messages)
 
     def _resolve_senders(self) -> None:
@@ -372,17 +372,17 @@ class Network:
         # block.
         view = self._node.graph()
         topics = {robot.topics.reply for robot in self._robots.values()} | self._robot_of.keys()
-        with self._answers_lock:
+        with self._replies_lock:
             self._view = view
             self._senders.update(view, topics)
             for robot in self._robots.values():
                 first = first_announcer(view, robot.topics.description)
                 if robot.dialect != "rize" and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
-            for message in self._unknown.pop_all():
+            for message in self._unresolved_replies.pop_all():
                 if self._senders.node_of(message) is not None:
                     self._handle_reply_locked(message)
-        self._poke()
+        self._on_change()
 
     def _request_lookup(self) -> None:
         # Starts the query in a separate thread.
@@ -417,48 +417,48 @@ class Network:
         for message in messages:
             with self._errors:
                 self._receive(message)
-        self._poke()
+        self._on_change()
 
     def _receive(self, message: Message) -> None:
         if not self._is_from_robot(message):
             return
-        self._newest[message.topic] = message
+        self._newest_messages[message.topic] = message
         for callback in self._callbacks.get(message.topic, ()):
             payload = payload_of(message)
             if payload is not None:
                 callback(payload)
 
     def _receive_replies(self, messages: Sequence[Message]) -> None:
-        with self._answers_lock:
+        with self._replies_lock:
             for message in messages:
                 with self._errors:
                     self._handle_reply_locked(message)
-        self._poke()
+        self._on_change()
 
     def _handle_reply_locked(self, message: Message) -> None:
-        # Call with `_answers_lock` held. The sender must be known before an answer is used.
+        # Call with `_replies_lock` held. The sender must be known before a reply is used.
         node = self._senders.node_of(message)
-        native = any(
+        is_native = any(
             robot.dialect != "rize" and robot.topics.reply == message.topic for robot in self._robots.values()
         )
-        if native and (node is None or self._unknown.has_messages_of(message.publisher)):
-            self._unknown.add(message)
+        if is_native and (node is None or self._unresolved_replies.has_messages_of(message.publisher)):
+            self._unresolved_replies.add(message)
             self._request_lookup()
             return
-        if native and not self._is_stop_node(message.topic, node or ""):
+        if is_native and not self._is_stop_node(message.topic, node or ""):
             return  # skip decoding
         payload = payload_of(message)
         if isinstance(payload, Mapping):
             self._apply_reply(message.topic, payload, node or "")
 
     def _is_stop_node(self, topic: str, node: str) -> bool:
-        # True for a robot's node, and for a node that must answer a stop.
-        with self._arrived:
-            must_answer = any(node in waiting for _name, waiting in self._stops.values())
-        return must_answer or any(self._is_own_reply(robot, topic, node) for robot in self._robots.values())
+        # True for a robot's node, and for a node that must reply to a stop.
+        with self._stops_changed:
+            is_awaited = any(node in silent_nodes for _name, silent_nodes in self._stops.values())
+        return is_awaited or any(self._is_own_reply(robot, topic, node) for robot in self._robots.values())
 
     def _apply_reply(self, topic: str, payload: Mapping[str, object], node: str) -> None:
-        # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
+        # Replies to a stop count from all nodes that must reply, others from the robot's own node only.
         reply = payload if "state" in payload and "op" in payload else rize.from_reply(payload)
         if reply is None:
             return
@@ -470,12 +470,12 @@ class Network:
         if reply.get("op") == "stop":
             return
         call = self._calls.get(bounded_str(reply.get("id")))
-        # The answer to a cancel has the command's id, but only the command's own answer ends it.
+        # The reply to a cancel has the command's id, but only the command's own reply ends it.
         if call is None or call.done or reply.get("op") not in (None, "invoke"):
             return
         state = bounded_str(reply.get("state"))
         if self._robots[call.robot].topics.reply != topic or state not in REPLY_STATES:
-            return  # another robot's answer, or an invalid state
+            return  # another robot's reply, or an invalid state
         output = reply.get("output")
         call.output = output if isinstance(output, Mapping) else {}
         call.error = safe_error_text(reply.get("error"))
@@ -508,21 +508,21 @@ class Network:
         sender_robots = [
             robot.name for robot in self._robots.values() if self._is_own_reply(robot, topic, node)
         ]
-        with self._arrived:
-            is_own_stop = id in self._own_stops  # also for duplicate answers
-            name, waiting = self._stops.get(id, ("", set()))
-            if name in robots and node in waiting:
+        with self._stops_changed:
+            is_own_stop = id in self._own_stops  # also for duplicate replies
+            name, silent_nodes = self._stops.get(id, ("", set()))
+            if name in robots and node in silent_nodes:
                 if reply["state"] == "failed":
                     self._stop_errors[name] = stop_error_text(name, reply.get("error"))
                 else:
-                    waiting.discard(node)
+                    silent_nodes.discard(node)
                     self._stop_errors.pop(name, None)
-                if not waiting:
+                if not silent_nodes:
                     del self._stops[id]
-            self._arrived.notify_all()
-        if not is_own_stop and not self._ending:
+            self._stops_changed.notify_all()
+        if not is_own_stop and not self._is_ending:
             for name in sender_robots:
-                self._stopped_outside(name)
+                self._on_external_stop(name)
 
     def _make_command(
         self, id: str, op: str, action: str = "", input: Mapping[str, object] | None = None

@@ -39,15 +39,17 @@ class PublishGuard:
         Args:
             topics: Names of the moved robots by topic.
         """
-        moved: dict[str, set[str]] = {}
+        topics_by_robot: dict[str, set[str]] = {}
         for topic, names in topics.items():
             for name in names:
-                moved.setdefault(name, set()).add(topic)
-        self._moving = MovingTopics(RobotControls(name, frozenset(each)) for name, each in moved.items())
+                topics_by_robot.setdefault(name, set()).add(topic)
+        self._moving_topics = MovingTopics(
+            RobotControls(name, frozenset(each)) for name, each in topics_by_robot.items()
+        )
 
     def check(self, topic: str) -> None:
         """Raise BehaviourError if a message on a topic would move a robot that the program may not move."""
-        names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
+        names = [name for name in self._moving_topics.robots_on(topic) if name not in self._allowed]
         if names:
             robot_names = format_list(names)
             raise BehaviourError(

@@ -35,7 +35,6 @@ class ProgramQuestion:
     text: str
     answer: str | None = None
     choices: tuple[str, ...] = ()
-    """Possible answers, shown as buttons; if empty, the user types the answer."""
 
 
 QuestionCallback = Callable[[ProgramQuestion | None], None]
@@ -58,10 +57,10 @@ class Questions:
         self._scheduler, self._on_question = scheduler, on_question
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
-        self._waiting: list[ProgramQuestion] = []
+        self._queue: list[ProgramQuestion] = []
         self.answer: object = ""
 
-    def ask(self, words: object) -> None:
+    def ask(self, question_text: object) -> None:
         """Ask a question and wait for the answer, which is stored in `answer`.
 
         Raises:
@@ -71,7 +70,7 @@ class Questions:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
-        self.answer = parse_answer(self._wait_for_answer(text(words)))
+        self.answer = parse_answer(self._wait_for_answer(text(question_text)))
 
     def ask_with_choices(self, question_text: object, choices: object) -> None:
         """Ask a question with a button for each item of a list, and store the selected item in `answer`.
@@ -86,18 +85,18 @@ class Questions:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
-        offered = choices_by_label(choices)
-        chosen_label = self._wait_for_answer(text(question_text), tuple(offered))
-        value = offered.get(chosen_label, "")
+        values_by_label = choices_by_label(choices)
+        chosen_label = self._wait_for_answer(text(question_text), tuple(values_by_label))
+        value = values_by_label.get(chosen_label, "")
         self.answer = parse_answer(value) if isinstance(value, str) else value
 
     def _wait_for_answer(self, question_text: str, choices: tuple[str, ...] = ()) -> str:
         question = ProgramQuestion(next(self._ids), question_text[:MAX_QUESTION_LENGTH], choices=choices)
-        self._update_queue(self._waiting.append, question)
+        self._update_queue(self._queue.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
         finally:  # also if the script ends meanwhile
-            self._update_queue(self._waiting.remove, question)
+            self._update_queue(self._queue.remove, question)
         return question.answer or ""
 
     def set_answer(self, id: int, answer: str) -> None:
@@ -108,16 +107,16 @@ class Questions:
             answer: Answer.
         """
         with self._lock:
-            for question in self._waiting:
+            for question in self._queue:
                 if question.id == id:
                     question.answer = answer[:MAX_ANSWER_LENGTH]
 
     def _update_queue(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
         with self._lock:
-            before = self._waiting[:1]
+            first_before = self._queue[:1]
             change(question)
-            if before != self._waiting[:1] and self._on_question is not None:
-                self._on_question(self._waiting[0] if self._waiting else None)
+            if first_before != self._queue[:1] and self._on_question is not None:
+                self._on_question(self._queue[0] if self._queue else None)
 
 
 def choices_by_label(choices: object) -> dict[str, object]:

@@ -147,21 +147,23 @@ class Replacements:
             call: Cancelled command.
             names_robot: True to include the name of the robot in the message.
         """
-        loser = next((each for each in self._commands if each.call is call), None)
-        if loser is None or loser.block is None:
+        replaced = next((each for each in self._commands if each.call is call), None)
+        if replaced is None or replaced.block is None:
             return
-        later = list(self._commands)[self._commands.index(loser) + 1 :]
-        winner = next((each for each in later if _replaces(each, loser)), None)
-        if winner is None or winner.script == loser.script:
+        later_commands = list(self._commands)[self._commands.index(replaced) + 1 :]
+        replacing = next((each for each in later_commands if _replaces(each, replaced)), None)
+        if replacing is None or replacing.script == replaced.script:
             return
         template = _("“{action}” was replaced by “{other}”")
         if names_robot:
             template = _("{robot}: “{action}” was replaced by “{other}”")
-        message = template.format(robot=call.robot, action=loser.action.title, other=winner.action.title)
-        pair = (loser.block, winner.block or winner.action.name)
+        message = template.format(
+            robot=call.robot, action=replaced.action.title, other=replacing.action.title
+        )
+        key = (replaced.block, replacing.block or replacing.action.name)
         with self._lock:
-            count = self._counts[pair] = self._counts.get(pair, 0) + 1
-            self._new_replacements[pair] = Replacement(loser.block, message, count)
+            count = self._counts[key] = self._counts.get(key, 0) + 1
+            self._new_replacements[key] = Replacement(replaced.block, message, count)
 
     def take_new(self) -> tuple[Replacement, ...]:
         """Return the replacements since the last call; repeated ones are combined with their count."""
@@ -170,11 +172,11 @@ class Replacements:
         return new_replacements
 
 
-def _replaces(winner: _Command, loser: _Command) -> bool:
+def _replaces(replacing: _Command, replaced: _Command) -> bool:
     return (
-        winner.call.robot == loser.call.robot
-        and winner.action.on_busy == REPLACE
-        and bool(set(winner.action.uses) & set(loser.action.uses))
+        replacing.call.robot == replaced.call.robot
+        and replacing.action.on_busy == REPLACE
+        and bool(set(replacing.action.uses) & set(replaced.action.uses))
     )
 
 
@@ -338,19 +340,19 @@ class RobotHandle:
             if not call.is_canceled_by_pause or call.state != "canceled":
                 return call
             self._wait_while_paused(action, is_remainder_unknown(action, input, call))
-            rest = remaining_input(action, input, call)
-            if rest is None:
+            remaining = remaining_input(action, input, call)
+            if remaining is None:
                 return call
-            input = rest
+            input = remaining
 
-    def _wait_while_paused(self, action: Action, unknown: bool) -> None:
+    def _wait_while_paused(self, action: Action, is_unknown: bool) -> None:
         names = {"robot": self._name, "action": action.title}
-        saying = self._runtime.status_text
+        status_text = self._runtime.status_text
         pause_warning = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
-        saying.set_warning(pause_warning.format(**names) if unknown else "")
+        status_text.set_warning(pause_warning.format(**names) if is_unknown else "")
         self._runtime.scheduler.wait_while_paused()
-        saying.set_warning("")
-        if unknown:
+        status_text.set_warning("")
+        if is_unknown:
             skipped_message = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
             self._runtime.write(skipped_message.format(**names))
 
@@ -362,27 +364,27 @@ class RobotHandle:
             raise BehaviourError(
                 _("{name} isn't responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
-        can_hold = action.cancellable and robot.dialect == "native"
-        limit = action.timeout_s or DEFAULT_TIMEOUT_S
-        until = time.monotonic() + limit + TIMEOUT_MARGIN_S
+        can_pause = action.cancellable and robot.dialect == "native"
+        time_limit_s = action.timeout_s or DEFAULT_TIMEOUT_S
+        deadline = time.monotonic() + time_limit_s + TIMEOUT_MARGIN_S
         is_waiting = bool(call.waits_for) and call.state == "accepted"
         if is_waiting:
             self._runtime.status_text.set_text(_waiting_text(robot, call))
 
         def ready() -> bool:
-            return call.done or (can_hold and scheduler.is_script_paused())
+            return call.done or (can_pause and scheduler.is_script_paused())
 
         while not scheduler.wait_for(
-            ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, until - time.monotonic()))
+            ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - time.monotonic()))
         ):
             if is_waiting:  # the time limit starts with the action
-                until = time.monotonic() + limit + TIMEOUT_MARGIN_S
+                deadline = time.monotonic() + time_limit_s + TIMEOUT_MARGIN_S
                 is_waiting = not call.has_started
                 self._runtime.status_text.set_text(_waiting_text(robot, call) if is_waiting else activity)
             error_text = self._silence_error(robot, call)
-            if error_text is None and time.monotonic() >= until:
+            if error_text is None and time.monotonic() >= deadline:
                 error_text = _("{name} didn't finish “{title}” within {limit:g} s.").format(
-                    name=self._name, title=action.title, limit=limit
+                    name=self._name, title=action.title, limit=time_limit_s
                 )
             if error_text is not None:
                 self._runtime.link().cancel(call)
@@ -393,8 +395,8 @@ class RobotHandle:
     def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
         if robot.heartbeat_interval_s is None:
             return None
-        silence = time.monotonic() - call.last_reply_s
-        if silence <= max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s):
+        silence_s = time.monotonic() - call.last_reply_s
+        if silence_s <= max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 
@@ -445,7 +447,7 @@ def _convert_input(action: Action, name: str, value: object) -> object:
             _("Can't run “{title}”: the value for “{value}” isn't known yet.").format(
                 title=action.title, value=parameter.title
             ),
-            unknown=True,
+            is_value_unknown=True,
         )
     return _convert_to_kind(parameter, value)
 
@@ -513,12 +515,12 @@ def remainder_parameter(action: Action, input: Mapping[str, object]) -> str | No
     Returns None if there is no such parameter or more than one.
     """
     unit = next((field.unit for field in action.feedback if field.name == REMAINING_FIELD), None)
-    same = [
+    matching_names = [
         parameter.name
         for parameter in action.parameters
         if unit is not None and parameter.unit == unit and _is_number(input.get(parameter.name))
     ]
-    return same[0] if len(same) == 1 else None
+    return matching_names[0] if len(matching_names) == 1 else None
 
 
 def _is_number(value: object) -> bool:

@@ -80,12 +80,12 @@ class CallStack:
                 block,
             )
         self._local.depth = depth + 1
-        before = self._scheduler.block()
+        previous_block = self._scheduler.block()
         try:
             result = call()
         finally:
             self._local.depth = depth
-        self._scheduler.restore_block(before)
+        self._scheduler.restore_block(previous_block)
         return result
 
 
@@ -98,7 +98,7 @@ class Runtime:
         error: Error of the script that failed, or of the robot that another program stopped; else None.
 
     Args:
-        printed: Called with each line that the program writes.
+        write_line: Called with each line that the program writes.
         labels: Labels of blocks by id.
         readings: Blocks as text by id.
         on_question: Called with the question to show, or None; without this callback, questions raise
@@ -107,13 +107,13 @@ class Runtime:
 
     def __init__(
         self,
-        printed: Callable[[str], None],
+        write_line: Callable[[str], None],
         *,
         labels: Mapping[str, str] | None = None,
         readings: Mapping[str, str] | None = None,
         on_question: QuestionCallback | None = None,
     ) -> None:
-        self._printed = printed
+        self._write_line = write_line
         self._labels = labels or {}
         self._link: ProgramLink | None = None
         self._robots: Mapping[str, Robot] = {}
@@ -122,7 +122,7 @@ class Runtime:
         self._subscriptions: list[Callable[[ProgramLink], None]] = []
         self._count_lock = threading.Lock()
         self._running = 0
-        self._timer_from_s = 0.0
+        self._timer_start_s = 0.0
         self.scheduler = Scheduler()
         self.status_text = StatusText(self.scheduler.block, readings or {})
         self.replacements = Replacements()
@@ -172,9 +172,9 @@ class Runtime:
         for script in self._starts:
             body = self._with_error_reporting(partial(self._run_once, script), on_end=self._remove_running)
             self.scheduler.start(script.__name__, body, idle=False)
-        for hat, script in self._triggers:
+        for trigger, script in self._triggers:
             body = self._with_error_reporting(
-                partial(self._run_for_events, hat, script), on_end=self._remove_running
+                partial(self._run_for_events, trigger, script), on_end=self._remove_running
             )
             self.scheduler.start(script.__name__, body)
 
@@ -183,20 +183,20 @@ class Runtime:
             self.scheduler.start_run()
             script()
 
-    def _run_for_events(self, hat: ScriptTrigger, script: Script) -> None:
+    def _run_for_events(self, trigger: ScriptTrigger, script: Script) -> None:
         while True:
-            arguments = hat.next(self.scheduler)
+            arguments = trigger.next(self.scheduler)
             with suppress(EndScript):
                 self.scheduler.start_run()
                 script(*arguments)
             self.scheduler.finish_run()
-            if hat.dropped:
+            if trigger.dropped_count:
                 self.write(
                     _("“{title}” couldn't keep up: {dropped} of its events were skipped").format(
-                        title=hat.title, dropped=hat.dropped
+                        title=trigger.title, dropped=trigger.dropped_count
                     )
                 )
-                hat.dropped = 0
+                trigger.dropped_count = 0
 
     def _with_error_reporting(
         self, body: Callable[[], None], on_end: Callable[[], None] = lambda: None
@@ -219,8 +219,8 @@ class Runtime:
     def _remove_running(self) -> None:
         with self._count_lock:
             self._running -= 1
-            last = self._running == 0
-        if last:
+            is_last = self._running == 0
+        if is_last:
             self.scheduler.stop()  # ends scripts that only wait for broadcasts
             self.finished.set()
 
@@ -253,22 +253,22 @@ class Runtime:
         """Record that the calling script has reached a block; see `Scheduler.step`."""
         self.scheduler.step(block)
 
-    def value(self, block: str, work_out: Callable[[], object]) -> object:
+    def value(self, block: str, compute: Callable[[], object]) -> object:
         """Compute and return the result of a value block; exceptions are converted to errors of the block.
 
         Args:
             block: Id of the block.
-            work_out: Computes the result.
+            compute: Computes the result.
 
         Raises:
             BehaviourError: The computation failed.
         """
         try:
-            return work_out()
+            return compute()
         except Exception as error:
             raise explain(error, self._labels.get(block, ""), block) from error
 
-    def number(self, block: str, work_out: Callable[[], object]) -> object:
+    def number(self, block: str, compute: Callable[[], object]) -> object:
         """Compute and return the result of a block that must return a number; see `value`.
 
         An unknown result (None) is returned as well.
@@ -277,7 +277,7 @@ class Runtime:
             BehaviourError: The computation failed, or the result is not a number, such as a text joined
                 by "+".
         """
-        result = self.value(block, work_out)
+        result = self.value(block, compute)
         if result is None or isinstance(result, (int, float)):
             return result
         name = f"“{self._labels.get(block, '')}”"
@@ -313,16 +313,16 @@ class Runtime:
             condition: Evaluated 50 times a second.
             at_most_s: Maximum wait in seconds, not counting pauses; None for no limit.
         """
-        limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
-        self.scheduler.wait_until(lambda: _is_true(condition), limit)
+        timeout_s = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
+        self.scheduler.wait_until(lambda: _is_true(condition), timeout_s)
 
     def write(self, value: object) -> None:
         """Write a value as a line to the Console."""
-        self._printed(values.text(value))
+        self._write_line(values.text(value))
 
     def show(self, value: object) -> None:
         """Write the value of a tried block as a short line; an empty line if the value is unknown."""
-        self._printed("" if value is None else short_text(value))
+        self._write_line("" if value is None else short_text(value))
 
     # ---- questions
 
@@ -342,11 +342,11 @@ class Runtime:
 
     def timer(self) -> float:
         """Return the seconds since the start or the last reset, not counting pauses of the program."""
-        return round(self.scheduler.running_time_s() - self._timer_from_s, 3)
+        return round(self.scheduler.running_time_s() - self._timer_start_s, 3)
 
     def reset_timer(self) -> None:
         """Restart the timer at 0."""
-        self._timer_from_s = self.scheduler.running_time_s()
+        self._timer_start_s = self.scheduler.running_time_s()
 
     # ---- topics
 
@@ -374,10 +374,10 @@ class Runtime:
 
     def broadcast_and_wait(self, name: str) -> None:
         """Start the scripts that receive a broadcast, and wait until they have ended."""
-        sent = self._broadcasts.send(name)
-        self.scheduler.wait_until(lambda: all(each.done for each in sent), None)
+        deliveries = self._broadcasts.send(name)
+        self.scheduler.wait_until(lambda: all(each.done for each in deliveries), None)
 
-    # ---- hats
+    # ---- event blocks
 
     def on_start(self, script: Script) -> Script:
         """Register a script that runs when the program starts."""
@@ -387,8 +387,8 @@ class Runtime:
     def on_message(self, topic: str) -> Decorator:
         """Return a decorator for scripts that run for each message on a topic and take its payload."""
 
-        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
-            link.on_message(topic, lambda payload: hat.enqueue((payload,)))
+        def prepare(trigger: ScriptTrigger, link: ProgramLink) -> None:
+            link.on_message(topic, lambda payload: trigger.enqueue((payload,)))
 
         return self._trigger_decorator(
             _("when a message arrives on {topic}").format(topic=topic), prepare, MAX_QUEUED_MESSAGES
@@ -426,13 +426,13 @@ class Runtime:
             filters: Required values of fields, by name.
         """
 
-        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
+        def prepare(trigger: ScriptTrigger, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
             source = self._robots[robot].source
 
             def on_data(data: object) -> None:
                 if event_matches(data, filters, description, source):
-                    hat.enqueue(())
+                    trigger.enqueue(())
 
             link.on_event(robot, event, on_data)
 
@@ -443,8 +443,8 @@ class Runtime:
     def on_change(self, robot: str, sensor: str) -> Decorator:
         """Return a decorator for scripts that run each time the value of a sensor changes."""
 
-        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
-            link.on_sensor(robot, sensor, change_detector(lambda: hat.enqueue(())))
+        def prepare(trigger: ScriptTrigger, link: ProgramLink) -> None:
+            link.on_sensor(robot, sensor, change_detector(lambda: trigger.enqueue(())))
 
         return self._trigger_decorator(
             _("when {robot} {sensor} changes").format(robot=robot, sensor=sensor), prepare, MAX_QUEUED_EVENTS
@@ -456,8 +456,8 @@ class Runtime:
         See `RobotHandle.on_pass` for the arguments.
         """
 
-        def prepare(hat: ScriptTrigger, link: ProgramLink) -> None:
-            link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: hat.enqueue(())))
+        def prepare(trigger: ScriptTrigger, link: ProgramLink) -> None:
+            link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: trigger.enqueue(())))
 
         return self._trigger_decorator(
             _("when {robot} {sensor} goes {side} {limit}").format(
@@ -468,12 +468,12 @@ class Runtime:
         )
 
     def _trigger_decorator(
-        self, title: str, prepare: Callable[[ScriptTrigger, ProgramLink], None], waiting: int
+        self, title: str, prepare: Callable[[ScriptTrigger, ProgramLink], None], max_queued: int
     ) -> Decorator:
         def decorate(script: Script) -> Script:
-            hat = ScriptTrigger(title, max_waiting=waiting)
-            self._triggers.append((hat, script))
-            self._subscriptions.append(lambda link: prepare(hat, link))
+            trigger = ScriptTrigger(title, max_queued=max_queued)
+            self._triggers.append((trigger, script))
+            self._subscriptions.append(lambda link: prepare(trigger, link))
             return script
 
         return decorate
@@ -501,7 +501,7 @@ class Runtime:
 
     def _require_link(self) -> ProgramLink:
         if self._link is None:
-            raise BehaviourError(_("the program hasn't started yet."))
+            raise BehaviourError(_("The program hasn't started yet."))
         return self._link
 
 
@@ -509,6 +509,6 @@ def _is_true(condition: Callable[[], object]) -> bool:
     try:
         return bool(condition())
     except BehaviourError as error:
-        if error.unknown:
+        if error.is_value_unknown:
             return False
         raise

@@ -56,10 +56,10 @@ class Script:
         self.name = name
         self.wake = threading.Condition(lock)
         self.block: str | None = None
-        self.idle = True  # waits for its event
-        self.ended = False  # EndScript is raised at its next call
-        self.busy = False  # waits for something that continues while paused, such as a robot's answer
-        self.frozen = False  # waits for time or a condition, which pauses
+        self.is_idle = True  # waits for its event
+        self.is_ending = False  # EndScript is raised at its next call
+        self.has_external_wait = False  # waits for something that a pause doesn't suspend, such as a reply
+        self.has_pausable_wait = False  # waits for time or a condition, which a pause suspends
 
 
 class Scheduler:
@@ -75,15 +75,15 @@ class Scheduler:
         self._scripts: list[Script] = []
         self._local = threading.local()
         self._owner: Script | None = None
-        self._parked: deque[Script] = deque()  # waiting before a block
-        self._resuming: deque[Script] = deque()  # continuing a block after a wait
-        self._turns_deferred = False  # no script gets the turn while scripts are being started
-        self._paused = False
+        self._parked_scripts: deque[Script] = deque()  # waiting before a block
+        self._resuming_scripts: deque[Script] = deque()  # continuing a block after a wait
+        self._are_turns_deferred = False  # no script gets the turn while scripts are being started
+        self._is_paused = False
         self._paused_since_s = 0.0
         self._paused_total_s = 0.0  # total duration of earlier pauses
         self.pace_s = 0.0  # see `set_pace`
-        self._stepping: Script | None = None
-        self._stopping = False
+        self._stepping_script: Script | None = None
+        self._is_stopping = False
 
     # ---- scripts
 
@@ -97,7 +97,7 @@ class Scheduler:
                 at once.
         """
         script = Script(name, self._lock)
-        script.idle = idle
+        script.is_idle = idle
         with self._lock:
             self._scripts.append(script)
 
@@ -118,10 +118,10 @@ class Scheduler:
     def defer_turns(self) -> Iterator[None]:
         """Return a context manager for starting several scripts, in which no script runs yet."""
         with self._lock:
-            self._turns_deferred = True
+            self._are_turns_deferred = True
         yield
         with self._lock:
-            self._turns_deferred = False
+            self._are_turns_deferred = False
             self._grant_turn_locked()
 
     def start_run(self) -> None:
@@ -131,7 +131,7 @@ class Scheduler:
         """
         script = self._current_script()
         with self._lock:
-            script.idle = False
+            script.is_idle = False
             self._acquire_turn_locked(script)
 
     def acquire_turn(self) -> None:
@@ -141,7 +141,7 @@ class Scheduler:
         """
         script = self._current_script()
         with self._lock:
-            while self._paused and not self._stopping:
+            while self._is_paused and not self._is_stopping:
                 script.wake.wait()
             self._acquire_turn_locked(script)
 
@@ -149,7 +149,7 @@ class Scheduler:
         """End the current run of the calling script, which is idle until the next `start_run`."""
         script = self._current_script()
         with self._lock:
-            script.idle, script.block, script.ended = True, None, False
+            script.is_idle, script.block, script.is_ending = True, None, False
             self._release_turn_locked(script)
 
     def step(self, block: str) -> None:
@@ -164,15 +164,15 @@ class Scheduler:
         with self._lock:
             self._raise_if_ended(script)
             script.block = block
-            if self._stepping is script:
-                self._stepping = None
-            if self.pace_s and not self._paused:
+            if self._stepping_script is script:
+                self._stepping_script = None
+            if self.pace_s and not self._is_paused:
                 self._wait_locked(script, lambda: self.pace_s, step_ends=True)
-            if self._stepping is script:
+            if self._stepping_script is script:
                 return  # a step was requested while the script waited here
-            if not self._parked and not self._resuming and not self._paused:
+            if not self._parked_scripts and not self._resuming_scripts and not self._is_paused:
                 return
-            self._release_turn_locked(script, then_park=True)
+            self._release_turn_locked(script, is_parked=True)
             self._await_turn_locked(script)
 
     def current_script(self) -> Script:
@@ -189,15 +189,15 @@ class Scheduler:
 
     def end_other_runs(self) -> None:
         """End the current runs of all scripts except the calling one."""
-        mine = self._current_script()
+        current = self._current_script()
         with self._lock:
             for script in self._scripts:
-                if script is not mine:
+                if script is not current:
                     self._end_run_locked(script)
 
     def _end_run_locked(self, script: Script) -> None:
-        if not script.idle:
-            script.ended = True
+        if not script.is_idle:
+            script.is_ending = True
             script.wake.notify()
 
     # ---- waiting: other scripts run meanwhile
@@ -214,15 +214,15 @@ class Scheduler:
             at_most_s: Timeout in seconds, not counting pauses; None for no limit.
         """
         script = self._current_script()
-        remaining = at_most_s
+        remaining_s = at_most_s
         while condition is None or not condition():
-            if remaining is not None and remaining <= 0:
+            if remaining_s is not None and remaining_s <= 0:
                 return False
-            slice_s = remaining if condition is None else POLL_INTERVAL_S
-            if remaining is not None and slice_s is not None:
-                slice_s = min(slice_s, remaining)
+            slice_s = remaining_s if condition is None else POLL_INTERVAL_S
+            if remaining_s is not None and slice_s is not None:
+                slice_s = min(slice_s, remaining_s)
             elapsed_s = self._wait_slice(script, slice_s)
-            remaining = None if remaining is None else remaining - elapsed_s
+            remaining_s = None if remaining_s is None else remaining_s - elapsed_s
         return True
 
     def _wait_slice(self, script: Script, seconds: float | None) -> float:
@@ -242,16 +242,16 @@ class Scheduler:
             idle: True for an idle script that waits for its next event.
         """
         script = self._current_script()
-        until = None if timeout_s is None else self._clock() + timeout_s
+        deadline = None if timeout_s is None else self._clock() + timeout_s
         with self._lock:
-            script.busy = not idle
+            script.has_external_wait = not idle
             self._release_turn_locked(script)
             while not self._has_ended(script) and not ready():
-                remaining_s = None if until is None else until - self._clock()
+                remaining_s = None if deadline is None else deadline - self._clock()
                 if remaining_s is not None and remaining_s <= 0:
                     break
                 script.wake.wait(remaining_s)
-            script.busy = False
+            script.has_external_wait = False
             self._raise_if_ended(script)
             if not idle:
                 self._acquire_turn_locked(script)
@@ -259,12 +259,13 @@ class Scheduler:
 
     def is_script_paused(self) -> bool:
         """Return True if the calling script is suspended by a pause. Can be called with the lock held."""
-        return self._paused and self._stepping is not self._current_script()
+        return self._is_paused and self._stepping_script is not self._current_script()
 
     def wait_while_paused(self) -> None:
         """Wait within a block until the pause ends or a single step is requested."""
         with self._lock:
-            self._wait_locked(self._current_script(), lambda: None if self._paused else 0.0, step_ends=True)
+            script = self._current_script()
+            self._wait_locked(script, lambda: None if self._is_paused else 0.0, step_ends=True)
 
     def wake_scripts(self) -> None:
         """Wake waiting scripts so that they check their conditions. Thread-safe."""
@@ -276,29 +277,29 @@ class Scheduler:
     def pause(self) -> None:
         """Suspend every script at its next block. Thread-safe."""
         with self._lock:
-            if not self._paused:
+            if not self._is_paused:
                 self._paused_since_s = self._clock()
-            self._paused = True
+            self._is_paused = True
             self._wake_all_locked()
 
     @property
     def is_paused(self) -> bool:
         """True between `pause` and `resume`, even during a single step."""
-        return self._paused
+        return self._is_paused
 
     def resume(self) -> None:
         """Resume all scripts after a pause. Thread-safe."""
         with self._lock:
-            if self._paused:
+            if self._is_paused:
                 self._paused_total_s += self._clock() - self._paused_since_s
-            self._paused, self._stepping = False, None
+            self._is_paused, self._stepping_script = False, None
             self._grant_turn_locked()
             self._wake_all_locked()
 
     def running_time_s(self) -> float:
         """Return the time in seconds of a monotonic clock that stops while the program is paused."""
         with self._lock:
-            return (self._paused_since_s if self._paused else self._clock()) - self._paused_total_s
+            return (self._paused_since_s if self._is_paused else self._clock()) - self._paused_total_s
 
     def set_pace(self, seconds: float) -> None:
         """Set the delay of each script at each block.
@@ -315,26 +316,28 @@ class Scheduler:
         Has no effect unless the program is paused, or while a script runs.
         """
         with self._lock:
-            if not self._paused or self._stepping is not None or self._owner is not None:
+            if not self._is_paused or self._stepping_script is not None or self._owner is not None:
                 return
-            if self._parked:
-                self._stepping = self._parked.popleft()
-                self._resuming.append(self._stepping)
+            if self._parked_scripts:
+                self._stepping_script = self._parked_scripts.popleft()
+                self._resuming_scripts.append(self._stepping_script)
                 self._grant_turn_locked()
                 return
-            self._stepping = next((script for script in self._scripts if script.frozen), None)
+            self._stepping_script = next(
+                (script for script in self._scripts if script.has_pausable_wait), None
+            )
             self._wake_all_locked()
 
     def stop(self) -> None:
         """Stop the program: end waiting scripts at once, and other scripts at their next call of a method."""
         with self._lock:
-            self._stopping = True
+            self._is_stopping = True
             self._wake_all_locked()
 
     @property
     def is_stopping(self) -> bool:
         """True after `stop` was called."""
-        return self._stopping
+        return self._is_stopping
 
     def restore_block(self, block: str | None) -> None:
         """Set the current block of the calling script after a function call."""
@@ -347,12 +350,16 @@ class Scheduler:
     def snapshot(self) -> Snapshot:
         """Return the current state of the scripts."""
         with self._lock:
-            active = [script for script in self._scripts if not script.idle]
+            active = [script for script in self._scripts if not script.is_idle]
             blocks = tuple(dict.fromkeys(script.block for script in active if script.block))
-            is_idle = self._owner is None and self._stepping is None and not any(s.busy for s in active)
-            first = next((script.block for script in self._parked if script.block), None)
-            following = first or next((script.block for script in active if script.frozen), None)
-            return Snapshot(blocks, following, self._paused and is_idle and not self._resuming)
+            is_quiet = (
+                self._owner is None
+                and self._stepping_script is None
+                and not any(s.has_external_wait for s in active)
+            )
+            first = next((script.block for script in self._parked_scripts if script.block), None)
+            next_block = first or next((script.block for script in active if script.has_pausable_wait), None)
+            return Snapshot(blocks, next_block, self._is_paused and is_quiet and not self._resuming_scripts)
 
     # ---- the turn; call with the lock held
 
@@ -360,19 +367,19 @@ class Scheduler:
         self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False
     ) -> float:
         elapsed_s = 0.0
-        script.frozen = True
+        script.has_pausable_wait = True
         self._release_turn_locked(script)
-        while not self._has_ended(script) and not (step_ends and self._stepping is script):
+        while not self._has_ended(script) and not (step_ends and self._stepping_script is script):
             max_wait_s = limit_s()
             if max_wait_s is not None and elapsed_s >= max_wait_s:
                 break
-            if self._paused and self._stepping is not script:
+            if self._is_paused and self._stepping_script is not script:
                 script.wake.wait()
                 continue
             started_s = self._clock()
             script.wake.wait(None if max_wait_s is None else max_wait_s - elapsed_s)
             elapsed_s += self._clock() - started_s
-        script.frozen = False
+        script.has_pausable_wait = False
         self._acquire_turn_locked(script)
         return elapsed_s
 
@@ -382,15 +389,15 @@ class Scheduler:
             return script
         raise RuntimeError(_("this only works in a script; put it below “when started”"))
 
-    def _release_turn_locked(self, script: Script, *, then_park: bool = False) -> None:
+    def _release_turn_locked(self, script: Script, *, is_parked: bool = False) -> None:
         if self._owner is script:
             self._owner = None
-        if then_park:
-            self._parked.append(script)
+        if is_parked:
+            self._parked_scripts.append(script)
         self._grant_turn_locked()
 
     def _acquire_turn_locked(self, script: Script) -> None:
-        self._resuming.append(script)
+        self._resuming_scripts.append(script)
         self._grant_turn_locked()
         self._await_turn_locked(script)
 
@@ -402,12 +409,12 @@ class Scheduler:
         self._raise_if_ended(script)
 
     def _grant_turn_locked(self) -> None:
-        if self._owner is not None or self._turns_deferred:
+        if self._owner is not None or self._are_turns_deferred:
             return
-        if self._resuming:
-            self._owner = self._resuming.popleft()
-        elif self._parked and not self._paused:
-            self._owner = self._parked.popleft()
+        if self._resuming_scripts:
+            self._owner = self._resuming_scripts.popleft()
+        elif self._parked_scripts and not self._is_paused:
+            self._owner = self._parked_scripts.popleft()
         if self._owner is not None:
             self._owner.wake.notify()
 
@@ -422,17 +429,17 @@ class Scheduler:
             self._release_turn_locked(script)
 
     def _discard_turn_locked(self, script: Script) -> None:
-        if self._stepping is script:
-            self._stepping = None
-        for queue in (self._parked, self._resuming):
+        if self._stepping_script is script:
+            self._stepping_script = None
+        for queue in (self._parked_scripts, self._resuming_scripts):
             if script in queue:
                 queue.remove(script)
 
     def _has_ended(self, script: Script) -> bool:
-        return self._stopping or script.ended
+        return self._is_stopping or script.is_ending
 
     def _raise_if_ended(self, script: Script) -> None:
-        if self._stopping:
+        if self._is_stopping:
             raise StopProgram
-        if script.ended:
+        if script.is_ending:
             raise EndScript

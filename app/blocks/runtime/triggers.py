@@ -16,20 +16,20 @@ class ScriptTrigger:
 
     Attributes:
         title: Title of the event block, for messages.
-        dropped: Number of dropped events (only if the queue can hold more than one).
+        dropped_count: Number of dropped events (only if the queue can hold more than one).
 
     Args:
         title: Title of the event block.
-        max_waiting: Maximum number of queued events.
+        max_queued: Maximum number of queued events.
         condition: Condition; None for a queue of events.
     """
 
     def __init__(
-        self, title: str, *, max_waiting: int = 1, condition: Callable[[], bool] | None = None
+        self, title: str, *, max_queued: int = 1, condition: Callable[[], bool] | None = None
     ) -> None:
         self.title = title
-        self.dropped = 0
-        self._waiting: deque[tuple[object, ...]] = deque(maxlen=max_waiting)
+        self.dropped_count = 0
+        self._queue: deque[tuple[object, ...]] = deque(maxlen=max_queued)
         self._condition = condition
         self._was_true: bool | None = None
 
@@ -39,15 +39,15 @@ class ScriptTrigger:
         Args:
             arguments: Arguments for the script.
         """
-        if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
-            self.dropped += 1
-        self._waiting.append(arguments)
+        if len(self._queue) == self._queue.maxlen and self._queue.maxlen > 1:
+            self.dropped_count += 1
+        self._queue.append(arguments)
 
     def next(self, scheduler: Scheduler) -> tuple[object, ...]:
         """Wait until an event arrives or the condition becomes true, and return the script's arguments."""
         if self._condition is None:
-            scheduler.wait_for(lambda: bool(self._waiting), idle=True)
-            return self._waiting.popleft()
+            scheduler.wait_for(lambda: bool(self._queue), idle=True)
+            return self._queue.popleft()
         while not self._has_become_true(scheduler):
             scheduler.wait_for(lambda: False, POLL_INTERVAL_S, idle=True)
         return ()
@@ -57,50 +57,50 @@ class ScriptTrigger:
             return False
         scheduler.acquire_turn()
         try:
-            is_so = self._condition()
+            is_true = self._condition()
         finally:
             scheduler.finish_run()
         # A condition that is true from the start is not a change.
-        became = is_so and self._was_true is False
-        self._was_true = is_so
-        return became
+        has_become_true = is_true and self._was_true is False
+        self._was_true = is_true
+        return has_become_true
 
 
 class ThresholdTrigger:
-    """Threshold trigger that calls ``passed`` when a number passes a limit.
+    """Trigger that calls ``on_pass`` when a number passes a limit.
 
     A first value beyond the limit doesn't count.
 
     Args:
         side: "below" or "above".
         limit: Limit of the number.
-        passed: Called each time the number gets below or above the limit.
+        on_pass: Called each time the number gets below or above the limit.
     """
 
-    def __init__(self, side: str, limit: float, passed: Callable[[], None]) -> None:
+    def __init__(self, side: str, limit: float, on_pass: Callable[[], None]) -> None:
         self._side = side
         self._limit = limit
-        self._passed = passed
+        self._on_pass = on_pass
         self._was_beyond: bool | None = None
 
     def __call__(self, value: object) -> None:
         """Process a new value; values that aren't numbers are ignored."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return
-        beyond = value < self._limit if self._side == "below" else value > self._limit
-        if beyond and self._was_beyond is False:
-            self._passed()
-        self._was_beyond = beyond
+        is_beyond = value < self._limit if self._side == "below" else value > self._limit
+        if is_beyond and self._was_beyond is False:
+            self._on_pass()
+        self._was_beyond = is_beyond
 
 
-def change_detector(changed: Callable[[], None]) -> Callable[[object], None]:
-    """Return a function that calls ``changed`` when its argument differs from that of the last call."""
-    before: list[object] = []
+def change_detector(on_change: Callable[[], None]) -> Callable[[object], None]:
+    """Return a function that calls ``on_change`` when its argument differs from that of the last call."""
+    previous: list[object] = []
 
     def on_value(value: object) -> None:
-        if before and before[0] != value:
-            changed()
-        before[:] = [value]
+        if previous and previous[0] != value:
+            on_change()
+        previous[:] = [value]
 
     return on_value
 

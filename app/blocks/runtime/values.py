@@ -43,14 +43,14 @@ def text(value: object) -> str:
     return str(value)
 
 
-def _to_json_safe(value: object, around: tuple[int, ...]) -> object:
+def _to_json_safe(value: object, enclosing_ids: tuple[int, ...]) -> object:
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return text(value)
     if not isinstance(value, (Mapping, list, tuple)):
         return value
-    if id(value) in around:
+    if id(value) in enclosing_ids:
         return "…"
-    ancestors = (*around, id(value))
+    ancestors = (*enclosing_ids, id(value))
     if isinstance(value, Mapping):
         return {
             str(_to_json_safe(key, ancestors)): _to_json_safe(each, ancestors) for key, each in value.items()
@@ -93,13 +93,13 @@ def grapheme_clusters(string: str) -> Sequence[str]:
     return clusters
 
 
-def _is_combining(before: str, character: str) -> bool:
-    if before[-1] == _ZERO_WIDTH_JOINER or character in (_ZERO_WIDTH_JOINER, "\ufe0f"):
+def _is_combining(previous: str, character: str) -> bool:
+    if previous[-1] == _ZERO_WIDTH_JOINER or character in (_ZERO_WIDTH_JOINER, "\ufe0f"):
         return True
     if "\U0001f3fb" <= character <= "\U0001f3ff" or "\U000e0020" <= character <= "\U000e007f":
         return True  # skin tones, letters of a region's flag
     if "\U0001f1e6" <= character <= "\U0001f1ff":  # second half of a flag
-        return len(before) == 1 and "\U0001f1e6" <= before <= "\U0001f1ff"
+        return len(previous) == 1 and "\U0001f1e6" <= previous <= "\U0001f1ff"
     return unicodedata.category(character) in ("Mn", "Me", "Mc")
 
 
@@ -115,7 +115,8 @@ def number(value: object, label: str) -> int | float:
     """
     if value is None:
         raise BehaviourError(
-            _("{what} can't run: one of its values isn't known yet.").format(what=_(label)), unknown=True
+            _("{what} can't run: one of its values isn't known yet.").format(what=_(label)),
+            is_value_unknown=True,
         )
     if not isinstance(value, (int, float)):
         raise BehaviourError(
@@ -151,7 +152,7 @@ def random_number(low: object, high: object) -> int | float:
 
 
 def repeat(times: object) -> range:
-    """Return the range for a loop; the number of rounds is rounded, and 0 if negative."""
+    """Return the range for a loop; the number of iterations is rounded, and 0 if negative."""
     return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ITERATIONS)))
 
 

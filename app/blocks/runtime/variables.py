@@ -97,7 +97,7 @@ class VariableWatch:
         The first call returns all variables. Beyond `MAX_TOTAL_CHARACTERS`, the rest is left to the
         next call.
         """
-        changed, characters = [], 0
+        changed_values, characters = [], 0
         for python, variable in self._variables.items():
             if characters > MAX_TOTAL_CHARACTERS:
                 break
@@ -105,15 +105,15 @@ class VariableWatch:
             if python in self._reported_values and self._is_unchanged(python, value):
                 continue
             try:
-                displayed = display_value(variable.id, value)
+                display = display_value(variable.id, value)
             except RuntimeError:
                 continue  # a script is changing the value; the next read gets it
             self._last_values[python] = _comparable(value)
-            if displayed != self._reported_values.get(python):
-                self._reported_values[python] = displayed
-                changed.append(displayed)
-                characters += len(displayed.text) + sum(map(len, displayed.items))
-        return changed
+            if display != self._reported_values.get(python):
+                self._reported_values[python] = display
+                changed_values.append(display)
+                characters += len(display.text) + sum(map(len, display.items))
+        return changed_values
 
     def set_value(self, python: str, value: str | float | bool) -> None:
         """Set a variable of the program.
@@ -186,8 +186,8 @@ def limited_text(value: object, max_length: int) -> str:
     if isinstance(value, str):
         return _truncate(value[: max_length + 1], max_length)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:
-        about = round(value.bit_length() * 0.30103)
-        return _("a number with about {count} digits").format(count=about)
+        digit_count = round(value.bit_length() * 0.30103)
+        return _("a number with about {count} digits").format(count=digit_count)
     if isinstance(value, (list, tuple, Mapping)):
         parts: list[str] = []
         remaining = max_length

@@ -53,14 +53,14 @@ def _toolbox(catalogue: Catalogue) -> dict[str, object]:
     }
     contents += [_category(each, groups) for each in categories() if each.blocks and not each.parent]
     for robot in catalogue.connected.values():
-        contents.append(_heading(robot, connected=True))
+        contents.append(_heading(robot, is_connected=True))
         contents += [_group(robot, group) for group in groups[robot.name]]
-    contents += [_heading(robot, connected=False) for robot in catalogue.absent.values()]
+    contents += [_heading(robot, is_connected=False) for robot in catalogue.absent.values()]
     return {"kind": "categoryToolbox", "contents": contents}
 
 
-def _heading(robot: Robot, *, connected: bool) -> dict[str, object]:
-    return {"kind": "robotHeading", "name": robot.name, "virtual": robot.virtual, "connected": connected}
+def _heading(robot: Robot, *, is_connected: bool) -> dict[str, object]:
+    return {"kind": "robotHeading", "name": robot.name, "virtual": robot.virtual, "connected": is_connected}
 
 
 def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict[str, object]:
@@ -83,7 +83,7 @@ def _category_contents(category: Category) -> Iterator[Mapping[str, object]]:
     for block in category.blocks:
         if block.type in category.headings:
             yield {"kind": "label", "text": category.headings[block.type]}
-        if block.in_toolbox:
+        if block.is_in_toolbox:
             yield block.to_toolbox()
 
 

@@ -170,8 +170,8 @@ def _example(block: Block) -> str:
 def title(block: Block) -> str:
     """Return the text on a block with the names of slots in parentheses, such as ``wait (seconds) s``."""
 
-    def slot_text(hole: re.Match[str]) -> str:
-        argument = block.argument(hole[1])
+    def slot_text(match: re.Match[str]) -> str:
+        argument = block.argument(match[1])
         if argument is None or isinstance(argument, (LiveField, StatementInput)):
             return ""
         return f"({slot_name(block, argument)})"
@@ -197,7 +197,7 @@ def name(block: Block) -> str:
 
 def slot_name(block: Block, argument: Argument) -> str:
     """Return the display name of a slot or field."""
-    gap_texts = block.about.get(argument.name)
+    gap_texts = block.slot_texts.get(argument.name)
     if gap_texts:
         return gap_texts[0]
     return translate("gap", english_slot_name(argument))
@@ -210,7 +210,7 @@ def english_slot_name(argument: Argument) -> str:
 
 def _argument_text(block: Block, argument: Argument) -> str:
     kind_text = _kind_text(argument)
-    gap_texts = block.about.get(argument.name)
+    gap_texts = block.slot_texts.get(argument.name)
     if kind_text and gap_texts and gap_texts[1]:
         return _("{kind}, {more}").format(kind=kind_text, more=gap_texts[1])
     return kind_text
@@ -239,7 +239,7 @@ _FIELD_TEXTS: Mapping[type[Argument], str] = {
     PathField: lazy("name of a field in the topic's messages"),
     ColourField: lazy("a colour; click on it to choose"),
     VariableField: lazy("one of the behaviour's variables"),
-    Items: lazy("as many slots as you like"),
+    Items: lazy("up to 50 slots"),
     Inputs: lazy("inputs of the function"),
 }
 
@@ -250,14 +250,14 @@ def _value_text(gap: ValueInput) -> str:
         value_text = _("{kind}; {value} by default").format(kind=value_text, value=f"{gap.default:g}")
     if gap.only_if is None:
         return value_text
-    return _("{kind}; used only if you choose an item by its number").format(kind=value_text)
+    return _("{kind}; used only if you choose by number").format(kind=value_text)
 
 
 def _choice_text(field: ChoiceField) -> str:
     names = [f"“{option_text}”" for option_text, _value in field.options]
     if len(names) > _MAX_CHOICES:
-        few = ", ".join(names[: _MAX_CHOICES - 1])
-        return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
+        first_names = ", ".join(names[: _MAX_CHOICES - 1])
+        return _("one of {count} choices: {few} and others").format(count=len(names), few=first_names)
     return format_list(names, "or") if len(names) > 1 else _("choose one")
 
 

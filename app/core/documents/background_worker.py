@@ -25,15 +25,15 @@ class BackgroundWorker(Generic[T]):
         self._pending: dict[str, Callable[[], T]] = {}
         self._current_owner: str | None = None
         self._results: dict[str, T] = {}
-        self._failed: dict[str, Exception] = {}
+        self._errors: dict[str, Exception] = {}
         self._thread: threading.Thread | None = None
-        self._closed = False
+        self._is_closed = False
 
     def submit(self, owner: str, job: Callable[[], T]) -> None:
         """Queue a job for an owner; a pending job of the same owner is discarded."""
         with self._changed:
             self._pending[owner] = job
-            if self._thread is None and not self._closed:
+            if self._thread is None and not self._is_closed:
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 start_deep(self._thread)
             self._changed.notify_all()
@@ -44,16 +44,16 @@ class BackgroundWorker(Generic[T]):
         Raises the exception of a failed job.
         """
         with self._changed:
-            failed = self._failed.pop(owner, None)
-            if failed is not None:
-                raise failed
+            error = self._errors.pop(owner, None)
+            if error is not None:
+                raise error
             return self._results.pop(owner, None)
 
     def finish(self, owner: str) -> bool:
         """Wait at most 2 s until the owner has no pending or running job; return False on timeout."""
         with self._changed:
             return self._changed.wait_for(
-                lambda: self._closed or (owner not in self._pending and self._current_owner != owner),
+                lambda: self._is_closed or (owner not in self._pending and self._current_owner != owner),
                 JOIN_TIMEOUT_S,
             )
 
@@ -62,12 +62,12 @@ class BackgroundWorker(Generic[T]):
         with self._changed:
             self._pending.pop(owner, None)
             self._results.pop(owner, None)
-            self._failed.pop(owner, None)
+            self._errors.pop(owner, None)
 
     def close(self) -> None:
         """Stop the thread after the current job; waits at most 2 s."""
         with self._changed:
-            self._closed = True
+            self._is_closed = True
             self._pending.clear()
             self._changed.notify_all()
         if self._thread is not None:
@@ -78,8 +78,8 @@ class BackgroundWorker(Generic[T]):
             with self._changed:
                 self._current_owner = None
                 self._changed.notify_all()
-                self._changed.wait_for(lambda: self._closed or bool(self._pending))
-                if self._closed:
+                self._changed.wait_for(lambda: self._is_closed or bool(self._pending))
+                if self._is_closed:
                     return
                 owner = self._current_owner = next(iter(self._pending))
                 job = self._pending.pop(owner)
@@ -88,8 +88,8 @@ class BackgroundWorker(Generic[T]):
             except Exception as error:  # noqa: BLE001  raised in the thread that takes the result
                 with self._changed:
                     self._results.pop(owner, None)
-                    self._failed[owner] = error
+                    self._errors[owner] = error
                 continue
             with self._changed:
-                self._failed.pop(owner, None)
+                self._errors.pop(owner, None)
                 self._results[owner] = result

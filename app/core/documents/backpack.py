@@ -42,17 +42,17 @@ class BackpackStack:
 
     Attributes:
         id: Unique id of the stack.
-        at: Time when the stack was added, in seconds since 1970.
+        added_s: Time when the stack was added, in seconds since 1970.
         block: Blocks in Blockly's JSON format, with the names of their variables.
     """
 
     id: str
-    at: float
+    added_s: float
     block: Json
 
     def to_json(self) -> dict[str, object]:
         """Return the stack as a JSON object, as used in the file and in the editor's page."""
-        return {"id": self.id, "at": self.at, "block": self.block}
+        return {"id": self.id, "at": self.added_s, "block": self.block}
 
 
 class _Content(NamedTuple):
@@ -82,7 +82,7 @@ class Backpack:
         self._content = _Content()
         self._stamp: Stamp | None = None
         self._problem = ""
-        self._reported = ""
+        self._reported_problem = ""
         make_private(self.path.parent, "backpack*.json")
 
     @property
@@ -92,8 +92,8 @@ class Backpack:
 
     def take_problem(self) -> str:
         """Return and clear the error message about the file; "" if there is no error."""
-        trouble, self._problem = self._problem, ""
-        return trouble
+        problem, self._problem = self._problem, ""
+        return problem
 
     def reload_if_changed(self) -> None:
         """Reload the file if another instance has changed it."""
@@ -110,9 +110,11 @@ class Backpack:
         Raises BackpackError if the backpack is full or can't be written.
         """
         # Newer than all existing stacks, even if the clock was set back.
-        newest = max([self._clock(), *(item.at + len(blocks) * _MIN_TIME_STEP_S for item in self.items[:1])])
+        newest_s = max(
+            [self._clock(), *(item.added_s + len(blocks) * _MIN_TIME_STEP_S for item in self.items[:1])]
+        )
         items = [
-            BackpackStack(uuid4().hex, newest - index * _MIN_TIME_STEP_S, each)
+            BackpackStack(uuid4().hex, newest_s - index * _MIN_TIME_STEP_S, each)
             for index, each in enumerate(blocks)
         ]
         self.restore(items)
@@ -124,7 +126,7 @@ class Backpack:
         Raises BackpackError if the backpack is full or can't be written.
         """
         ids = {item.id for item in items}
-        self._update_items(lambda found: (*(item for item in found if item.id not in ids), *items))
+        self._update_items(lambda stacks: (*(item for item in stacks if item.id not in ids), *items))
 
     def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
         """Remove the stacks with these ids; return the removed stacks.
@@ -152,10 +154,10 @@ class Backpack:
     def _update_items(self, change: Callable[[tuple[BackpackStack, ...]], tuple[BackpackStack, ...]]) -> None:
         with locked(self.path):
             content = self._read()
-            now = _Content(_sort_newest_first(change(content.items)), content.unknown_entries)
-            if _ids(now) != _ids(content):
-                self._write(now, grows=len(now.items) > len(content.items))
-            self._apply(now)
+            updated = _Content(_sort_newest_first(change(content.items)), content.unknown_entries)
+            if _ids(updated) != _ids(content):
+                self._write(updated, grows=len(updated.items) > len(content.items))
+            self._apply(updated)
 
     def _apply(self, content: _Content) -> None:
         if _ids(content) != _ids(self._content):
@@ -218,8 +220,10 @@ class Backpack:
         if unknown:
             self._report_once(
                 ngettext(
-                    "{count} item in the backpack can't be read here; it was saved in '{path}'",
-                    "{count} items in the backpack can't be read here; they were saved in '{path}'",
+                    "{count} item in the backpack can't be shown by this version of Studio; it stays in "
+                    "'{path}'",
+                    "{count} items in the backpack can't be shown by this version of Studio; they stay in "
+                    "'{path}'",
                     len(unknown),
                 ).format(count=len(unknown), path=self.path)
             )
@@ -227,16 +231,16 @@ class Backpack:
 
     def _switch_to_own_file(self) -> _Content:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
-        newer = self.path
-        self.path = newer.with_name(f"backpack.format-{VERSION}.json")
-        if self.path == newer:
+        newer_path = self.path
+        self.path = newer_path.with_name(f"backpack.format-{VERSION}.json")
+        if self.path == newer_path:
             return self._rename_damaged_file()
         if not self.path.exists():
             self._report_once(
                 _(
                     "the backpack in “{file}” belongs to a newer NEP Studio and is unchanged; blocks you add "
                     "here are saved separately"
-                ).format(file=newer.name)
+                ).format(file=newer_path.name)
             )
         return self._read()
 
@@ -264,8 +268,8 @@ class Backpack:
 
     def _report_once(self, problem: str) -> None:
         # Once: a persistent problem is not repeated at each read.
-        if problem != self._reported:
-            self._problem = self._reported = problem
+        if problem != self._reported_problem:
+            self._problem = self._reported_problem = problem
 
 
 def _is_newer(version: object) -> bool:
@@ -273,7 +277,7 @@ def _is_newer(version: object) -> bool:
 
 
 def _sort_newest_first(items: Iterable[BackpackStack]) -> tuple[BackpackStack, ...]:
-    return tuple(sorted(items, key=lambda item: (-item.at, item.id)))
+    return tuple(sorted(items, key=lambda item: (-item.added_s, item.id)))
 
 
 def _ids(content: _Content) -> list[str]:
@@ -299,7 +303,7 @@ def _parse_stack(entry: object) -> BackpackStack | None:
 
 def _stamp(path: Path) -> Stamp | None:
     try:
-        about = path.stat()
+        file_stat = path.stat()
     except OSError:
         return None
-    return about.st_mtime_ns, about.st_size, about.st_ino
+    return file_stat.st_mtime_ns, file_stat.st_size, file_stat.st_ino

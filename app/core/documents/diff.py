@@ -17,19 +17,18 @@ class Difference:
 
     Attributes:
         block_count: Number of blocks in the earlier state.
-        added: Number of added blocks.
-        removed: Number of removed blocks.
-        changed: Number of blocks whose fields, values or texts differ.
+        added_count: Number of added blocks.
+        removed_count: Number of removed blocks.
+        changed_count: Number of blocks whose fields, values or texts differ.
         is_rearranged: True if the blocks are the same, but their positions or anything else in the
             workspace differs.
     """
 
     block_count: int
-    added: int = 0
-    removed: int = 0
-    changed: int = 0
+    added_count: int = 0
+    removed_count: int = 0
+    changed_count: int = 0
     is_rearranged: bool = False
-    """True if the same blocks are arranged differently."""
 
 
 def difference(earlier: Workspace, now: Workspace) -> Difference:
@@ -38,12 +37,12 @@ def difference(earlier: Workspace, now: Workspace) -> Difference:
     Numbers and texts in the slots of a block count as part of that block.
     """
     old, new = (dict(_blocks(workspace)) for workspace in (earlier, now))
-    stayed = old.keys() & new.keys()
+    common_ids = old.keys() & new.keys()
     result = Difference(
         len(old),
-        added=len(new.keys() - old.keys()),
-        removed=len(old.keys() - new.keys()),
-        changed=sum(old[id] != new[id] for id in stayed),
+        added_count=len(new.keys() - old.keys()),
+        removed_count=len(old.keys() - new.keys()),
+        changed_count=sum(old[id] != new[id] for id in common_ids),
     )
     if result != Difference(len(old)) or _are_equal(earlier, now):
         return result
@@ -60,19 +59,19 @@ def _are_equal(earlier: Workspace, now: Workspace) -> bool:
 def _blocks(workspace: Workspace) -> Iterator[tuple[str, object]]:
     # Blocks that the user placed, with their content.
     for block in parse_workspace(workspace).all_blocks():
-        if not block.shadow:
+        if not block.is_shadow:
             yield block.id, _content(block)
 
 
 def _content(block: PlacedBlock) -> object:
     shadow_contents = {
-        name: [_content(inner) for inner in inner_blocks if inner.shadow]
+        name: [_content(inner) for inner in inner_blocks if inner.is_shadow]
         for name, inner_blocks in block.inputs.items()
     }
     return (
         block.type,
         dict(block.fields),
-        block.enabled,
+        block.is_enabled,
         dict(block.extra_state),
         {k: v for k, v in shadow_contents.items() if v},
     )

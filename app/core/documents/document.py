@@ -72,7 +72,7 @@ class Document:
     def __init__(
         self, journal: Callable[[], Journal] = Journal, clock: Callable[[], float] = time.time
     ) -> None:
-        self._make_journal = journal
+        self._create_journal = journal
         self._clock = clock
         self._timer = time.perf_counter
         self._journal = journal()
@@ -85,13 +85,13 @@ class Document:
         self._parsed_robots: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
         """Cache of parsed robot descriptions: parsing one takes 15 ms, and every edit needs all of them."""
         self.dirty = False
-        self.saved_at: float | None = None
+        self.saved_s: float | None = None
         self._stamp: Stamp | None = None  # stamp of the file when it was last read or written
         self.revision = 0
         self.fixes = 0
         self.edits = 0
         self.definitions_revision = 0
-        self._connected: tuple[Robot, ...] = ()
+        self._connected_robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
@@ -139,7 +139,7 @@ class Document:
     def open(self, path: Path) -> None:
         """Open a file. If DocumentError is raised, the current content is unchanged."""
         self._replace(read_file(path), path)
-        self.saved_at = path.stat().st_mtime
+        self.saved_s = path.stat().st_mtime
         self._stamp = stamp_of(path)
 
     def open_example(self, path: Path) -> None:
@@ -169,9 +169,9 @@ class Document:
         """
         recovered = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.unknown_fields)
         self._replace(recovered, unsaved.path)
-        now = stamp_of(unsaved.path) if unsaved.path is not None else None
-        if now is not None and now[0] <= unsaved.edited_s * 1e9:
-            self._stamp = now  # the file was not changed after that work
+        stamp = stamp_of(unsaved.path) if unsaved.path is not None else None
+        if stamp is not None and stamp[0] <= unsaved.edited_s * 1e9:
+            self._stamp = stamp  # the file was not changed after that work
         self.dirty = True
         self._write_journal()
         if self.is_on_disk:
@@ -190,12 +190,12 @@ class Document:
         """
         target = path if path is not None else self.path
         if target is None:
-            raise DocumentError(None, _("this behaviour isn't saved to a file yet"), _("choose one"))
+            raise DocumentError(None, _("this behaviour isn't saved to a file yet"), _("choose a file"))
         name = name_of(target, self.name)
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.unknown_fields))
         self.path, self.name = target, name
         self.dirty = False
-        self.saved_at = self._clock()
+        self.saved_s = self._clock()
         self._stamp = stamp_of(target)
         self._discard_journal()
 
@@ -210,11 +210,11 @@ class Document:
             raise DocumentError(self.path, problem)
         new = renamed_path(self.path, new_name) if self.path is not None else None
         if self.path is not None and new is not None and new != self.path:
-            changed = self.is_changed_externally
+            was_changed_externally = self.is_changed_externally
             rename_file(self.path, new)
             rename_versions(self.path, new)
             self.path = new
-            self._stamp = self._stamp if changed else stamp_of(new)
+            self._stamp = self._stamp if was_changed_externally else stamp_of(new)
         elif self.path is not None and new_name != self.name:
             self.dirty = True  # in Studio's own folder the name is in the file
         self.name = new_name
@@ -231,10 +231,10 @@ class Document:
         Returns:
             False if the action does not change blocks.
         """
-        fixed = deep_json.run_deep(lambda: fix(self.workspace, action))
-        if fixed is None:
+        fixed_workspace = deep_json.run_deep(lambda: fix(self.workspace, action))
+        if fixed_workspace is None:
             return False
-        self.apply_edit(fixed)
+        self.apply_edit(fixed_workspace)
         self.fixes += 1
         return True
 
@@ -271,8 +271,8 @@ class Document:
     @property
     def is_changed_externally(self) -> bool:
         """True if another program changed the file since it was opened or saved; False if it is missing."""
-        now = stamp_of(self.path) if self.path is not None else None
-        return now is not None and now != self._stamp
+        stamp = stamp_of(self.path) if self.path is not None else None
+        return stamp is not None and stamp != self._stamp
 
     @property
     def is_blank(self) -> bool:
@@ -297,8 +297,8 @@ class Document:
     @property
     def is_on_disk(self) -> bool:
         """True if the current state is on disk. Waits at most 2 s for a write in progress."""
-        finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
-        return finished and self.journal_error is None
+        is_finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
+        return is_finished and self.journal_error is None
 
     def retry_journal(self) -> bool:
         """Retry a failed journal write; return True if all unsaved work is on disk."""
@@ -320,8 +320,8 @@ class Document:
 
     def set_connected(self, robots: Sequence[Robot]) -> None:
         """Set the robots that are connected, whose blocks can be used."""
-        if tuple(robots) != self._connected:
-            self._connected = tuple(robots)
+        if tuple(robots) != self._connected_robots:
+            self._connected_robots = tuple(robots)
             self.definitions_revision += 1
             self._store_used_robots()
 
@@ -334,7 +334,7 @@ class Document:
     @property
     def absent_robots(self) -> tuple[Robot, ...]:
         """Robots that the behaviour uses and that are not connected."""
-        connected_names = {robot.name for robot in self._connected}
+        connected_names = {robot.name for robot in self._connected_robots}
         return tuple(robot for robot in self._known_robots() if robot.name not in connected_names)
 
     def program(self) -> Program:
@@ -352,7 +352,7 @@ class Document:
         if workspace is None:
             return None
         program = _compile(
-            WorkspaceJson.from_blocks(workspace), self._connected, self.absent_robots, self.name
+            WorkspaceJson.from_blocks(workspace), self._connected_robots, self.absent_robots, self.name
         )
         return replace(program, shows_value=stack.is_value)
 
@@ -388,7 +388,7 @@ class Document:
 
     def _compile_job(self) -> Callable[[], Program]:
         # Compiles the current state; it may run in any thread, and parses there.
-        return partial(_compile, self._json, self._connected, self.absent_robots, self.name)
+        return partial(_compile, self._json, self._connected_robots, self.absent_robots, self.name)
 
     def problems(self) -> tuple[Problem, ...]:
         """Return the problems that the compiler found."""
@@ -397,7 +397,7 @@ class Document:
     def definitions(self) -> Mapping[str, object]:
         """Return the block and toolbox definitions for the editor, including those of connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
-            definitions = editor_definitions(self._connected, self.absent_robots, self._topics)
+            definitions = editor_definitions(self._connected_robots, self.absent_robots, self._topics)
             self._definitions = (self.definitions_revision, definitions)
         return self._definitions[1]
 
@@ -405,13 +405,13 @@ class Document:
 
     def _replace(self, behaviour_file: BehaviourFile, path: Path | None) -> None:
         self._discard_journal()
-        self._journal = self._make_journal()
+        self._journal = self._create_journal()
         self.name = name_of(path, behaviour_file.name) if path is not None else behaviour_file.name
         self.path, self.workspace = path, behaviour_file.workspace
         self.robots, self.unknown_fields = dict(behaviour_file.robots), behaviour_file.unknown_fields
         self._compiled = self._compile_s = self._compiling_key = None
         self.dirty = False
-        self.saved_at = self._stamp = None
+        self.saved_s = self._stamp = None
         self.revision += 1
         self.definitions_revision += 1
 
@@ -423,10 +423,10 @@ class Document:
         else:
             self._apply_journal_result(write_job)
 
-    def _apply_journal_result(self, written: Callable[[], bool | None]) -> None:
+    def _apply_journal_result(self, take_result: Callable[[], bool | None]) -> None:
         # Applies the result of writing the journal; None means not finished.
         try:
-            ended = written()
+            is_written = take_result()
         except OSError as error:
             self._journal_error = _("can't back up unsaved work ({reason}); save the file now").format(
                 reason=error.strerror or error
@@ -436,7 +436,7 @@ class Document:
                 reason=_(TOO_DEEP_MESSAGE), advice=_(SPLIT_ADVICE)
             )
         else:
-            self._journal_error = None if ended else self._journal_error
+            self._journal_error = None if is_written else self._journal_error
 
     def _discard_journal(self) -> None:
         if self.journal_writer is not None:
@@ -452,14 +452,14 @@ class Document:
             text = self._json.text
         except RecursionError:
             return  # writing the journal reports it
-        for robot in self._connected:
+        for robot in self._connected_robots:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
 
     def _known_robots(self) -> list[Robot]:
-        before, self._parsed_robots = self._parsed_robots, {}
+        previous_robots, self._parsed_robots = self._parsed_robots, {}
         for name, description in self.robots.items():
-            previous = before.get(name)
+            previous = previous_robots.get(name)
             is_known = previous is not None and _are_equal(previous[0], description)
             self._parsed_robots[name] = (
                 previous if previous and is_known else (description, _parse_robot(description))
@@ -473,15 +473,17 @@ def _write_entry(
     path: Path | None,
     workspace_json: WorkspaceJson,
     robots: Descriptions,
-    others: Mapping[str, object],
+    unknown_fields: Mapping[str, object],
 ) -> bool:
-    journal.write(name, path, workspace_json.text, robots, others)
+    journal.write(name, path, workspace_json.text, robots, unknown_fields)
     return True
 
 
-def _compile_timed(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> CompiledProgram:
+def _compile_timed(
+    key: Key, compile_program: Callable[[], Program], timer: Callable[[], float]
+) -> CompiledProgram:
     started_s = timer()
-    return CompiledProgram(key, compiling(), timer() - started_s)
+    return CompiledProgram(key, compile_program(), timer() - started_s)
 
 
 def _compile(

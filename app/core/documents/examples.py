@@ -46,14 +46,14 @@ def translated(example: BehaviourFile, translate_text: TranslateText = translate
         return names[english]
 
     workspace = _translate_value(example.workspace, translate_text, translate_label)
-    others = dict(example.unknown_fields)
-    if isinstance(about := others.get("description"), str):
-        others["description"] = translate_text(ABOUT, about)
+    unknown_fields = dict(example.unknown_fields)
+    if isinstance(about := unknown_fields.get("description"), str):
+        unknown_fields["description"] = translate_text(ABOUT, about)
     return replace(
         example,
         name=translate_text(NAME, example.name),
         workspace=workspace if isinstance(workspace, Mapping) else example.workspace,
-        unknown_fields=others,
+        unknown_fields=unknown_fields,
     )
 
 
@@ -67,27 +67,29 @@ def example_block_ids() -> frozenset[str]:
     )
 
 
-def _translate_value(value: object, translate_text: TranslateText, label: Callable[[str], str]) -> object:
+def _translate_value(
+    value: object, translate_text: TranslateText, translate_label: Callable[[str], str]
+) -> object:
     # A part of the blocks in Blockly's format.
     if isinstance(value, list):
-        return [_translate_value(each, translate_text, label) for each in value]
+        return [_translate_value(each, translate_text, translate_label) for each in value]
     if not isinstance(value, Mapping):
         return value
-    result = {key: _translate_value(each, translate_text, label) for key, each in value.items()}
+    result = {key: _translate_value(each, translate_text, translate_label) for key, each in value.items()}
     kind, fields = result.get("type"), result.get("fields")
     if kind == "values_text" and isinstance(fields, dict) and _has_letters(fields.get("TEXT")):
         fields["TEXT"] = translate_text(TEXT, str(fields["TEXT"]))
     if str(kind).startswith("functions_define") and isinstance(fields, dict):
-        fields["NAME"] = label(str(fields["NAME"]))
+        fields["NAME"] = translate_label(str(fields["NAME"]))
     for note in _dicts_in_list(result.get("workspaceComments")):
         note["text"] = translate_text(NOTE, str(note.get("text", "")))
     for variable in _dicts_in_list(result.get("variables")):
-        variable["name"] = label(str(variable["name"]))
+        variable["name"] = translate_label(str(variable["name"]))
     state = result.get("extraState")
     if isinstance(state, dict):
         for named_entry in (state, *_dicts_in_list(state.get("inputs"))):
             if "name" in named_entry:
-                named_entry["name"] = label(str(named_entry["name"]))
+                named_entry["name"] = translate_label(str(named_entry["name"]))
     return result
 
 

@@ -79,24 +79,29 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
     try:
         content = deep_json.loads(data)  # UTF-8, or UTF-16 or UTF-32 as some editors on Windows save it
     except (ValueError, RecursionError) as error:
-        damaged = _("{file} is damaged or not a behaviour").format(file=name)
-        raise DocumentError(path, damaged, _(OPEN_EARLIER_ADVICE)) from error
+        reason = _("{file} is damaged or not a behaviour").format(file=name)
+        raise DocumentError(path, reason, _(OPEN_EARLIER_ADVICE)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DocumentError(path, _("{file} isn't a behaviour").format(file=name), file_type_hint())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise DocumentError(path, _("{file} has no format version").format(file=name), _(OPEN_EARLIER_ADVICE))
     if version > VERSION:
-        newer = _("{file} was saved by a newer NEP Studio (version {version}) and is unchanged")
-        raise DocumentError(path, newer.format(file=name, version=version), _("update NEP Studio"))
+        template = _("{file} was saved by a newer NEP Studio (version {version}) and is unchanged")
+        raise DocumentError(path, template.format(file=name, version=version), _("update NEP Studio"))
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
         raise DocumentError(path, _("{file} has no blocks").format(file=name), _(OPEN_EARLIER_ADVICE))
-    described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
-    others = {name: value for name, value in content.items() if name not in KNOWN_FIELDS}
+    descriptions = {
+        str(name): description for name, description in robots.items() if isinstance(description, dict)
+    }
+    unknown_fields = {name: value for name, value in content.items() if name not in KNOWN_FIELDS}
     saved_name = content.get("name")
     return BehaviourFile(
-        saved_name if isinstance(saved_name, str) and saved_name else path.stem, workspace, described, others
+        saved_name if isinstance(saved_name, str) and saved_name else path.stem,
+        workspace,
+        descriptions,
+        unknown_fields,
     )
 
 

@@ -26,13 +26,13 @@ class FolderEntry:
         path: Path of the entry.
         is_folder: True for a folder.
         changed_s: Time of the last change in seconds since 1970.
-        size: File size in bytes.
+        size_bytes: File size in bytes.
     """
 
     path: Path
     is_folder: bool
     changed_s: float = 0.0
-    size: int = 0
+    size_bytes: int = 0
 
 
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:

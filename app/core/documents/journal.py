@@ -68,7 +68,7 @@ class Journal:
         path: Path | None,
         text: str,
         robots: Mapping[str, Mapping[str, object]],
-        others: Mapping[str, object] | None = None,
+        unknown_fields: Mapping[str, object] | None = None,
     ) -> None:
         """Write the current state to disk, so that it survives a crash of this process. Raises OSError.
 
@@ -77,7 +77,7 @@ class Journal:
             path: File of the behaviour, or None.
             text: JSON of the workspace, written unchanged.
             robots: Descriptions of the robots in use, by name.
-            others: Unknown fields of the behaviour file, to be preserved.
+            unknown_fields: Unknown fields of the behaviour file, to be preserved.
         """
         entry = {
             "format": FORMAT_VERSION,
@@ -87,7 +87,7 @@ class Journal:
             "path": str(path) if path is not None else None,
             "edited_s": self._clock(),
             "robots": robots,
-            "others": dict(others or {}),
+            "others": dict(unknown_fields or {}),
         }
         document = f'{json.dumps(entry, ensure_ascii=False)[:-1]}, "workspace": {text}}}'
         data = document.encode("utf-8", "surrogatepass")
@@ -150,7 +150,7 @@ def _read(file: Path) -> UnsavedWork | None:
             path=Path(path) if path is not None else None,
             edited_s=float(entry["edited_s"]),
             workspace=dict(entry["workspace"]),
-            robots={str(name): dict(td) for name, td in dict(entry["robots"]).items()},
+            robots={str(name): dict(description) for name, description in dict(entry["robots"]).items()},
             unknown_fields=dict(entry.get("others", {})),
         )
     except (ValueError, KeyError, TypeError):
@@ -163,10 +163,10 @@ def _process_start_s(pid: int) -> float:
     return psutil.Process(pid).create_time()
 
 
-def _is_running(pid: int, born_s: float) -> bool:
+def _is_running(pid: int, process_start_s: float) -> bool:
     # the process id alone may have been reused
     try:
         process = psutil.Process(pid)
-        return abs(process.create_time() - born_s) < 1.0 and process.status() != psutil.STATUS_ZOMBIE
+        return abs(process.create_time() - process_start_s) < 1.0 and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
         return False

@@ -28,29 +28,29 @@ class Documents:
         revision: Counter that increases when the tabs change.
     """
 
-    def __init__(self, make: Callable[[], Document] = Document) -> None:
-        self._make = make
+    def __init__(self, create_document: Callable[[], Document] = Document) -> None:
+        self._create_document = create_document
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
-        self._closed: list[Path] = []
+        self._closed_paths: list[Path] = []
         self._compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("studio-compiler")
         # a separate worker, so that unsaved work never waits for a long compilation
         self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
         self.revision = 0
         self.current = self._new_document()
-        self._open = [self.current]
+        self._documents = [self.current]
 
     def __iter__(self) -> Iterator[Document]:
         # In the order of the tabs.
-        return iter(tuple(self._open))
+        return iter(tuple(self._documents))
 
     def __len__(self) -> int:
-        return len(self._open)
+        return len(self._documents)
 
     @property
     def can_reopen(self) -> bool:
         """True if a closed tab can be reopened."""
-        return bool(self._closed)
+        return bool(self._closed_paths)
 
     # -- opening -----------------------------------------------------------------------------------------
 
@@ -88,15 +88,17 @@ class Documents:
     def duplicate(self, document: Document) -> Document:
         """Open a copy of a behaviour in a tab next to it."""
         self.show(document)
-        copied = self._new_document()
-        copied.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
-        return self._insert(copied)
+        copy = self._new_document()
+        copy.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
+        return self._insert(copy)
 
     def rename(self, document: Document, name: str) -> None:
         """Rename a behaviour and its file. If DocumentError is raised, nothing has changed."""
-        before = document.path
+        old_path = document.path
         document.rename_to(name)
-        self._closed = [document.path if each == before and document.path else each for each in self._closed]
+        self._closed_paths = [
+            document.path if each == old_path and document.path else each for each in self._closed_paths
+        ]
         self.revision += 1
 
     def recover(self, unsaved: UnsavedWork) -> Document:
@@ -113,33 +115,33 @@ class Documents:
     def find_by_path(self, path: Path) -> Document | None:
         """Return the open behaviour whose file is ``path``, or None."""
         resolved = path.resolve()
-        return next((each for each in self._open if each.path and each.path.resolve() == resolved), None)
+        return next((each for each in self._documents if each.path and each.path.resolve() == resolved), None)
 
     def find_by_key(self, key: str) -> Document | None:
         """Return the open behaviour with this key, or None."""
-        return next((each for each in self._open if each.key == key), None)
+        return next((each for each in self._documents if each.key == key), None)
 
     def title(self, document: Document) -> str:
         """Return the title of a behaviour, unique among the open behaviours."""
-        opened = [*self._open, *([document] if document not in self._open else [])]
-        return unique_titles([(each.name, each.path) for each in opened])[opened.index(document)]
+        documents = [*self._documents, *([document] if document not in self._documents else [])]
+        return unique_titles([(each.name, each.path) for each in documents])[documents.index(document)]
 
     # -- tabs --------------------------------------------------------------------------------------------
 
     def show(self, document: Document) -> None:
         """Make an open behaviour the current one."""
-        if document in self._open and document is not self.current:
+        if document in self._documents and document is not self.current:
             self._make_current(document)
 
     def neighbour(self, step: int) -> Document:
         """Return the behaviour ``step`` tabs to the right of the current one, wrapping around at the ends."""
-        return self._open[(self._open.index(self.current) + step) % len(self._open)]
+        return self._documents[(self._documents.index(self.current) + step) % len(self._documents)]
 
     def move(self, document: Document, index: int) -> None:
         """Move a tab to an index, counted from 0."""
-        if document in self._open and self._open.index(document) != index:
-            self._open.remove(document)
-            self._open.insert(max(0, index), document)
+        if document in self._documents and self._documents.index(document) != index:
+            self._documents.remove(document)
+            self._documents.insert(max(0, index), document)
             self.revision += 1
 
     def close(self, document: Document) -> None:
@@ -147,19 +149,22 @@ class Documents:
 
         The last tab is replaced with an empty behaviour.
         """
-        if document not in self._open:
+        if document not in self._documents:
             return
-        index = self._open.index(document)
+        index = self._documents.index(document)
         if document.path is not None:
-            self._closed = [*(each for each in self._closed if each != document.path), document.path]
-            del self._closed[:-MAX_CLOSED_TABS]
+            self._closed_paths = [
+                *(each for each in self._closed_paths if each != document.path),
+                document.path,
+            ]
+            del self._closed_paths[:-MAX_CLOSED_TABS]
         document.close()
         self._compiler.discard(document.key)
-        self._open.remove(document)
-        if not self._open:
-            self._open.append(self._new_document())
+        self._documents.remove(document)
+        if not self._documents:
+            self._documents.append(self._new_document())
         if document is self.current:
-            self.current = self._open[min(index, len(self._open) - 1)]
+            self.current = self._documents[min(index, len(self._documents) - 1)]
         self.revision += 1
 
     def reopen(self) -> Document | None:
@@ -167,15 +172,15 @@ class Documents:
 
         Raises DocumentError if the file can't be read.
         """
-        while self._closed:
-            path = self._closed.pop()
+        while self._closed_paths:
+            path = self._closed_paths.pop()
             if self.find_by_path(path) is None:
                 return self.open(path)
         return None
 
     def on_saved(self, document: Document) -> None:
         """Detach other tabs from the file that ``document`` was saved to; their blocks become unsaved."""
-        for other in self._open:
+        for other in self._documents:
             if other is not document and other.path == document.path:
                 other.detach_file()
         self.revision += 1
@@ -185,19 +190,19 @@ class Documents:
     def set_connected(self, robots: Sequence[Robot]) -> None:
         """Set the robots that are connected, whose blocks can be used."""
         self._robots = tuple(robots)
-        for document in self._open:
+        for document in self._documents:
             document.set_connected(robots)
 
     def set_topics(self, topics: Sequence[str]) -> None:
         """Set the names of the topics that the editor suggests."""
         self._topics = tuple(topics)
-        for document in self._open:
+        for document in self._documents:
             document.set_topics(topics)
 
     @property
     def definitions_revision(self) -> object:
         """Value that differs from its previous value if `definitions` may have changed."""
-        return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._open)
+        return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._documents)
 
     def definitions(self) -> Mapping[str, object]:
         """Return the block and toolbox definitions for the editor, shared by all tabs.
@@ -205,27 +210,27 @@ class Documents:
         The definitions cover the connected robots and the robots used in any open behaviour, so that
         hidden tabs keep their blocks.
         """
-        absent = {robot.name: robot for document in self._open for robot in document.absent_robots}
+        absent = {robot.name: robot for document in self._documents for robot in document.absent_robots}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:
         """Reason why unsaved work of a behaviour can't be written; None if there is no error."""
-        return next((each.journal_error for each in self._open if each.journal_error), None)
+        return next((each.journal_error for each in self._documents if each.journal_error), None)
 
     def retry_journals(self) -> list[Document]:
         """Retry failed journal writes; return the behaviours whose unsaved work still can't be written.
 
         Called when the window closes.
         """
-        return [each for each in self._open if not each.retry_journal()]
+        return [each for each in self._documents if not each.retry_journal()]
 
     def close_all(self) -> None:
         """Close all documents and background threads when the window closes.
 
         Unsaved work stays in the journals.
         """
-        for document in self._open:
+        for document in self._documents:
             document.close()
         self._compiler.close()
         self._journal_writer.close()
@@ -236,41 +241,45 @@ class Documents:
         """Return the open tabs as JSON data for the settings."""
         tabs = [
             {"path": str(each.path) if each.path is not None else None, "journal": each.journal_name}
-            for each in self._open
+            for each in self._documents
             if not each.is_blank
         ]
-        saved_documents = [each for each in self._open if not each.is_blank]
+        listed_documents = [each for each in self._documents if not each.is_blank]
         return {
             "tabs": tabs,
-            "current": saved_documents.index(self.current) if self.current in saved_documents else 0,
+            "current": listed_documents.index(self.current) if self.current in listed_documents else 0,
         }
 
     def restore_tabs(
-        self, tabs_state: Mapping[str, object], unsaved_work: Iterable[UnsavedWork], *, ended_well: bool
+        self,
+        tabs_state: Mapping[str, object],
+        unsaved_work: Iterable[UnsavedWork],
+        *,
+        has_ended_normally: bool,
     ) -> set[Path]:
         """Restore the tabs of the last session; return the paths of the journals that were restored.
 
         Args:
             tabs_state: Result of `tabs_state` in the last session.
             unsaved_work: Unsaved work found at the start.
-            ended_well: True if the last session ended normally; then unsaved work is restored without
+            has_ended_normally: True if the last session ended normally; then unsaved work is restored without
                 asking.
         """
         tabs, current = tabs_state.get("tabs"), tabs_state.get("current")
-        unsaved = {each.journal.name: each for each in unsaved_work} if ended_well else {}
+        unsaved = {each.journal.name: each for each in unsaved_work} if has_ended_normally else {}
         restored: set[Path] = set()
-        opened: dict[int, Document] = {}
+        documents_by_tab: dict[int, Document] = {}
         for number, tab in enumerate(tabs if isinstance(tabs, list) else ()):
             if not isinstance(tab, Mapping):
                 continue
             entry = unsaved.get(str(tab.get("journal")))
             document = self._restore_tab(tab.get("path"), entry)
             if document is not None:
-                opened[number] = document
+                documents_by_tab[number] = document
             if entry is not None:
                 restored.add(entry.journal)
-        if isinstance(current, int) and current in opened:
-            self.show(opened[current])
+        if isinstance(current, int) and current in documents_by_tab:
+            self.show(documents_by_tab[current])
         return restored
 
     def arrange_tabs(self, tabs_state: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
@@ -293,7 +302,7 @@ class Documents:
                 if document is not None and document not in documents_by_tab.values():
                     documents_by_tab[number] = document
         ordered = list(documents_by_tab.values())
-        self._open = [*ordered, *(each for each in self._open if each not in ordered)]
+        self._documents = [*ordered, *(each for each in self._documents if each not in ordered)]
         if isinstance(current, int) and current in documents_by_tab:
             self.current = documents_by_tab[current]
         self.revision += 1
@@ -311,7 +320,7 @@ class Documents:
     # -- private -----------------------------------------------------------------------------------------
 
     def _new_document(self) -> Document:
-        document = self._make()
+        document = self._create_document()
         document.compiler, document.journal_writer = self._compiler, self._journal_writer
         document.set_connected(self._robots)
         document.set_topics(self._topics)
@@ -326,7 +335,7 @@ class Documents:
         return self._insert(document)
 
     def _insert(self, document: Document) -> Document:
-        self._open.insert(self._open.index(self.current) + 1, document)
+        self._documents.insert(self._documents.index(self.current) + 1, document)
         return self._make_current(document)
 
     def _make_current(self, document: Document) -> Document:
@@ -336,11 +345,11 @@ class Documents:
 
     def _assign_unique_name(self, document: Document) -> Document:
         # A behaviour without a file gets a unique name.
-        document.name = self._free_name(document.name, besides=document)
+        document.name = self._free_name(document.name, excluding=document)
         return document
 
-    def _free_name(self, base_name: str, besides: Document | None = None) -> str:
-        names = {each.name.casefold() for each in self._open if each is not besides}
+    def _free_name(self, base_name: str, excluding: Document | None = None) -> str:
+        names = {each.name.casefold() for each in self._documents if each is not excluding}
         number, name = 2, base_name
         while name.casefold() in names:
             name = f"{base_name} {number}"

@@ -75,12 +75,12 @@ def problem_lines(
     """
     lines: list[ProblemLine] = []
     line_indexes: dict[str, int] = {}
-    grey = block_counts_by_robot(workspace, absent)
+    disabled_counts = block_counts_by_robot(workspace, absent)
     missing_by_name = {robot.name: robot for robot in missing}
     types_by_robot = block_types_by_robot(workspace)
     types = {robot.name: block_types_of(robot) for robot in connected} if missing_by_name else {}
     for problem in problems:
-        name = _missing_robot(problem)
+        name = _missing_robot_name(problem)
         if name is None:
             problem_fixes = (
                 (Fix(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
@@ -89,21 +89,21 @@ def problem_lines(
         elif name not in line_indexes:
             line_indexes[name] = len(lines)
             robot = missing_by_name.get(name)
-            able: list[Robot] = []
+            suitable_robots: list[Robot] = []
             if robot is not None:
                 blocks = types_by_robot.get(name, frozenset())
-                able = [
+                suitable_robots = [
                     each for each in connected if supports_blocks(blocks, robot.model, each, types[each.name])
                 ]
-            fixes = robot_fixes(name, robot, able, virtual_models)
-            lines.append(ProblemLine(problem, fixes, max(1, grey.get(name, 0))))
+            fixes = robot_fixes(name, robot, suitable_robots, virtual_models)
+            lines.append(ProblemLine(problem, fixes, max(1, disabled_counts.get(name, 0))))
     return tuple(_with_block_count(each) for each in lines)
 
 
 def robot_fixes(
     name: str,
     robot: Robot | None,
-    able: Sequence[Robot],
+    suitable_robots: Sequence[Robot],
     virtual_models: Collection[str],
 ) -> tuple[Fix, ...]:
     """Return the fixes for a missing robot, best first.
@@ -114,15 +114,15 @@ def robot_fixes(
     Args:
         name: Name of the missing robot.
         robot: Missing robot; None if it has no description.
-        able: Connected robots that support all blocks that use the missing robot.
+        suitable_robots: Connected robots that support all blocks that use the missing robot.
         virtual_models: Models that are available as virtual robots.
     """
     if robot is None:
         return (_show_robots_fix(name),)
-    alike = [other for other in able if other.model == robot.model] or able
+    preferred_robots = [other for other in suitable_robots if other.model == robot.model] or suitable_robots
     fixes = [
         Fix(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
-        for other in alike[:MAX_FIXES]
+        for other in preferred_robots[:MAX_FIXES]
     ]
     if robot.model in virtual_models and len(fixes) < MAX_FIXES:
         fixes.append(Fix(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
@@ -134,7 +134,7 @@ def _show_robots_fix(name: str) -> Fix:
     return Fix(_("Show the robots"), f"{CONNECT_PREFIX}{name}")
 
 
-def _missing_robot(problem: Problem) -> str | None:
+def _missing_robot_name(problem: Problem) -> str | None:
     action = problem.fix_action or ""
     return action.removeprefix(CONNECT_PREFIX) if action.startswith(CONNECT_PREFIX) else None
 
@@ -143,7 +143,7 @@ def _with_block_count(line: ProblemLine) -> ProblemLine:
     # A single block is named; several blocks are counted.
     if line.block_count == 1:
         return line
-    name = _missing_robot(line.problem) or ""
+    name = _missing_robot_name(line.problem) or ""
     subject = ngettext("{count} block", "{count} blocks", line.block_count).format(count=line.block_count)
     message = _("{robot} isn't connected, so {block} will be skipped.").format(robot=name, block=subject)
     return replace(line, problem=replace(line.problem, subject=subject, message=message, icon="bot"))

@@ -21,7 +21,7 @@ class SavedTabs:
     ) -> None:
         # `report_error` is called with a message if the tabs can't be saved.
         self._settings, self._documents, self._report_error = settings, documents, report_error
-        self.active = False
+        self.is_active = False
         """True if the tabs of this window are saved; False in a second window."""
         self._last_session: dict[str, object] = {}
         self._saved_revision = -1
@@ -35,11 +35,11 @@ class SavedTabs:
         Returns:
             Unsaved work that was not restored, because the user must be asked first.
         """
-        self.active = True
+        self.is_active = True
         tabs_state: dict[str, object] = self._settings.get(SETTING_KEY, {})
         self._last_session = tabs_state
         restored = self._documents.restore_tabs(
-            tabs_state, unsaved_work, ended_well=tabs_state.get("ended_well") is True
+            tabs_state, unsaved_work, has_ended_normally=tabs_state.get("ended_well") is True
         )
         self.save()
         return [each for each in unsaved_work if each.journal not in restored]
@@ -69,16 +69,18 @@ class SavedTabs:
         if self._documents.revision != self._saved_revision:
             self.save()
 
-    def save(self, *, ended_well: bool = False) -> None:
+    def save(self, *, has_ended_normally: bool = False) -> None:
         """Save the open tabs.
 
         Args:
-            ended_well: True if the window closes normally.
+            has_ended_normally: True if the window closes normally.
         """
-        if not self.active:
+        if not self.is_active:
             return
         self._saved_revision = self._documents.revision
         try:
-            self._settings.set(SETTING_KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
+            self._settings.set(
+                SETTING_KEY, {**self._documents.tabs_state(), "ended_well": has_ended_normally}
+            )
         except SettingsError as error:
             self._report_error(str(error))

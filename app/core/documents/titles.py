@@ -28,10 +28,10 @@ def unique_titles(named_paths: Sequence[tuple[str, Path | None]]) -> list[str]:
 
     A title is the name, followed by as many parent folders as are needed to distinguish equal names.
     """
-    alike: dict[str, set[Path]] = {}
+    paths_by_name: dict[str, set[Path]] = {}
     for name, path in named_paths:
         if path is not None:
-            alike.setdefault(name.casefold(), set()).add(path)
+            paths_by_name.setdefault(name.casefold(), set()).add(path)
     counts: dict[str, int] = {}
     for name, _path in named_paths:
         counts[name.casefold()] = counts.get(name.casefold(), 0) + 1
@@ -39,7 +39,7 @@ def unique_titles(named_paths: Sequence[tuple[str, Path | None]]) -> list[str]:
     for name, path in named_paths:
         title = name
         if path is not None and counts[name.casefold()] > 1:
-            folder = _distinguishing_folder(path, alike[name.casefold()] - {path})
+            folder = _distinguishing_folder(path, paths_by_name[name.casefold()] - {path})
             title = _("{name} — {folder}").format(name=name, folder=folder) if folder else name
         titles.append(title)
     return titles
@@ -51,10 +51,10 @@ def recent_titles(files: Sequence[RecentFile]) -> list[RecentFile]:
     return [replace(file, name=title) for file, title in zip(files, titles, strict=True)]
 
 
-def _distinguishing_folder(path: Path, others: set[Path]) -> str:
+def _distinguishing_folder(path: Path, other_paths: set[Path]) -> str:
     # As few folders as distinguish the file from the others.
     folders = path.parent.parts[1:] or path.parent.parts
     for count in range(1, len(folders)):
-        if all(other.parent.parts[-count:] != folders[-count:] for other in others):
+        if all(other.parent.parts[-count:] != folders[-count:] for other in other_paths):
             return "/".join(folders[-count:])
     return "/".join(folders)

@@ -85,7 +85,7 @@ def save_version(
     if not path.is_file() or not path.stat().st_size:
         return None
     try:
-        data, written = read_regular_file(path), path.stat()
+        data, file_stat = read_regular_file(path), path.stat()
         newest = next(iter(versions_of(path, versions_folder)), None)
         if (
             newest is not None
@@ -95,14 +95,14 @@ def save_version(
             return SavedVersion(path, newest.copy)
         copy = free_path(versions_folder, f"{path.stem}, before", clock(), f" {_path_hash(path)}")
         write_atomically(copy, data, private=True)
-        os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
+        os.utime(copy, ns=(file_stat.st_mtime_ns, file_stat.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
         template = _("{file} wasn't saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, template.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another instance has done this already
         _prune_versions(versions_folder, _path_hash(path))
-        _drop_oldest(versions_folder)
+        _evict_oldest(versions_folder)
     return SavedVersion(path, copy)
 
 
@@ -127,17 +127,17 @@ class Version:
 
 def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Return the versions of a file, newest first."""
-    mark = _path_hash(path)
-    return [each for each in _list_versions(_versions_folder(folder)) if each.path_hash == mark]
+    path_hash = _path_hash(path)
+    return [each for each in _list_versions(_versions_folder(folder)) if each.path_hash == path_hash]
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Return versions of other files with the same name, such as those of a moved file, newest first."""
-    mark, stem = _path_hash(path), _safe_stem(path.stem)
+    path_hash, stem = _path_hash(path), _safe_stem(path.stem)
     return [
         each
         for each in _list_versions(_versions_folder(folder))
-        if each.path_hash != mark and each.name == stem
+        if each.path_hash != path_hash and each.name == stem
     ]
 
 
@@ -222,25 +222,25 @@ def _parse_version(copy: Path) -> Version | None:
     if match is None:
         return None
     try:
-        written = copy.stat().st_mtime
-        replaced = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
+        written_s = copy.stat().st_mtime
+        replaced_s = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
     except (OSError, ValueError, OverflowError):
         return None
-    return Version(copy, match["stem"], written, replaced, match["mark"] or "")
+    return Version(copy, match["stem"], written_s, replaced_s, match["mark"] or "")
 
 
-def _prune_versions(folder: Path, mark: str) -> None:
+def _prune_versions(folder: Path, path_hash: str) -> None:
     # Removes the version that leaves the smallest gap.
-    versions = [each for each in _list_versions(folder) if each.path_hash == mark]
+    versions = [each for each in _list_versions(folder) if each.path_hash == path_hash]
     while len(versions) > MAX_COPIES_PER_FILE:
         gaps = {
             index: versions[index - 1].replaced_s - versions[index + 1].replaced_s
             for index in range(MIN_COPIES_PER_FILE, len(versions) - 1)
         }
-        versions.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
+        versions.pop(min(gaps, key=lambda index: gaps[index])).copy.unlink(missing_ok=True)
 
 
-def _drop_oldest(folder: Path) -> None:
+def _evict_oldest(folder: Path) -> None:
     remaining_bytes = MAX_BYTES
     for number, version in enumerate(_list_versions(folder)):
         remaining_bytes -= version.copy.stat().st_size

@@ -23,34 +23,34 @@ class QuietNodes:
     """
 
     def __init__(self) -> None:
-        self._counted: dict[str, tuple[int, float]] = {}
+        self._totals_by_node: dict[str, tuple[int, float]] = {}
 
     def update(self, graph_input: GraphInput, now: float) -> None:
         """Apply new statistics; ``now`` is in monotonic seconds. New nodes count as active."""
         sums = {entry.key: 0 for entry in graph_input.nodes if entry.gone_s is None}
-        unknown = {
+        uncounted_keys = {
             entry.key
             for entry in graph_input.nodes
             if (kind := find_kind(entry.network)) is not None and not kind.reports_stats
         }
-        originals = {entry.key for entry in graph_input.nodes if entry.is_original}
+        original_keys = {entry.key for entry in graph_input.nodes if entry.is_original}
         for entry, count in _counts(graph_input):
-            if count is None and entry in originals:
-                unknown.add(entry)
+            if count is None and entry in original_keys:
+                uncounted_keys.add(entry)
             elif entry in sums:
                 sums[entry] += count or 0
-        before = self._counted
-        self._counted = {}
+        previous_totals = self._totals_by_node
+        self._totals_by_node = {}
         for entry, total in sums.items():
-            if entry not in unknown:
-                previous = before.get(entry)
-                moved = previous is None or previous[0] != total
-                self._counted[entry] = total, now if moved or previous is None else previous[1]
+            if entry not in uncounted_keys:
+                previous = previous_totals.get(entry)
+                has_changed = previous is None or previous[0] != total
+                self._totals_by_node[entry] = total, now if has_changed or previous is None else previous[1]
 
     def quiet_keys(self, now: float) -> frozenset[str]:
         """Return the keys of the nodes without a message or call in the last `QUIET_TIMEOUT_S` seconds."""
         return frozenset(
-            entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_TIMEOUT_S
+            key for key, (_total, since_s) in self._totals_by_node.items() if now - since_s >= QUIET_TIMEOUT_S
         )
 
 
@@ -69,16 +69,16 @@ class CallRates:
         """Return calls per second by service; services with fewer than two samples are omitted."""
         if len(self._samples) < 2:
             return {}
-        last_at, last = self._samples[-1]
-        first: dict[str, tuple[float, int]] = {}
+        last_s, last_counts = self._samples[-1]
+        first_samples: dict[str, tuple[float, int]] = {}
         for time_s, counts in self._samples:
-            if last_at - time_s <= CALL_WINDOW_S:
-                for name in counts.keys() - first.keys():
-                    first[name] = time_s, counts[name]
+            if last_s - time_s <= CALL_WINDOW_S:
+                for name in counts.keys() - first_samples.keys():
+                    first_samples[name] = time_s, counts[name]
         return {
-            name: (calls - first[name][1]) / (last_at - first[name][0])
-            for name, calls in last.items()
-            if name in first and first[name][0] < last_at and calls >= first[name][1]
+            name: (calls - first_samples[name][1]) / (last_s - first_samples[name][0])
+            for name, calls in last_counts.items()
+            if name in first_samples and first_samples[name][0] < last_s and calls >= first_samples[name][1]
         }
 
 

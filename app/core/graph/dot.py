@@ -30,7 +30,7 @@ def format_dot(graph: NodeGraph, group_names: Mapping[str, str], label: Callable
             *(f"    {each}" for each in lines_by_group.pop(group.key)),
             "  }",
         ]
-    lines += [f"  {each}" for others in lines_by_group.values() for each in others]
+    lines += [f"  {each}" for group_lines in lines_by_group.values() for each in group_lines]
     for line in graph.lines:
         style = ", style=dashed" if line.kind == "service" else ""
         text = quote(label(line))

@@ -61,15 +61,15 @@ class LayoutSizes:
     footer: float = 30.0
     char_width: float = 8.0
 
-    def scaled(self, share: float) -> LayoutSizes:
-        """Return the sizes multiplied by ``share``, for another text size."""
+    def scaled(self, factor: float) -> LayoutSizes:
+        """Return the sizes multiplied by ``factor``, for another text size."""
         width, height = self.node
         return LayoutSizes(
-            (width * share, height * share),
-            self.header * share,
-            self.side_margin * share,
-            self.footer * share,
-            self.char_width * share,
+            (width * factor, height * factor),
+            self.header * factor,
+            self.side_margin * factor,
+            self.footer * factor,
+            self.char_width * factor,
         )
 
 
@@ -104,7 +104,7 @@ class GraphLayout:
 
 
 def arrange(
-    graph: NodeGraph, before: GraphLayout | None = None, sizes: LayoutSizes | None = None
+    graph: NodeGraph, previous: GraphLayout | None = None, sizes: LayoutSizes | None = None
 ) -> GraphLayout:
     """Compute the layout of a graph.
 
@@ -112,41 +112,43 @@ def arrange(
 
     Args:
         graph: Drawing to lay out.
-        before: Previous layout. Its nodes keep their positions, unless more nodes appeared than
+        previous: Previous layout. Its nodes keep their positions, unless more nodes appeared than
             remained.
         sizes: Sizes of boxes and margins.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
-    route_keys, left_out = _routes_to_draw(graph)
-    previous_positions = {} if before is None else {**before.saved_positions, **before.positions}
+    route_keys, omitted_count = _routes_to_draw(graph)
+    previous_positions = {} if previous is None else {**previous.saved_positions, **previous.positions}
     current_keys = {node.key for node in graph.nodes}
-    stay = len(current_keys & previous_positions.keys())
-    is_plain = False
-    if not stay or stay < len(current_keys) - stay:
-        positions, is_plain = _place_all(graph, route_keys, sizes)
+    kept_count = len(current_keys & previous_positions.keys())
+    is_fallback = False
+    if not kept_count or kept_count < len(current_keys) - kept_count:
+        positions, is_fallback = _place_all(graph, route_keys, sizes)
         previous_positions = {}
     else:
         positions = _place_new(
             graph, {key: previous_positions[key] for key in current_keys & previous_positions.keys()}, sizes
         )
-    routes = {} if is_plain else _route_lines(positions, route_keys, sizes)
+    routes = {} if is_fallback else _route_lines(positions, route_keys, sizes)
     saved_positions = {
         key: position for key, position in previous_positions.items() if key not in current_keys
     }
     for key in [*saved_positions][: max(0, len(saved_positions) - MAX_SAVED_POSITIONS)]:
         del saved_positions[key]
-    straight = {
+    straight_routes = {
         route_key: _straight_route(positions[route_key[1]], positions[route_key[2]], sizes)
         for route_key in route_keys
     }
     groups = _group_boxes(graph, positions, sizes)
-    return GraphLayout(positions, groups, {**straight, **routes}, saved_positions, left_out, is_plain)
+    return GraphLayout(
+        positions, groups, {**straight_routes, **routes}, saved_positions, omitted_count, is_fallback
+    )
 
 
 def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     """Arrange all boxes in rows without graphlay, for the case that graphlay failed or took too long."""
     positions = _row_positions(graph, sizes)
-    route_keys, left_out = _routes_to_draw(graph)
+    route_keys, omitted_count = _routes_to_draw(graph)
     return GraphLayout(
         positions,
         _group_boxes(graph, positions, sizes),
@@ -155,7 +157,7 @@ def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
             for route_key in route_keys
         },
         {},
-        left_out,
+        omitted_count,
         is_fallback=True,
     )
 
@@ -163,14 +165,14 @@ def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
 def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     # Routes of lines with few ends first; and the number of omitted ones.
     routes: list[RouteKey] = []
-    left_out = 0
+    omitted_count = 0
     for line in sorted(graph.lines, key=_drawing_order):
         line_routes = [(line.key, source, target) for source, target in line.pairs()]
         if len(routes) + len(line_routes) <= MAX_ROUTES:
             routes += line_routes
         else:
-            left_out += len(line_routes)
-    return routes, left_out
+            omitted_count += len(line_routes)
+    return routes, omitted_count
 
 
 def _drawing_order(line: GraphLine) -> tuple[int, tuple[str, ...]]:
@@ -200,40 +202,43 @@ def _place_all(
     graph: NodeGraph, route_keys: Sequence[RouteKey], sizes: LayoutSizes
 ) -> tuple[dict[str, Position], bool]:
     # First the nodes within each group, then the groups. Also returns whether the library failed.
-    keys_by_block: dict[str, list[str]] = {}
+    keys_by_group: dict[str, list[str]] = {}
     for node in graph.nodes:
-        keys_by_block.setdefault(node.group, []).append(node.key)
-    home = {key: block for block, keys in keys_by_block.items() for key in keys}
-    within: dict[str, list[RouteKey]] = {}
-    between: dict[tuple[str, str], int] = {}
-    effort = "balanced" if len(home) < MAX_BALANCED_LAYOUT_NODES else "fast"
+        keys_by_group.setdefault(node.group, []).append(node.key)
+    group_by_key = {key: group_key for group_key, keys in keys_by_group.items() for key in keys}
+    inner_routes: dict[str, list[RouteKey]] = {}
+    route_counts: dict[tuple[str, str], int] = {}
+    effort = "balanced" if len(group_by_key) < MAX_BALANCED_LAYOUT_NODES else "fast"
     for route_key in route_keys:
-        begin, end = home[route_key[1]], home[route_key[2]]
-        if begin == end:
-            within.setdefault(begin, []).append(route_key)
+        source_group, target_group = group_by_key[route_key[1]], group_by_key[route_key[2]]
+        if source_group == target_group:
+            inner_routes.setdefault(source_group, []).append(route_key)
         else:
-            between[begin, end] = between.get((begin, end), 0) + 1
+            route_counts[source_group, target_group] = route_counts.get((source_group, target_group), 0) + 1
     try:
-        blocks = {
-            block: _place_block(keys, within.get(block, ()), sizes, effort)
-            for block, keys in keys_by_block.items()
+        positions_by_group = {
+            group_key: _place_group(keys, inner_routes.get(group_key, ()), sizes, effort)
+            for group_key, keys in keys_by_group.items()
         }
-        boxes = {block: _block_box(graph, block, positions, sizes) for block, positions in blocks.items()}
-        middles = _place_boxes(boxes, between)
+        boxes = {
+            group_key: _group_bounds(graph, group_key, positions, sizes)
+            for group_key, positions in positions_by_group.items()
+        }
+        centres = _place_boxes(boxes, route_counts)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
         _log.exception("layout library failed; nodes are placed in rows")
         return _row_positions(graph, sizes), True
     positions = {}
-    for block, (left, top, width, height) in boxes.items():
-        dx, dy = middles[block][0] - left - width / 2, middles[block][1] - top - height / 2
-        for key, (x, y) in blocks[block].items():
+    for group_key, (left, top, width, height) in boxes.items():
+        dx, dy = centres[group_key][0] - left - width / 2, centres[group_key][1] - top - height / 2
+        for key, (x, y) in positions_by_group[group_key].items():
             positions[key] = x + dx, y + dy
     return positions, False
 
 
-def _place_block(
+def _place_group(
     keys: Sequence[str], route_keys: Sequence[RouteKey], sizes: LayoutSizes, effort: str
 ) -> dict[str, Position]:
     if len(keys) == 1:
@@ -249,49 +254,55 @@ def _place_block(
     return {key: _parse_point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
 
 
-def _block_box(graph: NodeGraph, block: str, positions: Mapping[str, Position], sizes: LayoutSizes) -> Box:
+def _group_bounds(
+    graph: NodeGraph, group_key: str, positions: Mapping[str, Position], sizes: LayoutSizes
+) -> Box:
     # Bounding box of a group; of a node without a group the node itself.
-    group = next((each for each in graph.groups if each.key == block and not each.is_collapsed), None)
+    group = next((each for each in graph.groups if each.key == group_key and not each.is_collapsed), None)
     box = _bounding_box(_box_at(position, sizes.node) for position in positions.values())
     if group is None:
         return box
-    left, top, width, height = _with_margins(box, block, sizes)
+    left, top, width, height = _with_margins(box, group_key, sizes)
     return left, top, width, height + (sizes.footer if group.quiet_count else 0.0)
 
 
-def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Position]:
+def _place_boxes(
+    boxes: Mapping[str, Box], route_counts: Mapping[tuple[str, str], int]
+) -> dict[str, Position]:
     # Returns centres; boxes may have different sizes.
     if len(boxes) == 1:
         return dict.fromkeys(boxes, (0.0, 0.0))
-    index = {block: number for number, block in enumerate(boxes)}
+    index = {group_key: number for number, group_key in enumerate(boxes)}
     edges = [
-        {"source": index[begin], "target": index[end], "weight": float(count)}
-        for (begin, end), count in between.items()
+        {"source": index[source_group], "target": index[target_group], "weight": float(count)}
+        for (source_group, target_group), count in route_counts.items()
     ]
-    nodes = [_request_box(block, (box[2], box[3])) for block, box in boxes.items()]
+    nodes = [_request_box(group_key, (box[2], box[3])) for group_key, box in boxes.items()]
     layout = graphlay.layout(
         {"nodes": nodes, "edges": edges}, options=_graphlay_options("balanced", GROUP_GAP)
     )
-    middles = {block: _parse_point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
+    centres = {
+        group_key: _parse_point(node["center"]) for group_key, node in zip(boxes, layout.nodes, strict=True)
+    }
     width = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
     height = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
     return (
-        middles if width <= MAX_ASPECT_RATIO * height or len(boxes) < 4 else _shelf_positions(boxes, middles)
+        centres if width <= MAX_ASPECT_RATIO * height or len(boxes) < 4 else _shelf_positions(boxes, centres)
     )
 
 
-def _shelf_positions(boxes: Mapping[str, Box], middles: Mapping[str, Position]) -> dict[str, Position]:
+def _shelf_positions(boxes: Mapping[str, Box], centres: Mapping[str, Position]) -> dict[str, Position]:
     # Breaks one long row of groups into several, in the same order.
     area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
-    room = max(math.sqrt(area * TARGET_ASPECT_RATIO), *(box[2] for box in boxes.values()))
+    row_width = max(math.sqrt(area * TARGET_ASPECT_RATIO), *(box[2] for box in boxes.values()))
     positions: dict[str, Position] = {}
     left = top = row_height = 0.0
-    for block in sorted(boxes, key=lambda each: (middles[each], each)):
-        _left, _top, width, tall = boxes[block]
-        if left and left + width > room:
+    for group_key in sorted(boxes, key=lambda each: (centres[each], each)):
+        _left, _top, width, height = boxes[group_key]
+        if left and left + width > row_width:
             left, top, row_height = 0.0, top + row_height + GROUP_GAP, 0.0
-        positions[block] = left + width / 2, top + tall / 2
-        left, row_height = left + width + LAYER_GAP, max(row_height, tall)
+        positions[group_key] = left + width / 2, top + height / 2
+        left, row_height = left + width + LAYER_GAP, max(row_height, height)
     return positions
 
 
@@ -360,14 +371,14 @@ def _place_new(graph: NodeGraph, positions: dict[str, Position], sizes: LayoutSi
     for node in graph.nodes:
         if node.key in positions:
             continue
-        mates = [each.key for each in graph.nodes if each.group == node.group and each.key in positions]
+        group_mates = [each.key for each in graph.nodes if each.group == node.group and each.key in positions]
         neighbour_positions = [positions[key] for key in neighbours.get(node.key, ()) if key in positions]
-        if mates:
+        if group_mates:
             positions[node.key] = _free_position(
-                [positions[key] for key in mates], neighbour_positions, positions.values(), sizes
+                [positions[key] for key in group_mates], neighbour_positions, positions.values(), sizes
             )
         else:
-            left, top, width, _high = _bounding_box(
+            left, top, width, _height = _bounding_box(
                 _box_at(position, sizes.node) for position in positions.values()
             )
             step = sizes.node[0] + 2 * sizes.side_margin + LAYER_GAP
@@ -377,7 +388,7 @@ def _place_new(graph: NodeGraph, positions: dict[str, Position], sizes: LayoutSi
 
 
 def _free_position(
-    mates: Sequence[Position],
+    group_positions: Sequence[Position],
     neighbour_positions: Sequence[Position],
     occupied: Iterable[Position],
     sizes: LayoutSizes,
@@ -389,55 +400,57 @@ def _free_position(
     x_near = (
         sum(x for x, _y in neighbour_positions) / len(neighbour_positions)
         if neighbour_positions
-        else mates[0][0]
+        else group_positions[0][0]
     )
     y_near = (
         sum(y for _x, y in neighbour_positions) / len(neighbour_positions)
         if neighbour_positions
-        else max(y for _x, y in mates)
+        else max(y for _x, y in group_positions)
     )
-    tops = [y for _x, y in mates]
+    tops = [y for _x, y in group_positions]
     rows = [min(tops) + row_height * step for step in range(int((max(tops) - min(tops)) / row_height) + 2)]
-    columns = sorted({x for x, _y in mates})
+    columns = sorted({x for x, _y in group_positions})
     free = [
         (x, y)
         for x in columns
         for y in rows
         if all(
-            abs(x - other) >= node_width or abs(y - level) >= row_height - 1
-            for other, level in occupied_positions
+            abs(x - other_x) >= node_width or abs(y - other_y) >= row_height - 1
+            for other_x, other_y in occupied_positions
         )
     ]
     if not free:
         return columns[0], max(tops) + row_height
-    return min(free, key=lambda at: (abs(at[0] - x_near) + abs(at[1] - y_near), at))
+    return min(free, key=lambda position: (abs(position[0] - x_near) + abs(position[1] - y_near), position))
 
 
-def _push_apart(graph: NodeGraph, positions: dict[str, Position], grown: str, sizes: LayoutSizes) -> None:
+def _push_apart(
+    graph: NodeGraph, positions: dict[str, Position], grown_group: str, sizes: LayoutSizes
+) -> None:
     # Moves whole groups down until none overlaps one that has grown.
-    members: dict[str, list[str]] = {}
+    keys_by_group: dict[str, list[str]] = {}
     for node in graph.nodes:
         if node.key in positions:
-            members.setdefault(node.group or node.key, []).append(node.key)
+            keys_by_group.setdefault(node.group or node.key, []).append(node.key)
     boxes = {
         key: _bounding_box(
             _with_margins(_box_at(positions[member_key], sizes.node), key, sizes) for member_key in keys
         )
-        for key, keys in members.items()
+        for key, keys in keys_by_group.items()
     }
-    moving = [grown] if grown in boxes else []
+    pending_keys = [grown_group] if grown_group in boxes else []
     for _turn in range(len(boxes) ** 2):
-        if not moving:
+        if not pending_keys:
             return
-        upper = moving.pop()
+        upper_key = pending_keys.pop()
         for key, box in boxes.items():
-            if key == upper or not _overlaps(boxes[upper], box):
+            if key == upper_key or not _overlaps(boxes[upper_key], box):
                 continue
-            dy = boxes[upper][1] + boxes[upper][3] + GROUP_GAP - box[1]
+            dy = boxes[upper_key][1] + boxes[upper_key][3] + GROUP_GAP - box[1]
             boxes[key] = (box[0], box[1] + dy, box[2], box[3])
-            for member_key in members[key]:
+            for member_key in keys_by_group[key]:
                 positions[member_key] = (positions[member_key][0], positions[member_key][1] + dy)
-            moving.append(key)
+            pending_keys.append(key)
 
 
 def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:

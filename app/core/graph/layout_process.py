@@ -34,14 +34,18 @@ class LayoutProcess:
             creationflags=NO_CONSOLE,
         )
 
-    def arrange(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout | None:
+    def arrange(
+        self, graph: NodeGraph, previous: GraphLayout | None, sizes: LayoutSizes
+    ) -> GraphLayout | None:
         """Call `arrange` in the child process and return the layout.
 
         Returns None if the call failed, was killed, or took longer than `TIMEOUT_S` seconds.
         """
-        entryless = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
+        graph_without_entries = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:
-            output, _nothing = self._process.communicate(pickle.dumps((entryless, before, sizes)), TIMEOUT_S)
+            output, _error_output = self._process.communicate(
+                pickle.dumps((graph_without_entries, previous, sizes)), TIMEOUT_S
+            )
         except (subprocess.TimeoutExpired, OSError, ValueError):
             self.kill()
             return None
@@ -73,8 +77,8 @@ def is_large(graph: NodeGraph) -> bool:
 
 def main() -> None:
     """Lay out the graph on standard input and write the result to standard output."""
-    graph, before, sizes = pickle.load(sys.stdin.buffer)  # noqa: S301 - written by our own parent
-    sys.stdout.buffer.write(pickle.dumps(arrange(graph, before, sizes)))
+    graph, previous, sizes = pickle.load(sys.stdin.buffer)  # noqa: S301 - written by our own parent
+    sys.stdout.buffer.write(pickle.dumps(arrange(graph, previous, sizes)))
     sys.stdout.buffer.flush()
 
 

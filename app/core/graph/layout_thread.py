@@ -22,12 +22,12 @@ class LayoutThread:
     `layout_process`).
     """
 
-    def __init__(self, arranged: Arrange | None = None) -> None:
-        # `arranged` replaces the layout function, for graphs of any size.
-        self._arrange = arranged if arranged is not None else self._arrange_by_size
+    def __init__(self, arrange_function: Arrange | None = None) -> None:
+        # `arrange_function` replaces the layout function, for graphs of any size.
+        self._arrange = arrange_function if arrange_function is not None else self._arrange_by_size
         self._process: LayoutProcess | None = None
         self._changed = threading.Condition()
-        self._waiting: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
+        self._pending_request: tuple[NodeGraph, GraphLayout | None, LayoutSizes] | None = None
         self._result: tuple[NodeGraph, GraphLayout] | None = None
         self._is_busy = self._is_closing = False
         self._thread: threading.Thread | None = None
@@ -36,20 +36,20 @@ class LayoutThread:
     def is_busy(self) -> bool:
         """True if a graph is being laid out or pending."""
         with self._changed:
-            return self._is_busy or self._waiting is not None
+            return self._is_busy or self._pending_request is not None
 
-    def submit(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
+    def submit(self, graph: NodeGraph, previous: GraphLayout | None, sizes: LayoutSizes) -> None:
         """Request the layout of a graph, replacing a pending request. Does nothing after `close`.
 
         Args:
             graph: Drawing to lay out.
-            before: Previous layout, or None.
+            previous: Previous layout, or None.
             sizes: Sizes of boxes and margins.
         """
         with self._changed:
             if self._is_closing:
                 return
-            self._waiting = graph, before, sizes
+            self._pending_request = graph, previous, sizes
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name="graph-layout", daemon=True)
                 self._thread.start()
@@ -64,7 +64,7 @@ class LayoutThread:
     def close(self) -> None:
         """Stop the thread. Waits at most `JOIN_TIMEOUT_S` seconds, in case graphlay hangs."""
         with self._changed:
-            self._is_closing, self._waiting = True, None
+            self._is_closing, self._pending_request = True, None
             self._changed.notify()
             if self._process is not None:
                 self._process.kill()
@@ -74,24 +74,24 @@ class LayoutThread:
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._waiting is not None or self._is_closing)
-                if self._is_closing or self._waiting is None:
+                self._changed.wait_for(lambda: self._pending_request is not None or self._is_closing)
+                if self._is_closing or self._pending_request is None:
                     return
-                graph, before, sizes = self._waiting
-                self._waiting, self._is_busy = None, True
+                graph, previous, sizes = self._pending_request
+                self._pending_request, self._is_busy = None, True
             layout: GraphLayout | None = None
             with log_errors("lay out the graph"):
-                layout = self._arrange(graph, before, sizes)
+                layout = self._arrange(graph, previous, sizes)
             with self._changed:
                 self._is_busy = False
                 if layout is not None:
                     self._result = graph, layout
 
     def _arrange_by_size(
-        self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes
+        self, graph: NodeGraph, previous: GraphLayout | None, sizes: LayoutSizes
     ) -> GraphLayout:
         if not is_large(graph):
-            return arrange(graph, before, sizes)
+            return arrange(graph, previous, sizes)
         with self._changed:
             if self._is_closing:
                 return GraphLayout()
@@ -100,7 +100,7 @@ class LayoutThread:
             except OSError:  # no more processes can be started
                 return arrange_in_rows(graph, sizes)
         try:
-            layout = process.arrange(graph, before, sizes)
+            layout = process.arrange(graph, previous, sizes)
         finally:
             with self._changed:
                 self._process = None

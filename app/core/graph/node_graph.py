@@ -56,7 +56,6 @@ class GraphInput:
     services: Mapping[str, ServiceInfo] = field(default_factory=dict)
     robots: Sequence[str] = ()
     host: str = field(default_factory=platform.node)
-    """Name of this computer."""
     pages: Mapping[str, PageNode] = field(default_factory=dict)
 
 
@@ -68,8 +67,8 @@ class GraphOptions:
         quiet_nodes: Keys of the nodes without traffic.
         hides_quiet: True if quiet nodes are hidden, except in the groups of
             `groups_with_visible_quiet_nodes`.
-        starts_collapsed: True if all groups are collapsed except the groups in `toggled`; False if only
-            the groups in `toggled` are collapsed.
+        starts_collapsed: True if all groups are collapsed except the groups in `toggled_groups`; False if
+            only the groups in `toggled_groups` are collapsed.
     """
 
     group_by: GroupBy = "computer"
@@ -79,11 +78,11 @@ class GraphOptions:
     quiet_nodes: frozenset[str] = frozenset()
     groups_with_visible_quiet_nodes: frozenset[str] = frozenset()
     starts_collapsed: bool = False
-    toggled: frozenset[str] = frozenset()
+    toggled_groups: frozenset[str] = frozenset()
 
     def is_collapsed(self, group: str) -> bool:
         """Return True if a group is collapsed and drawn as one box."""
-        return bool(group) and self.starts_collapsed is not (group in self.toggled)
+        return bool(group) and self.starts_collapsed is not (group in self.toggled_groups)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,21 +193,23 @@ def node_graph(graph_input: GraphInput, options: GraphOptions) -> NodeGraph:
     """
     boxes = _boxes(graph_input, options)
     groups = _groups(graph_input, options, boxes)
-    closed = {group.key for group in groups if group.is_collapsed}
-    drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, options)]
-    drawn += [_collapsed_box(group) for group in groups if group.is_collapsed]
-    visible_keys = {node.key for node in drawn}
+    collapsed_keys = {group.key for group in groups if group.is_collapsed}
+    drawn_nodes = [
+        node for node in boxes.values() if node.group not in collapsed_keys and not _is_hidden(node, options)
+    ]
+    drawn_nodes += [_collapsed_box(group) for group in groups if group.is_collapsed]
+    visible_keys = {node.key for node in drawn_nodes}
     box_by_entry = {
-        entry: (node.group if node.group in closed else node.key)
+        entry: (node.group if node.group in collapsed_keys else node.key)
         for entry, node in boxes.items()
-        if node.group in closed or node.key in visible_keys
+        if node.group in collapsed_keys or node.key in visible_keys
     }
     lines = [*_topic_lines(graph_input, options, box_by_entry)]
     services: list[GraphLine] = []
     if options.shows_services:
         services = [*_service_lines(graph_input, options, box_by_entry)]
     return NodeGraph(
-        tuple(drawn),
+        tuple(drawn_nodes),
         tuple(sorted([*lines, *services], key=lambda line: (line.kind, line.topics))),
         groups,
         sum(entry.gone_s is None for entry in graph_input.nodes),
@@ -228,14 +229,14 @@ def _is_hidden(node: DrawnNode, options: GraphOptions) -> bool:
 
 def _boxes(graph_input: GraphInput, options: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
-    pictures = {topic.key for topic in graph_input.topics if topic.codec == "image"}
-    drawn: dict[str, DrawnNode] = {}
+    image_topics = {topic.key for topic in graph_input.topics if topic.codec == "image"}
+    drawn_nodes: dict[str, DrawnNode] = {}
     key_counts: Counter[str] = Counter()
     for entry in sorted(graph_input.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
         key_counts[key] += 1
         page = graph_input.pages.get(entry.name) if _is_page(entry) else None
-        drawn[entry.key] = DrawnNode(
+        drawn_nodes[entry.key] = DrawnNode(
             key if key_counts[key] == 1 else f"{key}|{key_counts[key]}",
             _name_of(entry) if page is None else page.title,
             _group_of(entry, graph_input, options.group_by),
@@ -243,12 +244,12 @@ def _boxes(graph_input: GraphInput, options: GraphOptions) -> dict[str, DrawnNod
             entry,
             entry.key,
             _bridged_network(entry),
-            any(key_of(entry.network, topic) in pictures for topic in entry.published_topics),
+            any(key_of(entry.network, topic) in image_topics for topic in entry.published_topics),
             entry.gone_s is not None,
             entry.key in options.quiet_nodes and entry.gone_s is None,
             page=page,
         )
-    return dict(sorted(drawn.items(), key=lambda item: item[1].key))
+    return dict(sorted(drawn_nodes.items(), key=lambda item: item[1].key))
 
 
 def _kind_of(entry: NodeEntry, graph_input: GraphInput) -> NodeKind:
@@ -293,8 +294,8 @@ def _group_of(entry: NodeEntry, graph_input: GraphInput, group_by: GroupBy) -> s
     if _is_page(entry):
         return WEB_GROUP
     if group_by == "robot":
-        mine = [name for name in graph_input.robots if _belongs_to(entry, name)]
-        return f"robot:{max(mine, key=len)}" if mine else "robot:"
+        robot_names = [name for name in graph_input.robots if _belongs_to(entry, name)]
+        return f"robot:{max(robot_names, key=len)}" if robot_names else "robot:"
     return f"host:{entry.host}" if entry.host or not entry.network else f"network:{entry.network}"
 
 
@@ -306,28 +307,34 @@ def _groups(
     graph_input: GraphInput, options: GraphOptions, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
-    members: dict[str, list[DrawnNode]] = {}
+    nodes_by_group: dict[str, list[DrawnNode]] = {}
     for node in boxes.values():
-        members.setdefault(node.group, []).append(node)
+        nodes_by_group.setdefault(node.group, []).append(node)
     addresses = _addresses(graph_input)
     groups = []
-    for key in sorted(members):
+    for key in sorted(nodes_by_group):
         if not key:
             continue
-        nodes = members[key]
-        hidden = sum(_is_hidden(node, options) for node in nodes)
+        nodes = nodes_by_group[key]
+        hidden_count = sum(_is_hidden(node, options) for node in nodes)
         counts = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
         address = min(counts, key=lambda each: (-counts[each], each)) if counts and key != WEB_GROUP else ""
-        closed = options.is_collapsed(key) or hidden == len(nodes)
+        is_collapsed = options.is_collapsed(key) or hidden_count == len(nodes)
         groups.append(
             GraphGroup(
-                key, _host_of(key), address, _icon_of(key, nodes, graph_input), len(nodes), hidden, closed
+                key,
+                _group_name(key),
+                address,
+                _icon_of(key, nodes, graph_input),
+                len(nodes),
+                hidden_count,
+                is_collapsed,
             )
         )
     return tuple(groups)
 
 
-def _host_of(group: str) -> str:
+def _group_name(group: str) -> str:
     return group.partition(":")[2]
 
 
@@ -349,11 +356,11 @@ def _addresses(graph_input: GraphInput) -> dict[str, str]:
         if topic.info is None:
             continue
         for publisher in topic.info.publishers:
-            entry = key_of(topic.network, publisher.node_id)
-            if entry not in addresses:
-                reached = next(filter(None, map(_address_in, publisher.endpoints)), "")
-                if reached:
-                    addresses[entry] = reached
+            node_key = key_of(topic.network, publisher.node_id)
+            if node_key not in addresses:
+                address = next(filter(None, map(_address_in, publisher.endpoints)), "")
+                if address:
+                    addresses[node_key] = address
     return addresses
 
 
@@ -398,14 +405,14 @@ def _topic_lines(
         info = topic.info
         if info is None or topic.gone_s is not None or not is_drawn(topic.name, options):
             continue
-        hearers = [key_of(topic.network, each.node_id) for each in info.subscribers]
-        hearers += [
+        subscriber_keys = [key_of(topic.network, each.node_id) for each in info.subscribers]
+        subscriber_keys += [
             entry
             for network, pattern, entry in patterns
             if network == topic.network and matches(pattern, topic.name)
         ]
-        speakers = (key_of(topic.network, each.node_id) for each in info.publishers)
-        _add_to_bundle(bundles, _ends(speakers, hearers, box_by_entry), topic.key)
+        publisher_keys = (key_of(topic.network, each.node_id) for each in info.publishers)
+        _add_to_bundle(bundles, _ends(publisher_keys, subscriber_keys, box_by_entry), topic.key)
     yield from _lines_of("topic", bundles)
 
 

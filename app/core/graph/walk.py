@@ -56,7 +56,7 @@ def _step_from_node(
 ) -> GraphSelection:
     if arrow in {"up", "down"}:
         return GraphSelection("node", _next_in_column(layout, selection.key, arrow))
-    lines = _lines_at(graph, layout, selection.key, outward=arrow == "right")
+    lines = _lines_at(graph, layout, selection.key, is_outward=arrow == "right")
     if not lines:
         return selection
     return GraphSelection("topic", lines[0].topics[0], selection.key, arrow == "right")
@@ -71,8 +71,8 @@ def _step_from_line(
     if arrow in {"left", "right"}:
         end_keys = line.targets if arrow == "right" else line.sources
         origin_position = layout.positions.get(selection.origin)
-        goes_on = selection.is_outward is (arrow == "right")
-        if not goes_on and selection.origin in end_keys:
+        is_forward = selection.is_outward is (arrow == "right")
+        if not is_forward and selection.origin in end_keys:
             return GraphSelection("node", selection.origin)
         reachable = [key for key in end_keys if key in layout.positions and key != selection.origin]
         return (
@@ -80,22 +80,22 @@ def _step_from_line(
         )
     end_keys = line.sources if selection.is_outward else line.targets
     origin = selection.origin if selection.origin in end_keys else end_keys[0]
-    lines = _lines_at(graph, layout, origin, outward=selection.is_outward)
+    lines = _lines_at(graph, layout, origin, is_outward=selection.is_outward)
     topics = [topic for each in lines for topic in each.topics]
     index = topics.index(selection.key) + (1 if arrow == "down" else -1)
     index = min(max(index, 0), len(topics) - 1)
     return GraphSelection("topic", topics[index], origin, selection.is_outward)
 
 
-def _lines_at(graph: NodeGraph, layout: GraphLayout, key: str, *, outward: bool) -> list[GraphLine]:
+def _lines_at(graph: NodeGraph, layout: GraphLayout, key: str, *, is_outward: bool) -> list[GraphLine]:
     # Outgoing or incoming lines of a node, uppermost first.
-    def height(line: GraphLine) -> tuple[float, tuple[str, ...]]:
-        others = line.targets if outward else line.sources
-        levels = [layout.positions[each][1] for each in others if each in layout.positions]
-        return (sum(levels) / len(levels) if levels else 0.0), line.topics
+    def sort_key(line: GraphLine) -> tuple[float, tuple[str, ...]]:
+        end_keys = line.targets if is_outward else line.sources
+        y_positions = [layout.positions[each][1] for each in end_keys if each in layout.positions]
+        return (sum(y_positions) / len(y_positions) if y_positions else 0.0), line.topics
 
-    lines = [line for line in graph.lines if key in (line.sources if outward else line.targets)]
-    return sorted(lines, key=height)
+    lines = [line for line in graph.lines if key in (line.sources if is_outward else line.targets)]
+    return sorted(lines, key=sort_key)
 
 
 def _nearest(layout: GraphLayout, keys: list[str], reference: Position | None) -> str:
@@ -109,9 +109,9 @@ def _next_in_column(layout: GraphLayout, key: str, arrow: Arrow) -> str:
     # Prefers the same column to a small distance; itself when there is none.
     x, y = layout.positions[key]
     direction = 1 if arrow == "down" else -1
-    others = {
+    distances = {
         other: (abs(position[0] - x) * 3 + (position[1] - y) * direction)
         for other, position in layout.positions.items()
         if (position[1] - y) * direction > 1
     }
-    return min(others, key=lambda other: (others[other], other), default=key)
+    return min(distances, key=lambda other: (distances[other], other), default=key)

@@ -93,11 +93,11 @@ class _Frame:
 
 
 def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
-    makers = (("circles", _parse_circle), ("points", _parse_points), ("texts", _parse_text))
-    for name, maker in makers:
+    parsers = (("circles", _parse_circle), ("points", _parse_points), ("texts", _parse_text))
+    for name, parse_item in parsers:
         for item in _items(payload.get(name)):
             if isinstance(item, Mapping) and frame.remaining_points > 0:
-                yield from maker(item, frame)
+                yield from parse_item(item, frame)
     face = _parse_face(payload)
     if face is not None:
         yield from face
@@ -119,9 +119,9 @@ def _parse_points(item: Mapping[str, object], frame: _Frame) -> Iterator[Annotat
     )
     points, thickness = tuple(point for point in parsed_points if point is not None), _thickness(item)
     outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
-    each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
-    if kind == POINTS and len(each) == len(points):
-        for vertex, point_colour in zip(points, each, strict=True):
+    point_colours = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
+    if kind == POINTS and len(point_colours) == len(points):
+        for vertex, point_colour in zip(points, point_colours, strict=True):
             yield AnnotationShape("points", (vertex,), point_colour, None, thickness)
     elif kind == POINTS:
         yield AnnotationShape("points", points, outline, fill, thickness)
@@ -131,7 +131,7 @@ def _parse_points(item: Mapping[str, object], frame: _Frame) -> Iterator[Annotat
         yield AnnotationShape("line", points, outline, None, thickness)
     elif kind == LINE_LIST:
         for index in range(0, len(points) - 1, 2):
-            point_colour = each[index // 2] if index // 2 < len(each) else outline
+            point_colour = point_colours[index // 2] if index // 2 < len(point_colours) else outline
             yield AnnotationShape("line", points[index : index + 2], point_colour, None, thickness)
 
 
@@ -144,9 +144,9 @@ def _parse_text(item: Mapping[str, object], frame: _Frame) -> Iterator[Annotatio
     if position is None or not isinstance(text, str) or not text.strip():
         return
     size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
-    colour, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
+    colour, background = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
     yield AnnotationShape(
-        "text", (position,), colour, ground, 1.0, size, shortened(" ".join(text.split()), MAX_TEXT_LENGTH)
+        "text", (position,), colour, background, 1.0, size, shortened(" ".join(text.split()), MAX_TEXT_LENGTH)
     )
 
 
@@ -163,8 +163,8 @@ def _parse_face(payload: Mapping[str, object]) -> tuple[AnnotationShape, ...] | 
     if width is None or height is None or width <= 0 or height <= 0:
         return None
     x, y = corner
-    right, low = x + width / frame.width, y + height / frame.height
-    corners = ((x, y), (right, y), (right, low), (x, low))
+    right, bottom = x + width / frame.width, y + height / frame.height
+    corners = ((x, y), (right, y), (right, bottom), (x, bottom))
     return (AnnotationShape("area", corners, YELLOW, None, 2.0, text=_("face")),)
 
 
@@ -177,10 +177,10 @@ def _colour(value: object) -> Colour | None:
     # None for invisible colours.
     if not isinstance(value, Mapping):
         return None
-    red, green, blue, covers = (_number(value.get(name)) for name in "rgba")
-    if red is None or green is None or blue is None or not covers or covers <= 0:
+    red, green, blue, opacity = (_number(value.get(name)) for name in "rgba")
+    if red is None or green is None or blue is None or not opacity or opacity <= 0:
         return None
-    return _clamp(red), _clamp(green), _clamp(blue), _clamp(covers)
+    return _clamp(red), _clamp(green), _clamp(blue), _clamp(opacity)
 
 
 def _clamp(value: float) -> float:

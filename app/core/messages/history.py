@@ -20,8 +20,8 @@ class MessageHistory:
     publisher can modify.
     """
 
-    def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:
-        self._most_bytes, self._most_messages = most_bytes, max(1, most_messages)
+    def __init__(self, max_bytes: int = MAX_BYTES, max_messages: int = MAX_MESSAGES) -> None:
+        self._max_bytes, self._max_messages = max_bytes, max(1, max_messages)
         self._messages: deque[Message] = deque()
         self.size_bytes = 0
         self.first = 0
@@ -61,7 +61,7 @@ class MessageHistory:
         self._messages.append(stored)
         self.size_bytes += stored.size_bytes
         while len(self._messages) > 1 and (
-            len(self._messages) > self._most_messages or self.size_bytes > self._most_bytes
+            len(self._messages) > self._max_messages or self.size_bytes > self._max_bytes
         ):
             self.size_bytes -= self._messages.popleft().size_bytes
             self.first += 1

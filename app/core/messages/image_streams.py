@@ -41,10 +41,10 @@ class ImageRateMeter:
         end = now - RATE_DELAY_S
         while self._times and self._times[0] <= end - RATE_WINDOW_S:
             self._times.popleft()
-        counted = sum(1 for time_s in self._times if time_s <= end)
-        if counted < 2:
+        count = sum(1 for time_s in self._times if time_s <= end)
+        if count < 2:
             return None
-        return counted / min(RATE_WINDOW_S, max(end - self._times[0], 1e-3))
+        return count / min(RATE_WINDOW_S, max(end - self._times[0], 1e-3))
 
 
 @dataclass(eq=False)
@@ -128,13 +128,13 @@ class ImageStream:
         """Set the display style, and decode the current image again, even while it is frozen."""
         self._images.set_style(self, style)
 
-    def set_frozen(self, frozen: bool) -> None:
+    def set_frozen(self, is_frozen: bool) -> None:
         """Freeze the current image, or show the newest image again.
 
         Args:
-            frozen: True to freeze the image.
+            is_frozen: True to freeze the image.
         """
-        self._images.set_frozen(self, frozen)
+        self._images.set_frozen(self, is_frozen)
 
     def count_painted(self) -> None:
         """Count a painted image for `displayed_hz`. The panel calls this once for each image."""
@@ -179,7 +179,7 @@ class Images:
         self.lock = threading.Lock()
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
-        self._closing = False
+        self._is_closing = False
         self._reset_count = 0
         self._thread: threading.Thread | None = None
 
@@ -194,8 +194,8 @@ class Images:
         with self.lock:
             self._streams.setdefault(stream.topic, []).append(stream)
             stream.arrival_rate = ImageRateMeter()
-            self._arrived.notify()  # a held one may be requested larger
-            if self._thread is None and not self._closing:
+            self._arrived.notify()  # a frozen image may be needed at a larger size
+            if self._thread is None and not self._is_closing:
                 self._thread = self._start_decoding()
 
     def restart_silence(self) -> None:
@@ -287,17 +287,17 @@ class Images:
                 stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def set_frozen(self, stream: ImageStream, frozen: bool) -> None:
+    def set_frozen(self, stream: ImageStream, is_frozen: bool) -> None:
         """Freeze a stream or show its newest image again; see `ImageStream.set_frozen`."""
         with self.lock:
-            stream.is_frozen = frozen
-            if frozen:
+            stream.is_frozen = is_frozen
+            if is_frozen:
                 stream.pending = None
 
     def close(self) -> None:
         """Stop the thread."""
         with self.lock:
-            self._closing = True
+            self._is_closing = True
             self._arrived.notify()
         if self._thread is not None:
             self._thread.join(timeout=2)
@@ -311,16 +311,16 @@ class Images:
     def _decode_all(self) -> None:
         while True:
             with self.lock:
-                while not self._closing and not self._has_pending():
+                while not self._is_closing and not self._has_pending():
                     self._arrived.wait()
-                if self._closing:
+                if self._is_closing:
                     return
             self.decode_pending()
 
     def decode_pending(self) -> None:
         """Decode the newest pending image of each stream. Called in the decoding thread."""
         with self.lock:
-            pending_work, times = self._take_pending(), self._reset_count
+            pending_work, reset_count = self._take_pending(), self._reset_count
         for streams, message, arrived_s, size, style in pending_work:
             try:
                 picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, style), None
@@ -329,12 +329,12 @@ class Images:
             except Exception as problem:  # noqa: BLE001  one message must not end the decoding thread
                 picture, error = (
                     None,
-                    _("“{topic}” sends an image that can't be shown: {problem}").format(
+                    _("An image on “{topic}” can't be shown: {problem}").format(
                         topic=message.topic, problem=problem
                     ),
                 )
             with self.lock:
-                for stream in streams if times == self._reset_count else ():
+                for stream in streams if reset_count == self._reset_count else ():
                     _deliver(stream, message, picture, error)
 
     def _has_pending(self) -> bool:
@@ -344,42 +344,50 @@ class Images:
     def _take_pending(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureStyle]]:
         pending_work = []
         for streams in self._streams.values():
-            waiting = [stream for stream in streams if stream.pending is not None]
-            if not waiting:
+            pending_streams = [stream for stream in streams if stream.pending is not None]
+            if not pending_streams:
                 continue
-            of_message: dict[tuple[int, PictureStyle], list[ImageStream]] = {}
-            for stream in waiting:  # a held stream decodes its own image again
+            streams_by_image: dict[tuple[int, PictureStyle], list[ImageStream]] = {}
+            for stream in pending_streams:  # a frozen stream decodes its own image again
                 image_key = (id(stream.pending[0]), stream.style)  # type: ignore[index]
-                of_message.setdefault(image_key, []).append(stream)
-            for together in of_message.values():
-                message, arrived_s = together[0].pending  # type: ignore[misc]
-                pending_work.append((together, message, arrived_s, _largest(together), together[0].style))
-            for stream in waiting:
+                streams_by_image.setdefault(image_key, []).append(stream)
+            for same_image_streams in streams_by_image.values():
+                message, arrived_s = same_image_streams[0].pending  # type: ignore[misc]
+                pending_work.append(
+                    (
+                        same_image_streams,
+                        message,
+                        arrived_s,
+                        _largest(same_image_streams),
+                        same_image_streams[0].style,
+                    )
+                )
+            for stream in pending_streams:
                 stream.pending = None
         return pending_work
 
 
 def _deliver(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
-    before = stream.picture
+    previous = stream.picture
     if stream.is_suspended:
-        return  # the stream isn't visible; the next image after `wake` is shown
-    if stream.is_frozen and before is not None and before.message is not message:
-        return  # decoded while the user held the previous image
+        return  # the stream isn't visible; the next image after `resume` is shown
+    if stream.is_frozen and previous is not None and previous.message is not message:
+        return  # decoded while the user froze the previous image
     stream.error = error
     if picture is not None:
         if picture.style != stream.style and stream.pending is None:  # changed while it was decoded
             stream.pending = (message, picture.received_s)
         stream.picture = picture
         stream.is_awaiting_image = (
-            stream.is_awaiting_image and before is not None and before.message is message
+            stream.is_awaiting_image and previous is not None and previous.message is message
         )
 
 
 def _largest(streams: Sequence[ImageStream]) -> Size | None:
     # None means full resolution.
-    wishes = [stream.requested_size for stream in streams]
-    sizes = [size for size in wishes if size is not None]
-    if len(sizes) < len(wishes):
+    requested_sizes = [stream.requested_size for stream in streams]
+    sizes = [size for size in requested_sizes if size is not None]
+    if len(sizes) < len(requested_sizes):
         return None
     return max(size[0] for size in sizes), max(size[1] for size in sizes)
 

@@ -26,14 +26,14 @@ class PictureStyle:
     Attributes:
         brightness: -1 to 1; 0 leaves the image unchanged.
         contrast: 0.1 to 10; 1 leaves the image unchanged.
-        colours: Colour map of images with one channel: one of `COLOUR_MAPS`, or "" for the default.
+        colour_map: Colour map of images with one channel: one of `COLOUR_MAPS`, or "" for the default.
         low: Value of the first colour; None for the minimum of the image (0 for bytes).
         high: Value of the last colour; None for the maximum of the image (255 for bytes).
     """
 
     brightness: float = 0.0
     contrast: float = 1.0
-    colours: str = ""
+    colour_map: str = ""
     low: float | None = None
     high: float | None = None
 
@@ -42,7 +42,7 @@ class PictureStyle:
         return {
             "brightness": self.brightness,
             "contrast": self.contrast,
-            "colours": self.colours,
+            "colours": self.colour_map,
             "low": self.low,
             "high": self.high,
         }
@@ -55,13 +55,13 @@ def parse_style(saved: object) -> PictureStyle:
     """Parse the result of `PictureStyle.to_json`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
-    saved_numbers = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
-    brightness, contrast, low, high = saved_numbers.values()
-    colours = saved.get("colours")
+    saved_values = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
+    brightness, contrast, low, high = saved_values.values()
+    colour_map = saved.get("colours")
     style = PictureStyle(
         min(max(brightness, -1.0), 1.0) if brightness is not None else 0.0,
         min(max(contrast, MIN_CONTRAST), MAX_CONTRAST) if contrast is not None else 1.0,
-        colours if isinstance(colours, str) and colours in COLOUR_MAPS else "",
+        colour_map if isinstance(colour_map, str) and colour_map in COLOUR_MAPS else "",
     )
     return replace(style, low=low, high=high) if low is None or high is None or low < high else style
 
@@ -98,15 +98,17 @@ def apply_tones(style: PictureStyle, picture: NDArray[np.uint8]) -> NDArray[np.u
     import cv2  # noqa: PLC0415  slow import
     import numpy as np  # noqa: PLC0415
 
-    return np.asarray(cv2.LUT(picture, _tones(style)), np.uint8)
+    return np.asarray(cv2.LUT(picture, _tone_table(style)), np.uint8)
 
 
-def apply_colour_map(style: PictureStyle, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
+def apply_colour_map(
+    style: PictureStyle, channel_values: NDArray[Any]
+) -> tuple[NDArray[np.uint8], ColourScale]:
     """Apply the colour map to an image with one channel.
 
     Args:
         style: Display style.
-        numbers: Array (rows, columns).
+        channel_values: Array (rows, columns).
 
     Returns:
         Array (rows, columns, 4) of blue, green, red and 255, black for NaN and infinity; and the colour
@@ -115,12 +117,12 @@ def apply_colour_map(style: PictureStyle, numbers: NDArray[Any]) -> tuple[NDArra
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
-    is_finite = np.isfinite(numbers)
-    low, high = _value_range(style, numbers[is_finite], is_bytes=numbers.dtype == np.uint8)
-    colours = _colours(style.colours or ("grey" if numbers.dtype == np.uint8 else DEFAULT_COLOUR_MAP))[
-        _tones(style)
-    ]
-    scaled_image = cv2.cvtColor(scaled(numbers, is_finite, low, high), cv2.COLOR_GRAY2BGR)
+    is_finite = np.isfinite(channel_values)
+    low, high = _value_range(style, channel_values[is_finite], is_bytes=channel_values.dtype == np.uint8)
+    colours = _colour_table(
+        style.colour_map or ("grey" if channel_values.dtype == np.uint8 else DEFAULT_COLOUR_MAP)
+    )[_tone_table(style)]
+    scaled_image = cv2.cvtColor(scaled(channel_values, is_finite, low, high), cv2.COLOR_GRAY2BGR)
     bgra = cv2.cvtColor(cv2.LUT(scaled_image, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
     if not is_finite.all():
         bgra[~is_finite] = (0, 0, 0, 255)
@@ -166,28 +168,28 @@ def scaled(frame: NDArray[Any], is_valid: NDArray[np.bool_], low: float, high: f
     return result
 
 
-def _tones(style: PictureStyle) -> NDArray[np.uint8]:
+def _tone_table(style: PictureStyle) -> NDArray[np.uint8]:
     # Lookup table of the 256 values.
     import numpy as np  # noqa: PLC0415
 
-    steps = (np.arange(256.0) - 127.5) * style.contrast + 127.5 + style.brightness * 255
-    return np.clip(steps + 0.5, 0, 255).astype(np.uint8)
+    levels = (np.arange(256.0) - 127.5) * style.contrast + 127.5 + style.brightness * 255
+    return np.clip(levels + 0.5, 0, 255).astype(np.uint8)
 
 
 @lru_cache(maxsize=len(COLOUR_MAPS))
-def _colours(name: str) -> NDArray[np.uint8]:
+def _colour_table(name: str) -> NDArray[np.uint8]:
     # As red, green and blue.
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
-    steps = np.arange(256, dtype=np.uint8)
+    levels = np.arange(256, dtype=np.uint8)
     if name == "grey":
-        return np.repeat(steps[:, None], 3, axis=1)
+        return np.repeat(levels[:, None], 3, axis=1)
     maps = {
         "viridis": cv2.COLORMAP_VIRIDIS,
         "turbo": cv2.COLORMAP_TURBO,
         "inferno": cv2.COLORMAP_INFERNO,
         "jet": cv2.COLORMAP_JET,
     }
-    bgr = cv2.applyColorMap(steps.reshape(256, 1), maps[name]).reshape(256, 3)
+    bgr = cv2.applyColorMap(levels.reshape(256, 1), maps[name]).reshape(256, 3)
     return np.ascontiguousarray(bgr[:, ::-1])

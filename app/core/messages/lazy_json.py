@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 
 CHUNK_BYTES = 1 << 20
 MAX_DEPTH = 1000
-MIN_CACHED_SEPARATORS = 256  # separators
-MAX_CACHED_CONTAINERS = 1000  # containers
+MIN_CACHED_SEPARATORS = 256
+"""Number of separators of an object or array above which their positions are cached."""
+MAX_CACHED_CONTAINERS = 1000
+"""Maximum number of objects and arrays that are cached."""
 OPEN, CLOSE = b"{[", b"}]"
 QUOTE, BACKSLASH, COMMA, COLON = b'"\\,:'
 WHITESPACE = b" \t\r\n"
@@ -38,7 +40,7 @@ class UnreadableValue:
         self.text = text
 
     def __str__(self) -> str:
-        return f"no JSON: {self.text[:60].decode('utf-8', 'replace')}"
+        return f"invalid JSON: {self.text[:60].decode('utf-8', 'replace')}"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, UnreadableValue) and other.text == self.text
@@ -60,15 +62,15 @@ class JsonIndex:
 
         self.data = data
         self._separator_positions, kinds = _find_separators(data)
-        opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
-        after = np.cumsum(opens.astype(np.int32) - closes)
-        if not len(after) or after[-1] != 0 or after.min() < 0:
+        is_open, is_close = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
+        depths_after = np.cumsum(is_open.astype(np.int32) - is_close)
+        if not len(depths_after) or depths_after[-1] != 0 or depths_after.min() < 0:
             raise ValueError(_("unbalanced brackets"))
-        level = after + closes
-        if level.max() > MAX_DEPTH:
+        depths = depths_after + is_close
+        if depths.max() > MAX_DEPTH:
             raise ValueError(_("nested deeper than {most} levels").format(most=MAX_DEPTH))
-        order = np.argsort(level.astype(np.int16), kind="stable")
-        bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
+        order = np.argsort(depths.astype(np.int16), kind="stable")
+        bounds = np.searchsorted(np.take(depths, order), np.arange(1, int(depths.max()) + 2))
         self._levels = [  # `take` releases the GIL, unlike indexing with brackets
             (np.take(self._separator_positions, order[a:b]), np.take(kinds, order[a:b]))
             for a, b in pairwise(bounds)
@@ -128,11 +130,11 @@ class JsonIndex:
         end_positions = self._end_positions[level]
         end = int(end_positions[np.searchsorted(end_positions, start)])
         first, last = np.searchsorted(positions, start) + 1, np.searchsorted(positions, end)
-        inner_positions, kind = positions[first:last], kinds[first:last]
-        parts = end, inner_positions[kind == COMMA], inner_positions[kind == COLON]
+        inner_positions, inner_kinds = positions[first:last], kinds[first:last]
+        separators = end, inner_positions[inner_kinds == COMMA], inner_positions[inner_kinds == COLON]
         if len(inner_positions) > MIN_CACHED_SEPARATORS:  # requested repeatedly, and slow to find
-            self._cached_separators[start] = parts
-        return parts
+            self._cached_separators[start] = separators
+        return separators
 
     def path_to(self, position: int) -> tuple[str | int, ...]:
         """Return the keys and indices that lead to the value at a position of the text."""
@@ -154,24 +156,24 @@ class _LazyContainer:
         self._index, self._start, self._level = index, start, level
 
     @cached_property
-    def _parts(self) -> tuple[int, Positions, Positions]:
+    def _separators(self) -> tuple[int, Positions, Positions]:
         return self._index.separators(self._start, self._level)
 
     @cached_property
     def _count(self) -> int:
-        end, commas, _colons = self._parts
+        end, commas, _colons = self._separators
         if len(commas) or bytes(self._index.data[self._start + 1 : end]).strip(WHITESPACE):
             return len(commas) + 1
         return 0
 
     def _bounds(self, row: int) -> tuple[int, int]:
-        end, commas, _colons = self._parts
+        end, commas, _colons = self._separators
         start = self._start + 1 if row == 0 else int(commas[row - 1]) + 1
         return start, int(commas[row]) if row < len(commas) else end
 
     def row_at(self, position: int) -> int | None:
         # Index of the child at a position of the text.
-        end, commas, _colons = self._parts
+        end, commas, _colons = self._separators
         if not self._start < position < end or not self._count:
             return None
         return int(commas.searchsorted(position))
@@ -186,7 +188,7 @@ class _LazyContainer:
     @property
     def raw(self) -> memoryview:
         # JSON text as a view of the message.
-        return self._index.data[self._start : self._parts[0] + 1]
+        return self._index.data[self._start : self._separators[0] + 1]
 
     @property
     def text(self) -> bytes:
@@ -256,7 +258,7 @@ class LazyObject(_LazyContainer, Mapping[str, object]):
     def _colon(self, row: int) -> int:
         # Position of a child's colon; its end if there is none.
         start, end = self._bounds(row)
-        colons = self._parts[2]
+        colons = self._separators[2]
         index = int(colons.searchsorted(start))
         return int(colons[index]) if index < len(colons) and colons[index] < end else end
 
@@ -278,36 +280,40 @@ def _find_separators(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
     is_separator = np.zeros(256, bool)
     is_separator[list(OPEN + CLOSE + bytes((COMMA, COLON)))] = True
     positions, kinds = [], []
-    in_text, escaped = 0, False
-    for begin in range(0, len(data), CHUNK_BYTES):
-        part = np.frombuffer(data[begin : begin + CHUNK_BYTES], np.uint8)
-        quotes = part == QUOTE
-        slashes = np.flatnonzero(part == BACKSLASH)
-        if escaped or len(slashes):
-            skipped, escaped = _find_escaped(slashes, len(part), escaped)
-            quotes[skipped] = False
-        inside_string = (np.cumsum(quotes, dtype=np.int32) + in_text) & 1
-        indexes = np.flatnonzero(np.take(is_separator, part) & (inside_string == 0))
-        positions.append(indexes + begin)
-        kinds.append(part[indexes])
-        in_text = int(inside_string[-1])
-    if in_text or not positions:
+    in_string, is_escaped = 0, False
+    for start in range(0, len(data), CHUNK_BYTES):
+        chunk = np.frombuffer(data[start : start + CHUNK_BYTES], np.uint8)
+        quotes = chunk == QUOTE
+        backslashes = np.flatnonzero(chunk == BACKSLASH)
+        if is_escaped or len(backslashes):
+            escaped_positions, is_escaped = _find_escaped(backslashes, len(chunk), is_escaped)
+            quotes[escaped_positions] = False
+        inside_string = (np.cumsum(quotes, dtype=np.int32) + in_string) & 1
+        indexes = np.flatnonzero(np.take(is_separator, chunk) & (inside_string == 0))
+        positions.append(indexes + start)
+        kinds.append(chunk[indexes])
+        in_string = int(inside_string[-1])
+    if in_string or not positions:
         raise ValueError(_("unterminated string"))
     return np.concatenate(positions), np.concatenate(kinds)
 
 
-def _find_escaped(slashes: Positions, length: int, first: bool) -> tuple[list[int] | Positions, bool]:
+def _find_escaped(
+    backslashes: Positions, length: int, is_first_escaped: bool
+) -> tuple[list[int] | Positions, bool]:
     # Positions after an effective backslash, and whether the next chunk starts with such a position.
     import numpy as np  # noqa: PLC0415
 
-    if first and len(slashes) and slashes[0] == 0:
-        slashes = slashes[1:]  # it is escaped itself
-    if not len(slashes):
-        return ([0] if first else []), False
-    run = np.concatenate(([True], np.diff(slashes) != 1))
-    starts = np.flatnonzero(run)
-    within = np.arange(len(slashes)) - np.repeat(starts, np.diff(np.append(starts, len(slashes))))
-    counting = slashes[within % 2 == 0] + 1
-    carries_over = bool(counting[-1] == length)
-    escaped_positions = counting[:-1] if carries_over else counting
-    return (np.append(escaped_positions, 0) if first else escaped_positions), carries_over
+    if is_first_escaped and len(backslashes) and backslashes[0] == 0:
+        backslashes = backslashes[1:]  # it is escaped itself
+    if not len(backslashes):
+        return ([0] if is_first_escaped else []), False
+    is_run_start = np.concatenate(([True], np.diff(backslashes) != 1))
+    starts = np.flatnonzero(is_run_start)
+    run_offsets = np.arange(len(backslashes)) - np.repeat(
+        starts, np.diff(np.append(starts, len(backslashes)))
+    )
+    positions_after = backslashes[run_offsets % 2 == 0] + 1
+    carries_over = bool(positions_after[-1] == length)
+    escaped_positions = positions_after[:-1] if carries_over else positions_after
+    return (np.append(escaped_positions, 0) if is_first_escaped else escaped_positions), carries_over

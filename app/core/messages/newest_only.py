@@ -20,23 +20,23 @@ class NewestJobWorker(Generic[Job, Result]):
         # `process_job` is called in the thread and must not raise.
         self._process_job, self._name = process_job, name
         self._wake = threading.Condition()
-        self._waiting: list[Job] = []  # at most one
-        self._working: list[Job] = []
+        self._pending_jobs: list[Job] = []  # at most one
+        self._running_jobs: list[Job] = []
         self._results: list[Result] = []
-        self._closing = False
+        self._is_closing = False
         self._thread: threading.Thread | None = None
 
     @property
     def is_busy(self) -> bool:
         """True if a job is running or pending."""
         with self._wake:
-            return bool(self._waiting or self._working)
+            return bool(self._pending_jobs or self._running_jobs)
 
     def submit(self, job: Job) -> None:
         """Set the next job, replacing a pending one."""
         with self._wake:
-            self._waiting = [job]
-            if self._thread is None and not self._closing:
+            self._pending_jobs = [job]
+            if self._thread is None and not self._is_closing:
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 self._thread.start()
             self._wake.notify()
@@ -50,13 +50,13 @@ class NewestJobWorker(Generic[Job, Result]):
     def clear(self) -> None:
         """Discard the pending job, the finished result, and the result of a running job."""
         with self._wake:
-            self._waiting, self._working, self._results = [], [], []
+            self._pending_jobs, self._running_jobs, self._results = [], [], []
 
     def close(self) -> None:
         """Stop the thread; waits at most one second for a running job."""
         with self._wake:
-            self._closing = True
-            self._waiting, self._working, self._results = [], [], []
+            self._is_closing = True
+            self._pending_jobs, self._running_jobs, self._results = [], [], []
             self._wake.notify()
         if self._thread is not None:
             self._thread.join(1.0)
@@ -64,13 +64,13 @@ class NewestJobWorker(Generic[Job, Result]):
     def _run(self) -> None:
         while True:
             with self._wake:
-                while not self._waiting and not self._closing:
+                while not self._pending_jobs and not self._is_closing:
                     self._wake.wait()
-                if self._closing:
+                if self._is_closing:
                     return
-                mine = self._working = self._waiting
-                self._waiting = []
-            result = self._process_job(mine[0])
+                taken = self._running_jobs = self._pending_jobs
+                self._pending_jobs = []
+            result = self._process_job(taken[0])
             with self._wake:
-                if self._working is mine:  # otherwise it was discarded
-                    self._results, self._working = [result], []
+                if self._running_jobs is taken:  # otherwise it was discarded
+                    self._results, self._running_jobs = [result], []

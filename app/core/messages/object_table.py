@@ -73,16 +73,16 @@ def lists_of_objects(value: object, max_paths: int = MAX_LISTS) -> list[Steps]:
     ``max_paths`` paths are returned; the search stops after `_MAX_SEARCHED_VALUES` values.
     """
     paths: list[Steps] = []
-    waiting: deque[tuple[Steps, object]] = deque([((), value)])
+    queue: deque[tuple[Steps, object]] = deque([((), value)])
     for _each in range(_MAX_SEARCHED_VALUES):
-        if not waiting or len(paths) >= max_paths:
+        if not queue or len(paths) >= max_paths:
             break
-        steps, current = waiting.popleft()
+        steps, current = queue.popleft()
         if is_list_of_objects(current):
             paths.append(steps)
         elif isinstance(current, Mapping):
-            room = max(0, _MAX_SEARCHED_VALUES - len(waiting))
-            waiting.extend(((*steps, str(key)), below) for key, below in islice(current.items(), room))
+            capacity = max(0, _MAX_SEARCHED_VALUES - len(queue))
+            queue.extend(((*steps, str(key)), nested) for key, nested in islice(current.items(), capacity))
     return paths
 
 
@@ -140,13 +140,13 @@ def columns_of(rows: Sequence[ObjectRow], max_columns: int = MAX_COLUMNS) -> tup
     for row in rows[:MAX_ROWS_CHECKED]:
         for key, value in row.value.items():
             if isinstance(value, Mapping) and 0 < len(value) <= _MAX_FLATTENED_KEYS:
-                columns.update(dict.fromkeys((key, below) for below in value))  # type: ignore[misc]
+                columns.update(dict.fromkeys((key, nested) for nested in value))  # type: ignore[misc]
             else:
                 columns[(key,)] = None  # type: ignore[index]
             if len(columns) >= max_columns:
                 return tuple(columns)[:max_columns]
-    inner = {column[0] for column in columns if len(column) > 1}
-    return tuple(column for column in columns if len(column) > 1 or column[0] not in inner)
+    flattened_keys = {column[0] for column in columns if len(column) > 1}
+    return tuple(column for column in columns if len(column) > 1 or column[0] not in flattened_keys)
 
 
 def column_name(column: Steps) -> str:
@@ -188,14 +188,14 @@ def cell_text(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def format_table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
+def format_table_csv(name_title: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
     """Return a table as CSV.
 
     Args:
-        first: Title of the column with the row names.
+        name_title: Title of the column with the row names.
         columns: Further columns.
         rows: Rows in order.
     """
-    header = [first, *(escape_formula(column_name(column)) for column in columns)]
+    header = [name_title, *(escape_formula(column_name(column)) for column in columns)]
     lines = ([escape_formula(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
     return format_csv([header, *lines])

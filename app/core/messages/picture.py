@@ -42,7 +42,7 @@ class Picture:
     Attributes:
         bgra: Contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32. Has fewer
             rows and columns than the image if the image was decoded for a small view.
-        numbers: Values of an image with one channel (grey, depth), else None.
+        channel_values: Values of an image with one channel (grey, depth), else None.
         message: Message that was decoded.
     """
 
@@ -53,13 +53,13 @@ class Picture:
     stamp_ns: int | None
     received_s: float
     message: Message | None = None
-    numbers: NDArray[Any] | None = None
+    channel_values: NDArray[Any] | None = None
     style: PictureStyle = PLAIN
     """Display style with which the image was decoded."""
     scale: ColourScale | None = None
     """Colour scale of an image that shows numbers as colours, else None."""
     has_one_channel: bool = False
-    """True if the image has one channel, even if `numbers` is None."""
+    """True if the image has one channel, even if `channel_values` is None."""
 
     @property
     def is_full_resolution(self) -> bool:
@@ -73,23 +73,23 @@ class Picture:
         """
         if not (self.is_full_resolution and 0 <= x < self.width and 0 <= y < self.height):
             return None
-        if self.numbers is not None:
-            number: int | float = self.numbers[y, x].item()
+        if self.channel_values is not None:
+            number: int | float = self.channel_values[y, x].item()
             return number
         blue, green, red = (int(value) for value in self.bgra[y, x, :3])
         return red, green, blue
 
 
 def decode(
-    message: Message, received_s: float, fit: Size | None = None, style: PictureStyle = PLAIN
+    message: Message, received_s: float, display_size: Size | None = None, style: PictureStyle = PLAIN
 ) -> tuple[Picture | None, str | None]:
     """Decode a message to an image.
 
     Args:
         message: Message with an image.
         received_s: Arrival time of the message (monotonic seconds).
-        fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at
-            a reduced size. None means full resolution.
+        display_size: Displayed width and height in screen pixels. An image at least twice as large is
+            decoded at a reduced size. None means full resolution.
         style: Display style.
 
     Returns:
@@ -98,24 +98,24 @@ def decode(
     import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start
 
     try:
-        frame, size = _decode_frame(message, fit)
+        frame, size = _decode_frame(message, display_size)
         converted = _to_bgra(frame, style)
     except NepError as error:
         return None, str(error)
     except (cv2.error, MemoryError) as error:
-        return None, _("“{topic}” sends an image that can't be shown: {problem}").format(
+        return None, _("An image on “{topic}” can't be shown: {problem}").format(
             topic=message.topic, problem=_short_message(error)
         )
     if converted is None:
         return None, _("“{topic}” has images of {shape} {dtype}, which can't be shown").format(
             topic=message.topic, shape=frame.shape, dtype=frame.dtype
         )
-    bgra, numbers, scale = converted
-    is_grey = numbers is not None
+    bgra, channel_values, scale = converted
+    is_grey = channel_values is not None
     if (bgra.shape[1], bgra.shape[0]) != size:
-        numbers = None
+        channel_values = None
     image = Picture(
-        bgra, *size, message.seq, message.stamp_ns, received_s, message, numbers, style, scale, is_grey
+        bgra, *size, message.seq, message.stamp_ns, received_s, message, channel_values, style, scale, is_grey
     )
     return image, None
 
@@ -124,7 +124,7 @@ def reuse_picture(
     displayed: Picture | None,
     message: Message,
     received_s: float,
-    fit: Size | None,
+    display_size: Size | None,
     style: PictureStyle = PLAIN,
 ) -> Picture | None:
     """Return the shown image for a new message without decoding, if both messages contain equal bytes.
@@ -139,7 +139,10 @@ def reuse_picture(
         or displayed.style != style
     ):
         return None
-    displayed_message, factor = displayed.message, _reduction_factor((displayed.width, displayed.height), fit)
+    displayed_message, factor = (
+        displayed.message,
+        _reduction_factor((displayed.width, displayed.height), display_size),
+    )
     if abs(displayed.bgra.shape[0] * factor - displayed.height) >= factor:  # rounded up or down
         return None
     if displayed_message.extension != message.extension or not _are_bytes_equal(
@@ -193,19 +196,19 @@ def encode_png(message: Message) -> bytes:
     return bytes(data.tobytes())
 
 
-def _decode_frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
+def _decode_frame(message: Message, display_size: Size | None) -> tuple[NDArray[Any], Size]:
     # In OpenCV's layout (grey, BGR or BGRA; any type), perhaps reduced, and its full size.
     layout = image_codec.raw_layout(message.extension.get("encoding"))
     if layout is not None:
         frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
         size = (frame.shape[1], frame.shape[0])
-        frame = _reduce(frame, _reduction_factor(size, fit))
+        frame = _reduce(frame, _reduction_factor(size, display_size))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame, size
     file = parse_header(message.data)
     size = (file.width, file.height)
-    factor = _reduction_factor(size, fit)
+    factor = _reduction_factor(size, display_size)
     if file.kind == "jpeg":
         return image_codec.decode_file(file, factor), size
     return _reduce(image_codec.decode_file(file), factor), size
@@ -216,19 +219,19 @@ def _reduce(frame: NDArray[Any], factor: int) -> NDArray[Any]:
 
     if factor == 1:
         return frame
-    small = (max(1, frame.shape[1] // factor), max(1, frame.shape[0] // factor))
+    reduced_size = (max(1, frame.shape[1] // factor), max(1, frame.shape[0] // factor))
     if frame.dtype not in AVERAGED_DTYPES:
-        return frame[::factor, ::factor][: small[1], : small[0]]
-    smaller: NDArray[Any] = cv2.resize(frame, small, interpolation=cv2.INTER_AREA)
-    return smaller
+        return frame[::factor, ::factor][: reduced_size[1], : reduced_size[0]]
+    reduced: NDArray[Any] = cv2.resize(frame, reduced_size, interpolation=cv2.INTER_AREA)
+    return reduced
 
 
-def _reduction_factor(size: Size, fit: Size | None) -> int:
-    # Factor by which the image can be reduced for `fit`.
-    if fit is None:
+def _reduction_factor(size: Size, display_size: Size | None) -> int:
+    # Factor by which the image can be reduced for `display_size`.
+    if display_size is None:
         return 1
-    shrink = min(size[0] / max(1, fit[0]), size[1] / max(1, fit[1]))
-    return next((factor for factor in REDUCTION_FACTORS if shrink >= factor), 1)
+    ratio = min(size[0] / max(1, display_size[0]), size[1] / max(1, display_size[1]))
+    return next((factor for factor in REDUCTION_FACTORS if ratio >= factor), 1)
 
 
 def _to_bgra(
@@ -243,7 +246,7 @@ def _to_bgra(
         return None
     if channels == 1:
         grey = frame.reshape(frame.shape[:2])
-        if frame.dtype == np.uint8 and (style.colours, style.low, style.high) == ("", None, None):
+        if frame.dtype == np.uint8 and (style.colour_map, style.low, style.high) == ("", None, None):
             return cv2.cvtColor(apply_tones(style, grey), cv2.COLOR_GRAY2BGRA), grey, None
         bgra, scale = apply_colour_map(style, grey)
         return bgra, grey, scale

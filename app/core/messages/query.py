@@ -54,11 +54,11 @@ class QueryResult:
 
     Attributes:
         values: Found values, by path.
-        cut: Reason why the result is incomplete, or "".
+        incomplete_reason: Reason why the result is incomplete, or "".
     """
 
     values: Mapping[FoundPath, object]
-    cut: str = ""
+    incomplete_reason: str = ""
 
 
 class JsonQuery:
@@ -82,34 +82,38 @@ class JsonQuery:
             raise QueryError(_("the query isn't valid")) from error
 
     def evaluate(
-        self, value: object, most_steps: int = MAX_VISITED_VALUES, most_found: int = MAX_RESULTS
+        self, value: object, max_steps: int = MAX_VISITED_VALUES, max_results: int = MAX_RESULTS
     ) -> QueryResult:
         """Run the query on a decoded message.
 
         Args:
             value: Decoded message.
-            most_steps: Maximum number of visited values.
-            most_found: Maximum number of returned values.
+            max_steps: Maximum number of visited values.
+            max_results: Maximum number of returned values.
         """
-        count = _StepCounter(most_steps)
-        looked_through = _wrap_counted(value, count)
+        counter = _StepCounter(max_steps)
+        counted_value = _wrap_counted(value, counter)
         results: dict[FoundPath, object] = {}
-        if not isinstance(looked_through, (_CountedObject, _CountedList)):
+        if not isinstance(counted_value, (_CountedObject, _CountedList)):
             return QueryResult({FoundPath.from_steps(()): value} if self.text == "$" else {})
-        cut = ""
+        incomplete_reason = ""
         try:
-            for match in self._path.finditer(looked_through):
-                if len(results) >= most_found:
-                    cut = _("Only the first {count} are shown.").format(count=most_found)
+            for match in self._path.finditer(counted_value):
+                if len(results) >= max_results:
+                    incomplete_reason = _("Only the first {count} matches are shown.").format(
+                        count=max_results
+                    )
                     break
                 results[FoundPath.from_steps(tuple(match.parts))] = _unwrap(match.obj)
         except _LimitReached:
-            cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
+            incomplete_reason = _(
+                "The search stopped after {count} values. Only the matches found until then are shown."
+            ).format(count=max_steps)
         except RecursionError:
-            cut = _("The message is nested too deeply for a query.")
+            incomplete_reason = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:
-            cut = _error_message(error, self.text)
-        return QueryResult(results, cut)
+            incomplete_reason = _error_message(error, self.text)
+        return QueryResult(results, incomplete_reason)
 
 
 @cache
@@ -122,11 +126,11 @@ def _environment() -> jsonpath.JSONPathEnvironment:
 
 def _error_message(error: jsonpath.JSONPathError, text: str) -> str:
     reason, token = escaped(str(error.message or "")), error.token
-    rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
-    if not rest:
+    remainder = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
+    if not remainder:
         return _("the query is incomplete: {reason}").format(reason=reason)
     template = _("the query isn't valid from {rest} on: {reason}")
-    return template.format(rest=escaped(shortened(rest, 20)), reason=reason)
+    return template.format(rest=escaped(shortened(remainder, 20)), reason=reason)
 
 
 class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search
@@ -145,13 +149,13 @@ class _StepCounter:
             raise _LimitReached
 
 
-def _wrap_counted(value: object, count: _StepCounter) -> object:
+def _wrap_counted(value: object, counter: _StepCounter) -> object:
     if isinstance(value, Mapping):
-        return _CountedObject(value, count)
+        return _CountedObject(value, counter)
     if isinstance(value, (bytes, bytearray, memoryview)):
         return _WrappedBytes(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return _CountedList(value, count)
+        return _CountedList(value, counter)
     return value
 
 
@@ -173,31 +177,31 @@ class _WrappedBytes:
 
 
 class _CountedObject(Mapping[str, object]):
-    __slots__ = ("_count", "raw")
+    __slots__ = ("_counter", "raw")
 
-    def __init__(self, raw: Mapping[object, object], count: _StepCounter) -> None:
-        self.raw, self._count = raw, count
+    def __init__(self, raw: Mapping[object, object], counter: _StepCounter) -> None:
+        self.raw, self._counter = raw, counter
 
     def __getitem__(self, key: str) -> object:
-        self._count.add()
-        return _wrap_counted(self.raw[key], self._count)
+        self._counter.add()
+        return _wrap_counted(self.raw[key], self._counter)
 
     def __iter__(self) -> Iterator[str]:
         for key in self.raw:
-            self._count.add()
+            self._counter.add()
             yield str(key)
 
     def items(self) -> Iterator[tuple[str, object]]:  # type: ignore[override]
         # Avoids looking up each key again, and supports numeric keys of msgpack.
         for key, value in self.raw.items():
-            self._count.add()
-            yield str(key), _wrap_counted(value, self._count)
+            self._counter.add()
+            yield str(key), _wrap_counted(value, self._counter)
 
     def __len__(self) -> int:
         return len(self.raw)
 
     def __eq__(self, other: object) -> bool:
-        self._count.add()
+        self._counter.add()
         if not isinstance(other, _CountedObject) or len(self) != len(other):
             return False
         return self.raw is other.raw or all(
@@ -208,10 +212,10 @@ class _CountedObject(Mapping[str, object]):
 
 
 class _CountedList(Sequence[object]):
-    __slots__ = ("_count", "raw")
+    __slots__ = ("_counter", "raw")
 
-    def __init__(self, raw: Sequence[object], count: _StepCounter) -> None:
-        self.raw, self._count = raw, count
+    def __init__(self, raw: Sequence[object], counter: _StepCounter) -> None:
+        self.raw, self._counter = raw, counter
 
     @overload
     def __getitem__(self, row: int) -> object: ...
@@ -221,21 +225,21 @@ class _CountedList(Sequence[object]):
 
     def __getitem__(self, row: int | slice) -> object:
         if isinstance(row, slice):
-            self._count.add(len(range(*row.indices(len(self.raw)))))
-            return [_wrap_counted(value, self._count) for value in self.raw[row]]
-        self._count.add()
-        return _wrap_counted(self.raw[row], self._count)
+            self._counter.add(len(range(*row.indices(len(self.raw)))))
+            return [_wrap_counted(value, self._counter) for value in self.raw[row]]
+        self._counter.add()
+        return _wrap_counted(self.raw[row], self._counter)
 
     def __iter__(self) -> Iterator[object]:
         for value in self.raw:
-            self._count.add()
-            yield _wrap_counted(value, self._count)
+            self._counter.add()
+            yield _wrap_counted(value, self._counter)
 
     def __len__(self) -> int:
         return len(self.raw)
 
     def __eq__(self, other: object) -> bool:
-        self._count.add()
+        self._counter.add()
         if not isinstance(other, _CountedList) or len(self) != len(other):
             return False
         return self.raw is other.raw or all(map(_are_equal, self, other))

@@ -70,6 +70,6 @@ def file_stem(message: Message) -> str:
     The name is valid on every operating system.
     """
     stamp_ns = message.stamp_ns if message.stamp_ns is not None else time.time_ns()
-    when = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(stamp_ns // 1_000_000_000))
+    time_text = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(stamp_ns // 1_000_000_000))
     topic = re.sub(r"[^\w\-]+", " ", message.topic).strip()[:80] or "picture"
-    return f"{topic} {when}.{stamp_ns // 1_000_000 % 1000:03}"
+    return f"{topic} {time_text}.{stamp_ns // 1_000_000 % 1000:03}"

@@ -34,14 +34,14 @@ class CheckResult:
     """Result of the checks of one topic since the last call of `DecodeChecker.pop_results`.
 
     Attributes:
-        checked: Number of checked messages.
+        checked_count: Number of checked messages.
         bad_count: Number of checked messages that can't be decoded.
         unchecked_count: Number of messages that were not checked for lack of time.
         error: Description of the newest error, or "".
         is_newest_readable: True if the newest message can be decoded.
     """
 
-    checked: int = 0
+    checked_count: int = 0
     bad_count: int = 0
     unchecked_count: int = 0
     error: str = ""
@@ -62,7 +62,7 @@ class DecodeChecker:
         self._results: dict[str, CheckResult] = {}
         self._suspects: dict[str, float] = {}
         self._budget_s = MAX_BUDGET_S
-        self._refilled = clock()
+        self._refilled_s = clock()
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
         """Check messages of one topic, oldest first. Images and bytes are skipped."""
@@ -72,12 +72,12 @@ class DecodeChecker:
         self._refill_budget()
         self._check(topic, messages, result)
         with self._lock:
-            old = self._results.get(topic)
-            if old is not None:
-                result.checked += old.checked
-                result.bad_count += old.bad_count
-                result.unchecked_count += old.unchecked_count
-                result.error = result.error or old.error
+            previous = self._results.get(topic)
+            if previous is not None:
+                result.checked_count += previous.checked_count
+                result.bad_count += previous.bad_count
+                result.unchecked_count += previous.unchecked_count
+                result.error = result.error or previous.error
             self._results[topic] = result
 
     def pop_results(self) -> dict[str, CheckResult]:
@@ -88,16 +88,16 @@ class DecodeChecker:
 
     def _refill_budget(self) -> None:
         now = self._clock()
-        self._budget_s = min(MAX_BUDGET_S, self._budget_s + max(0.0, now - self._refilled) * MAX_CPU_SHARE)
-        self._refilled = now
+        self._budget_s = min(MAX_BUDGET_S, self._budget_s + max(0.0, now - self._refilled_s) * MAX_CPU_SHARE)
+        self._refilled_s = now
 
     def _check(self, topic: str, messages: Sequence[Message], result: CheckResult) -> None:
         newest = messages[-1]
         # the newest is always decoded and stays decoded: panels show it
         result.error = _decode_error(newest, keep_decoded=True)
         result.is_newest_readable = not result.error
-        result.checked, result.bad_count = 1, int(not result.is_newest_readable)
-        now = self._refilled
+        result.checked_count, result.bad_count = 1, int(not result.is_newest_readable)
+        now = self._refilled_s
         if result.bad_count:
             self._suspects[topic] = now
         if len(messages) > 1:  # reading the clock takes longer than a single message
@@ -106,22 +106,22 @@ class DecodeChecker:
     def _check_older(self, topic: str, messages: Sequence[Message], result: CheckResult, now: float) -> None:
         started_s = self._cpu_clock()
         budget_s = self._budget_s - (0.0 if self._is_suspect(topic, now) else RESERVED_BUDGET_S)
-        index, batch_size, worked, older = 0, 1, 0.0, len(messages) - 1
-        while index < older and worked < budget_s:
-            was_well, before = not result.bad_count, worked
-            end = min(older, index + batch_size)
+        index, batch_size, elapsed_s, older_count = 0, 1, 0.0, len(messages) - 1
+        while index < older_count and elapsed_s < budget_s:
+            was_error_free, previous_elapsed_s = not result.bad_count, elapsed_s
+            end = min(older_count, index + batch_size)
             index = _check_batch(messages, index, end, result)
-            if was_well and result.bad_count:
+            if was_error_free and result.bad_count:
                 self._suspects[topic] = now
                 budget_s = self._budget_s
-            worked = self._cpu_clock() - started_s
+            elapsed_s = self._cpu_clock() - started_s
             batch_size = (
                 min(2 * batch_size, MAX_BATCH)
-                if worked - before < CLOCK_READ_INTERVAL_S
+                if elapsed_s - previous_elapsed_s < CLOCK_READ_INTERVAL_S
                 else max(1, batch_size // 2)
             )
-        result.unchecked_count = len(messages) - result.checked
-        self._budget_s -= worked
+        result.unchecked_count = len(messages) - result.checked_count
+        self._budget_s -= elapsed_s
 
     def _is_suspect(self, topic: str, now: float) -> bool:
         last_suspected_s = self._suspects.get(topic)
@@ -137,7 +137,7 @@ def _check_batch(messages: Sequence[Message], index: int, end: int, result: Chec
     while index < end and size_bytes < MAX_BATCH_BYTES:
         message = messages[index]
         problem = _decode_error(message, keep_decoded=False)
-        result.checked += 1
+        result.checked_count += 1
         if problem:
             result.bad_count += 1
             result.error = result.error or problem

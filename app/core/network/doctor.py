@@ -109,19 +109,23 @@ class Doctor:
         self._partial_findings = None
         self.revision += 1
 
-    def _report(self, findings: tuple[doctor.Finding, ...], check_count: int, total_checks: int) -> None:
+    def _report_progress(
+        self, findings: tuple[doctor.Finding, ...], check_count: int, total_checks: int
+    ) -> None:
         self._partial_findings, self.check_count, self.total_checks = findings, check_count, total_checks
         self.revision += 1
 
     def _find(self, expected_topic: str) -> tuple[doctor.Finding, ...]:
         try:
-            return tuple(self._diagnose(expected_topic, self._report))
+            return tuple(self._diagnose(expected_topic, self._report_progress))
         except Exception as error:  # noqa: BLE001  reported as a finding
-            message = _("The doctor couldn't finish: {kind}: {error}.").format(
+            message = _("The doctor couldn't finish ({kind}: {error}).").format(
                 kind=type(error).__name__, error=error
             )
             return (
-                doctor.Finding("doctor", "error", message, _("Report it to the developers of NEP Studio.")),
+                doctor.Finding(
+                    "doctor", "error", message, _("Report this error to the developers of NEP Studio.")
+                ),
             )
 
 
@@ -135,4 +139,8 @@ def create_doctor(address: str, folder: Path) -> Doctor:
         folder: Studio's folder.
     """
     folders = [(_("Settings and unsaved work"), folder)]
-    return Doctor(lambda key, tell: doctor.diagnose(address, "" if split_key(key)[0] else key, folders, tell))
+    return Doctor(
+        lambda key, report_progress: doctor.diagnose(
+            address, "" if split_key(key)[0] else key, folders, report_progress
+        )
+    )

@@ -29,32 +29,32 @@ def change_messages(before: GraphView, after: GraphView) -> list[str]:
     summarized in one.
     """
     join_messages: list[tuple[str, str]] = []
-    more: list[tuple[str, str]] = []
+    topic_messages: list[tuple[str, str]] = []
     new_nodes = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]
     reported: set[str] = set()
-    topics_of = _topics_by_node(after)
+    topics_by_node = _topics_by_node(after)
     for node in new_nodes:
-        new = [name for name in topics_of.get(node, ()) if not _is_published(before, name)]
-        name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE_GENERATION
-        if len(new) > MAX_LISTED_TOPICS:
-            join_messages.append((name, _joined_message(name, len(new), original=original)))
-            reported.update(new)
-        elif not new:
-            template = _("{node} joined (original NEP)") if original else _("{node} joined")
+        new_topics = [name for name in topics_by_node.get(node, ()) if not _is_published(before, name)]
+        name, is_original = after.nodes[node].name, after.nodes[node].generation != NATIVE_GENERATION
+        if len(new_topics) > MAX_LISTED_TOPICS:
+            join_messages.append((name, _joined_message(name, len(new_topics), is_original=is_original)))
+            reported.update(new_topics)
+        elif not new_topics:
+            template = _("{node} joined (original NEP)") if is_original else _("{node} joined")
             join_messages.append((name, template.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
         if count and name not in reported and not _is_internal(name) and not _is_published(before, name):
             template = ngettext(
-                "{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count
+                "new topic {topic} ({count} publisher)", "new topic {topic} ({count} publishers)", count
             )
-            more.append((name, template.format(topic=name, count=count)))
+            topic_messages.append((name, template.format(topic=name, count=count)))
     left_names = [
         node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)
     ]
     return [
         *_summarize(join_messages, _("{count} nodes joined: {names} and {more} more")),
-        *_summarize(more, _("{count} new topics: {names} and {more} more")),
+        *_summarize(topic_messages, _("{count} new topics: {names} and {more} more")),
         *_summarize(
             [(name, _("{node} left").format(node=name)) for name in left_names],
             _("{count} nodes left: {names} and {more} more"),
@@ -69,14 +69,14 @@ def _summarize(lines: Sequence[tuple[str, str]], summary_template: str) -> list[
     return [summary_template.format(count=len(lines), names=listed_names, more=len(lines) - MAX_NAMED)]
 
 
-def _joined_message(node: str, count: int, *, original: bool) -> str:
+def _joined_message(node: str, count: int, *, is_original: bool) -> str:
     template = (
         ngettext(
             "{node} joined with {count} topic (original NEP)",
             "{node} joined with {count} topics (original NEP)",
             count,
         )
-        if original
+        if is_original
         else ngettext("{node} joined with {count} topic", "{node} joined with {count} topics", count)
     )
     return template.format(node=node, count=count)

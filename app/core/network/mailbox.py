@@ -67,16 +67,16 @@ class Mailbox:
         self,
         messages_per_topic: int = MAX_MESSAGES_PER_TOPIC,
         bytes_per_topic: int = MAX_BYTES_PER_TOPIC,
-        events: int = MAX_EVENTS,
+        max_events: int = MAX_EVENTS,
     ) -> None:
         self._messages_per_topic = messages_per_topic
         self._bytes_per_topic = bytes_per_topic
-        self._event_limit = events
+        self._max_events = max_events
         self._lock = threading.Lock()
         self._rings: dict[str, _Ring] = {}
         self._events: deque[object] = deque()
-        self._lost_events = 0
-        self._ring_sizes: dict[str, int] = {}
+        self._lost_event_count = 0
+        self._capacities: dict[str, int] = {}
 
     def set_capacity(self, topic: str, messages: int | None) -> None:
         """Set the capacity of a topic's ring buffer. The byte limit still applies.
@@ -87,9 +87,9 @@ class Mailbox:
         """
         with self._lock:
             if messages is None:
-                self._ring_sizes.pop(topic, None)
+                self._capacities.pop(topic, None)
             else:
-                self._ring_sizes[topic] = max(1, messages)
+                self._capacities[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
         """Post a batch of messages of one topic, oldest first.
@@ -97,8 +97,8 @@ class Mailbox:
         Messages beyond the ring's size are only counted, so that a batch of thousands costs no more than a
         full ring.
         """
-        room = self._ring_sizes.get(topic, self._messages_per_topic)
-        newest = messages[-room:]
+        capacity = self._capacities.get(topic, self._messages_per_topic)
+        newest = messages[-capacity:]
         size_bytes = sum(message.size_bytes for message in newest)
         with self._lock:
             ring = self._rings.get(topic)
@@ -109,7 +109,7 @@ class Mailbox:
             ring.dropped += len(messages) - len(newest)
             # the newest message is never evicted, whatever its size
             while len(ring.messages) > 1 and (
-                len(ring.messages) > room or ring.size_bytes > self._bytes_per_topic
+                len(ring.messages) > capacity or ring.size_bytes > self._bytes_per_topic
             ):
                 ring.size_bytes -= ring.messages.popleft().size_bytes
                 ring.dropped += 1
@@ -122,8 +122,8 @@ class Mailbox:
     def post_event(self, event: object) -> None:
         """Post an event. If the event queue is full, the event is counted as lost instead."""
         with self._lock:
-            if len(self._events) >= self._event_limit:
-                self._lost_events += 1
+            if len(self._events) >= self._max_events:
+                self._lost_event_count += 1
             else:
                 self._events.append(event)
 
@@ -132,6 +132,6 @@ class Mailbox:
         with self._lock:
             rings, self._rings = self._rings, {}
             events, self._events = self._events, deque()
-            lost, self._lost_events = self._lost_events, 0
+            lost_event_count, self._lost_event_count = self._lost_event_count, 0
         batches = {topic: Batch(list(ring.messages), ring.dropped) for topic, ring in rings.items()}
-        return DrainResult(batches, list(events), lost)
+        return DrainResult(batches, list(events), lost_event_count)

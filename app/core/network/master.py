@@ -80,22 +80,22 @@ class MasterChangeDetector:
 
 
 class MasterStarter:
-    """Start of a master, unless one is running.
+    """Starter of the master process; does nothing if a master is already running.
 
-    Consecutive failures with the same reason are reported once.
+    Consecutive failures with the same reason are reported once, by the callback `on_failed`.
     """
 
     def __init__(
         self,
         address: str,
-        failed: Callable[[str], object],
+        on_failed: Callable[[str], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # `failed` is called with the reason in the starting thread; `clock` is monotonic seconds.
-        self._address, self._failed, self._clock = address, failed, clock
+        # `on_failed` is called with the reason in the starting thread; `clock` is monotonic seconds.
+        self._address, self._on_failed, self._clock = address, on_failed, clock
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
-        self._wait_s, self._retry_at, self._last_reason = RETRY_S, 0.0, ""
+        self._wait_s, self._retry_at_s, self._last_reason = RETRY_S, 0.0, ""
         self.is_first_master = False
         """True if no master was running before this one was started, so that no other node can be registered
         yet.
@@ -106,17 +106,17 @@ class MasterStarter:
         """True if the running master was started by this object."""
         return self._process is not None and self._process.poll() is None
 
-    def ensure(self) -> None:
+    def ensure_running(self) -> None:
         """Start a master if none is running. Returns immediately."""
         if self._thread is not None and self._thread.is_alive():
             return
         self._thread = threading.Thread(target=self._start, name="studio-launcher", daemon=True)
         self._thread.start()
 
-    def ensure_with_backoff(self) -> None:
-        """Call `ensure`, unless a failed start was too recent. Call this method repeatedly."""
-        if self._clock() >= self._retry_at:
-            self.ensure()
+    def ensure_running_with_backoff(self) -> None:
+        """Call `ensure_running`, unless a failed start was too recent. Call this method repeatedly."""
+        if self._clock() >= self._retry_at_s:
+            self.ensure_running()
 
     def close(self) -> None:
         """Wait at most `JOIN_TIMEOUT_S` for a start in progress."""
@@ -126,20 +126,20 @@ class MasterStarter:
     def _start(self) -> None:
         error_text = self._try_start()
         if not error_text:
-            self._wait_s, self._retry_at, self._last_reason = RETRY_S, 0.0, ""
+            self._wait_s, self._retry_at_s, self._last_reason = RETRY_S, 0.0, ""
             return
-        self._retry_at = self._clock() + self._wait_s
+        self._retry_at_s = self._clock() + self._wait_s
         self._wait_s = min(2 * self._wait_s, MAX_RETRY_S)
         if error_text != self._last_reason:
             self._last_reason = error_text
-            self._failed(error_text)
+            self._on_failed(error_text)
 
     def _try_start(self) -> str:
         if is_running(self._address, timeout_s=0.5):
             return ""
-        hindered = doctor.start_blocker(self._address)
-        if hindered is not None:
-            return f"{hindered.sentence} {hindered.fix}"
+        blocker = doctor.start_blocker(self._address)
+        if blocker is not None:
+            return f"{blocker.sentence} {blocker.fix}"
         self.is_first_master = True
         self._log_crash()
         try:
@@ -156,5 +156,5 @@ class MasterStarter:
             return
         self._process = None
         if is_crash(code):
-            how = f"the master's process {exit_text(code)}"
-            _log.error("%s", how, extra=crash_extra("master", how))
+            cause = f"the master's process {exit_text(code)}"
+            _log.error("%s", cause, extra=crash_extra("master", cause))

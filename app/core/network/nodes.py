@@ -42,7 +42,7 @@ class NodeEntry:
     subscribed_topics: tuple[str, ...] = ()
     is_new: bool = False
     gone_s: float | None = None
-    gone_since: float | None = None
+    gone_since_s: float | None = None
     network: str = ""
     is_stale: bool = False
     has_parameters: bool = False
@@ -73,7 +73,7 @@ class Nodes:
     def __init__(self, network: str = "") -> None:
         self._network = network
         self._nodes: dict[str, NodeEntry] = {}
-        self._first_graph = True
+        self._is_first_graph = True
         self._last_version = (0, 0)
         self.revision = 0
         self.values_revision = 0
@@ -88,15 +88,15 @@ class Nodes:
         """Return the node with this id, or None."""
         return self._nodes.get(id)
 
-    def set_stale(self, stale: bool) -> None:
+    def set_stale(self, is_stale: bool) -> None:
         """Set `NodeEntry.is_stale` of all nodes. A change discards their CPU load.
 
         Args:
-            stale: True while the network can't be queried.
+            is_stale: True while the network can't be queried.
         """
         for node in self._nodes.values():
-            if node.is_stale is not stale:
-                node.is_stale, node.cpu_ratio = stale, None
+            if node.is_stale is not is_stale:
+                node.is_stale, node.cpu_ratio = is_stale, None
                 self.revision += 1
 
     def mark_seen(self, id: str) -> None:
@@ -114,72 +114,74 @@ class Nodes:
         for id, node in self._nodes.items():
             if id in view.nodes:
                 node.cpu_ratio = view.nodes[id].cpu_ratio
-        self._first_graph = False
+        self._is_first_graph = False
         self.values_revision += 1
 
     def update_ages(self, now: float) -> None:
-        """Update the ages at ``now`` (monotonic seconds).
+        """Update `NodeEntry.gone_s` of nodes that have left; ``now`` is monotonic seconds.
 
         Nodes that left more than `GONE_DISPLAY_S` seconds ago are removed.
         """
         for node in list(self._nodes.values()):
-            if node.gone_since is None:
+            if node.gone_since_s is None:
                 continue
-            node.gone_s = now - node.gone_since
+            node.gone_s = now - node.gone_since_s
             if node.gone_s >= GONE_DISPLAY_S:
                 del self._nodes[node.id]
                 self.revision += 1
 
     def _update_all(self, view: GraphView, now: float) -> None:
-        publishes, subscribes = _topics_by_node(view)
+        published_topics, subscribed_topics = _topics_by_node(view)
         for id, info in view.nodes.items():
             if info.generation == GATEWAY:
                 continue
             node = self._nodes.get(id)
             if node is None:
                 self._replace_gone(info)
-                new = not self._first_graph
-                node = self._nodes[id] = NodeEntry(id, info.name, is_new=new, network=self._network)
+                is_new = not self._is_first_graph
+                node = self._nodes[id] = NodeEntry(id, info.name, is_new=is_new, network=self._network)
             _update_entry(node, info)
             parameter_topic = parameters_topic(id)
             node.can_set_parameters = parameter_topic in view.services
             topic = view.topics.get(parameter_topic)
-            topic = view.topics.get(parameter_topic)
             node.has_parameters = node.can_set_parameters or (topic is not None and bool(topic.publishers))
-            node.published_topics, node.subscribed_topics = publishes.get(id, ()), subscribes.get(id, ())
+            node.published_topics, node.subscribed_topics = (
+                published_topics.get(id, ()),
+                subscribed_topics.get(id, ()),
+            )
         for id, node in self._nodes.items():
-            if id not in view.nodes and node.gone_since is None:
-                node.gone_since, node.gone_s, node.cpu_ratio = now, 0.0, None
+            if id not in view.nodes and node.gone_since_s is None:
+                node.gone_since_s, node.gone_s, node.cpu_ratio = now, 0.0, None
         self.revision += 1
 
     def _replace_gone(self, info: NodeInfo) -> None:
         # A restarted program replaces its entry that left.
         for id, node in list(self._nodes.items()):
-            if node.gone_since is not None and (node.name, node.host) == (info.name, info.host):
+            if node.gone_since_s is not None and (node.name, node.host) == (info.name, info.host):
                 del self._nodes[id]
 
 
 def _update_entry(node: NodeEntry, info: NodeInfo) -> None:
     node.name, node.host, node.pid = info.name, info.host, info.pid
     node.language, node.generation, node.since_ns = info.language, info.generation, info.since_ns
-    node.gone_since = node.gone_s = None
+    node.gone_since_s = node.gone_s = None
     node.is_stale = False
 
 
 def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]:
     # (topics that each node publishes, topics that it subscribes to), by node id, sorted and unique.
-    publishes: dict[str, dict[str, None]] = {}
-    subscribes: dict[str, dict[str, None]] = {}
+    published_topics: dict[str, dict[str, None]] = {}
+    subscribed_topics: dict[str, dict[str, None]] = {}
     for name in sorted(view.topics):
         info = view.topics[name]
         for publisher in info.publishers:
-            publishes.setdefault(publisher.node_id, {})[name] = None
+            published_topics.setdefault(publisher.node_id, {})[name] = None
         for subscriber in info.subscribers:
-            subscribes.setdefault(subscriber.node_id, {})[name] = None
+            subscribed_topics.setdefault(subscriber.node_id, {})[name] = None
     for name, pattern_info in view.patterns.items():
         for subscriber in pattern_info.subscribers:
-            subscribes.setdefault(subscriber.node_id, {})[name] = None
+            subscribed_topics.setdefault(subscriber.node_id, {})[name] = None
     return (
-        {id: tuple(names) for id, names in publishes.items()},
-        {id: tuple(sorted(names)) for id, names in subscribes.items()},
+        {id: tuple(names) for id, names in published_topics.items()},
+        {id: tuple(sorted(names)) for id, names in subscribed_topics.items()},
     )

@@ -94,16 +94,22 @@ class RemoteAccess:
             self._settings.set(SETTING_KEY, list(hosts))
         except SettingsError as error:
             template = (
-                _("Can't save this change: other computers can't connect after the next start ({error}).")
+                _(
+                    "This change couldn't be saved ({error}). After the next start, other computers won't be "
+                    "able to connect."
+                )
                 if hosts
-                else _("Can't save this change: other computers can connect after the next start ({error}).")
+                else _(
+                    "This change couldn't be saved ({error}). After the next start, other computers will "
+                    "still be able to connect."
+                )
             )
             self._alerts.raise_alert(
                 NOT_SAVED_ALERT,
                 "warn",
                 _("The list of allowed connections can't be saved."),
                 template.format(error=error),
-                button=_("Choose another"),
+                button=_("Choose an address"),
                 action="network.others",
                 count=0,
             )
@@ -145,11 +151,11 @@ class RemoteAccess:
             self._request_thread.join(3.0)
 
     def _request(self, hosts: tuple[str, ...]) -> None:
-        before = self._request_thread
+        previous_thread = self._request_thread
 
-        def work() -> None:
-            if before is not None:
-                before.join()
+        def send_request() -> None:
+            if previous_thread is not None:
+                previous_thread.join()
             try:
                 self._request_listen(hosts, self._address)
             except NepError as error:
@@ -157,7 +163,7 @@ class RemoteAccess:
             else:
                 self._post_event(RemoteAccessChanged(hosts))
 
-        self._request_thread = threading.Thread(target=work, name="studio-reach", daemon=True)
+        self._request_thread = threading.Thread(target=send_request, name="studio-reach", daemon=True)
         self._request_thread.start()
 
 

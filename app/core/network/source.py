@@ -141,12 +141,12 @@ class LiveSource:
         sinks: Sequence[Sink],
         post_event: Callable[[object], None],
         *,
-        always: Mapping[str, str] | None = None,
-        thread: str = "studio-source",
+        permanent_topics: Mapping[str, str] | None = None,
+        thread_name: str = "studio-source",
     ) -> None:
-        # `always`: topics with their types that are subscribed to from the start, before they have
+        # `permanent_topics`: topics with their types that are subscribed to from the start, before they have
         # publishers.
-        self._always = always or {}
+        self._permanent_topics = permanent_topics or {}
         self.address = address
         self._sinks = tuple(sinks)
         self._post_event = post_event
@@ -154,7 +154,7 @@ class LiveSource:
         self._lock = threading.Lock()
         self._watched_topics: set[str] = set()
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=thread, daemon=True)
+        self._thread = threading.Thread(target=self._run, name=thread_name, daemon=True)
         self._node: Node | None = None
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._lost_offsets: Counter[str] = Counter()
@@ -192,8 +192,8 @@ class LiveSource:
         """Return the number of messages lost on each topic since its watch began."""
         with self._lock:
             subscribers = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
-            before = dict(self._lost_offsets)
-        return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in subscribers.items()}
+            offsets = dict(self._lost_offsets)
+        return {topic: offsets.get(topic, 0) + (each.lost or 0) for topic, each in subscribers.items()}
 
     def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it; `close` waits."""
@@ -246,10 +246,10 @@ class LiveSource:
     def _run(self) -> None:
         try:
             while not self._closing.is_set():
-                went_well = False
+                has_succeeded = False
                 with log_errors("poll the network"):
-                    went_well = self._run_cycle()
-                if not went_well:
+                    has_succeeded = self._run_cycle()
+                if not has_succeeded:
                     self._closing.wait(self.poll_interval_s)
         finally:
             for _, subscriber in self._subscribers.values():
@@ -262,8 +262,8 @@ class LiveSource:
         # One cycle: join, query, run jobs until the next query. False while no master answers.
         if self._node is None and not self._join():
             return False
-        asked_s = self._query_graph()
-        pause_s = max(self.poll_interval_s, min(MAX_POLL_INTERVAL_S, POLL_PAUSE_FACTOR * asked_s))
+        query_duration_s = self._query_graph()
+        pause_s = max(self.poll_interval_s, min(MAX_POLL_INTERVAL_S, POLL_PAUSE_FACTOR * query_duration_s))
         self._run_jobs(time.monotonic() + pause_s)
         return True
 
@@ -290,19 +290,19 @@ class LiveSource:
         except NepError as error:
             self._report_lost(str(error))
             return 0.0
-        asked_s = time.monotonic() - started_s
+        query_duration_s = time.monotonic() - started_s
         if self._is_connected is not True:
             self._is_connected = True
             self._post_event(MasterFound(self.address))
-        self._post_event(GraphReceived(view, asked_s))
+        self._post_event(GraphReceived(view, query_duration_s))
         self._view = view
         self._reconcile()
-        return asked_s
+        return query_duration_s
 
-    def _run_jobs(self, until: float) -> None:
+    def _run_jobs(self, deadline_s: float) -> None:
         while not self._closing.is_set() and self._node is not None:
             try:
-                item = self._jobs.get(timeout=max(0.0, until - time.monotonic()))
+                item = self._jobs.get(timeout=max(0.0, deadline_s - time.monotonic()))
             except queue.Empty:
                 return
             if item is None:
@@ -322,13 +322,13 @@ class LiveSource:
         if view is None:
             return
         with self._lock:
-            watched = {*self._watched_topics, *self._always}
-        for topic in [topic for topic in self._subscribers if topic not in watched]:
+            required_topics = {*self._watched_topics, *self._permanent_topics}
+        for topic in [topic for topic in self._subscribers if topic not in required_topics]:
             self._unsubscribe(topic)
             self._lost_offsets.pop(topic, None)
-        for topic in watched:
+        for topic in required_topics:
             info = view.topics.get(topic)
-            msg_type = self._always.get(topic) if info is None else info.msg_type
+            msg_type = self._permanent_topics.get(topic) if info is None else info.msg_type
             if msg_type is None:
                 continue
             existing = self._subscribers.get(topic)
@@ -364,9 +364,11 @@ class LiveSource:
 
 def _free_name(view: GraphView) -> str:
     used_names = {node.name for node in view.nodes.values()}
-    others = (f"{NODE_NAME} {number}" for number in count(2))
+    numbered_names = (f"{NODE_NAME} {number}" for number in count(2))
     return (
-        NODE_NAME if NODE_NAME not in used_names else next(name for name in others if name not in used_names)
+        NODE_NAME
+        if NODE_NAME not in used_names
+        else next(name for name in numbered_names if name not in used_names)
     )
 
 

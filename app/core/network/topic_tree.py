@@ -59,7 +59,7 @@ class TopicFolder:
         name: Last part of the path.
         path: Whole path, such as "/robot/arm/".
         depth: Depth in the tree, 0 for a top-level folder.
-        is_open: True if the folder is expanded.
+        is_expanded: True if the folder is expanded.
         topics: All topics in the folder and its subfolders.
         children: Topics and subfolders directly in the folder.
     """
@@ -68,7 +68,7 @@ class TopicFolder:
     path: str
     network: str
     depth: int
-    is_open: bool = True
+    is_expanded: bool = True
     topics: list[Topic] = field(default_factory=list)
     children: list[TopicFolder | Topic] = field(default_factory=list)
     _stats: FolderStats | None = None
@@ -82,12 +82,12 @@ class TopicFolder:
     def stats(self) -> FolderStats:
         """Statistics, computed at the first access after `invalidate_stats`."""
         if self._stats is None:
-            present = [topic for topic in self.topics if topic.gone_s is None]
+            existing_topics = [topic for topic in self.topics if topic.gone_s is None]
             self._stats = FolderStats(
-                _sum(topic.rate_hz for topic in present),
-                _sum(topic.bandwidth_Bps for topic in present),
-                min((topic.age_s for topic in present if topic.age_s is not None), default=None),
-                _sum(topic.lost for topic in present),
+                _sum(topic.rate_hz for topic in existing_topics),
+                _sum(topic.bandwidth_Bps for topic in existing_topics),
+                min((topic.age_s for topic in existing_topics if topic.age_s is not None), default=None),
+                _sum(topic.lost for topic in existing_topics),
             )
         return self._stats
 
@@ -107,11 +107,11 @@ def _sum(values: Iterable[Number | None]) -> Number | None:
 class TopicTree:
     """Topics arranged in folders by their names. A topic and a folder may have the same name."""
 
-    def __init__(self, topics: Iterable[Topic], closed: Collection[str] = ()) -> None:
-        # `closed` are the keys of collapsed folders.
-        self._closed = closed
+    def __init__(self, topics: Iterable[Topic], collapsed_keys: Collection[str] = ()) -> None:
+        # `collapsed_keys` are the keys of collapsed folders.
+        self._collapsed_keys = collapsed_keys
         self._folders: dict[str, TopicFolder] = {}
-        self._top: list[TreeRow] = []
+        self._top_rows: list[TreeRow] = []
         for topic in topics:
             self._insert(topic)
 
@@ -124,19 +124,19 @@ class TopicTree:
     def __iter__(self) -> Iterator[TopicFolder]:
         return iter(self._folders.values())
 
-    def rows(self, ordered: Callable[[list[TreeRow]], list[TreeRow]]) -> list[TreeRow]:
+    def rows(self, sort_rows: Callable[[list[TreeRow]], list[TreeRow]]) -> list[TreeRow]:
         """Return the visible rows from top to bottom.
 
         Args:
-            ordered: Sorts the rows of one folder.
+            sort_rows: Sorts the rows of one folder.
         """
         rows: list[TreeRow] = []
-        waiting = ordered(self._top)[::-1]
-        while waiting:
-            row = waiting.pop()
+        pending_rows = sort_rows(self._top_rows)[::-1]
+        while pending_rows:
+            row = pending_rows.pop()
             rows.append(row)
-            if isinstance(row, TopicFolder) and row.is_open:
-                waiting += ordered(row.children)[::-1]
+            if isinstance(row, TopicFolder) and row.is_expanded:
+                pending_rows += sort_rows(row.children)[::-1]
         return rows
 
     def invalidate_stats(self) -> None:
@@ -145,13 +145,13 @@ class TopicTree:
             folder.invalidate_stats()
 
     def _insert(self, topic: Topic) -> None:
-        siblings, path = self._top, "/"
+        siblings, path = self._top_rows, "/"
         for depth, part in enumerate(split_name(topic.name)[:-1]):
             path = f"{path}{part}/"
             folder = self._folders.get(folder_key(topic.network, path))
             if folder is None:
                 folder = TopicFolder(part, path, topic.network, depth)
-                folder.is_open = folder.key not in self._closed
+                folder.is_expanded = folder.key not in self._collapsed_keys
                 self._folders[folder.key] = folder
                 siblings.append(folder)
             folder.topics.append(topic)
@@ -174,18 +174,18 @@ def topic_filter(words: Iterable[str]) -> Callable[[str, str], bool]:
     """
     conditions: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:
-        leaves_out = word.startswith("!") and len(word) > 1
-        text = (word[1:] if leaves_out else word).casefold()
+        is_exclusion = word.startswith("!") and len(word) > 1
+        text = (word[1:] if is_exclusion else word).casefold()
         is_pattern = "*" in text or "?" in text
-        conditions.append((leaves_out, re.compile(translate(text)) if is_pattern else text))
+        conditions.append((is_exclusion, re.compile(translate(text)) if is_pattern else text))
 
     def matches(name: str, details: str) -> bool:
         name, details = name.casefold(), details.casefold()
-        for leaves_out, condition in conditions:
+        for is_exclusion, condition in conditions:
             is_match = (
                 condition in details if isinstance(condition, str) else condition.match(name) is not None
             )
-            if is_match is leaves_out:
+            if is_match is is_exclusion:
                 return False
         return True
 

@@ -42,8 +42,8 @@ def key_of(network: str, topic: str) -> str:
 
 def split_key(key: str) -> tuple[str, str]:
     """Split a topic key (see `key_of`) into the network and the name of the topic."""
-    network, blank, topic = key.partition(_SEPARATOR)
-    return (network, topic) if blank else ("", key)
+    network, separator, topic = key.partition(_SEPARATOR)
+    return (network, topic) if separator else ("", key)
 
 
 @dataclass(slots=True, eq=False)
@@ -90,10 +90,10 @@ class Topic:
     dropped: int = 0
     missed: int = 0
     is_watched: bool = False
-    gone_since: float | None = None
+    gone_since_s: float | None = None
     last_stamp_ns: int | None = None
     last_received_s: float | None = None
-    subscribed_since: float | None = None
+    subscribed_since_s: float | None = None
     last_activity_s: float | None = None
     info: TopicInfo | None = None
     network: str = ""
@@ -113,7 +113,7 @@ class Topic:
 
     def static_values(self) -> tuple[object, ...]:
         """Return the values that change rarely. Panels rebuild their rows if one of these values changes."""
-        is_gone = self.gone_since is not None
+        is_gone = self.gone_since_s is not None
         return (self.msg_type, self.codec, self.publisher_nodes, self.is_new, is_gone, self.is_stale)
 
 
@@ -126,22 +126,22 @@ class Topics:
         self._network = network
         self._own_process = own_process if own_process is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
-        self._first_graph = True
+        self._is_first_graph = True
         self._view_version = (-1, -1)
         self._view: GraphView | None = None
-        self._clocks: Mapping[str, int] = {}
+        self._clock_offsets_ns: Mapping[str, int] = {}
         """Clock offset (ns) of each node on another computer, to be added to times of that node."""
         self._next_index = 0
-        self._reported_at = 0.0
-        self._hidden: set[str] = set()  # vanished, but still watched
+        self._reported_s = 0.0
+        self._hidden_names: set[str] = set()  # vanished, but still watched
         self.revision = 0
         self.values_revision = 0
 
     def __iter__(self) -> Iterator[Topic]:
-        return (topic for topic in self._topics.values() if topic.name not in self._hidden)
+        return (topic for topic in self._topics.values() if topic.name not in self._hidden_names)
 
     def __len__(self) -> int:
-        return len(self._topics) - len(self._hidden)
+        return len(self._topics) - len(self._hidden_names)
 
     def __getitem__(self, name: str) -> Topic:
         return self._topics[name]
@@ -155,7 +155,7 @@ class Topics:
 
     def existing_topics(self) -> list[Topic]:
         """Return the topics that have not vanished."""
-        return [topic for topic in self._topics.values() if topic.gone_since is None]
+        return [topic for topic in self._topics.values() if topic.gone_since_s is None]
 
     def topics_of_type(self, *msg_types: str) -> list[Topic]:
         """Return the existing topics that have one of these message types."""
@@ -175,12 +175,12 @@ class Topics:
         `MAX_TOPICS_PER_UPDATE` topics are updated in parts, by `update_ages`.
         """
         version = (view.epoch, view.revision)
-        self._clocks = self._clock_offsets(view)
+        self._clock_offsets_ns = self._clock_offsets(view)
         if version != self._view_version:
             self._apply_graph(view, now)
         elif len(self._topics) <= MAX_TOPICS_PER_UPDATE:
-            _update_statistics(self._topics.values(), view, now, self._clocks)
-        self._view_version, self._view, self._reported_at = version, view, now
+            _update_statistics(self._topics.values(), view, now, self._clock_offsets_ns)
+        self._view_version, self._view, self._reported_s = version, view, now
         self.values_revision += 1
 
     def _own_node_ids(self, view: GraphView) -> set[str]:
@@ -209,63 +209,65 @@ class Topics:
         for name, info in listed_topics.items():
             topic = self._topics.get(name)
             if topic is None:
-                topic = self._topics[name] = Topic(name, is_new=not self._first_graph, network=self._network)
+                topic = self._topics[name] = Topic(
+                    name, is_new=not self._is_first_graph, network=self._network
+                )
                 self.revision += 1
             self._apply_info(topic, info, view, now)
         for name, topic in self._topics.items():
-            if name not in listed_topics and topic.gone_since is None:
+            if name not in listed_topics and topic.gone_since_s is None:
                 self._mark_vanished(topic, now)
-        self._first_graph = False
+        self._is_first_graph = False
 
     def mark_all_vanished(self, now: float) -> None:
         """Set all topics to vanished, because the connection to the master was lost."""
         for topic in self._topics.values():
-            if topic.gone_since is None:
+            if topic.gone_since_s is None:
                 self._mark_vanished(topic, now)
 
-    def set_stale(self, stale: bool) -> None:
+    def set_stale(self, is_stale: bool) -> None:
         """Set `Topic.is_stale` of all topics. Topics that become stale lose their rates.
 
         Args:
-            stale: True while the network can't be queried.
+            is_stale: True while the network can't be queried.
         """
         for topic in self._topics.values():
-            if topic.is_stale is not stale:
-                topic.is_stale = stale
-                if stale:
+            if topic.is_stale is not is_stale:
+                topic.is_stale = is_stale
+                if is_stale:
                     topic.rate_hz = topic.bandwidth_Bps = None
                 self.revision += 1
 
     def measure_rates(
-        self, passed_s: float, before: Mapping[str, tuple[int, int]]
+        self, elapsed_s: float, previous_totals: Mapping[str, tuple[int, int]]
     ) -> dict[str, tuple[int, int]]:
         """Measure the rates of watched topics whose publishers report no rate.
 
         Args:
-            passed_s: Seconds since the previous call.
-            before: Return value of the previous call.
+            elapsed_s: Seconds since the previous call.
+            previous_totals: Return value of the previous call.
 
         Returns:
             Total number of received messages and bytes, by topic.
         """
-        arrived = {
+        totals = {
             topic.name: (topic.received, topic.received_bytes)
             for topic in self._topics.values()
-            if topic.is_watched and topic.gone_since is None
+            if topic.is_watched and topic.gone_since_s is None
         }
-        for name, (received, size_bytes) in arrived.items():
-            previous = before.get(name)
-            if previous is not None and previous[0] <= received and passed_s > 0:
+        for name, (received, size_bytes) in totals.items():
+            previous = previous_totals.get(name)
+            if previous is not None and previous[0] <= received and elapsed_s > 0:
                 topic = self._topics[name]
                 topic.measured_rates = (
-                    (received - previous[0]) / passed_s,
-                    (size_bytes - previous[1]) / passed_s,
+                    (received - previous[0]) / elapsed_s,
+                    (size_bytes - previous[1]) / elapsed_s,
                 )
                 if topic.info is None or topic.info.rate_hz is None:
                     topic.rate_hz, topic.bandwidth_Bps = topic.measured_rates
                     topic.rates.append(topic.measured_rates[0])
                     self.values_revision += 1
-        return arrived
+        return totals
 
     def update_ages(self, now: float, now_ns: int) -> None:
         """Update the ages of topics, and remove topics that vanished more than `GONE_DISPLAY_S` seconds ago.
@@ -278,26 +280,26 @@ class Topics:
         """
         if self._next_index >= len(self._topics):
             self._next_index = 0
-        begin, self._next_index = self._next_index, self._next_index + MAX_TOPICS_PER_UPDATE
-        batch = list(islice(self._topics.values(), begin, self._next_index))
+        start, self._next_index = self._next_index, self._next_index + MAX_TOPICS_PER_UPDATE
+        batch = list(islice(self._topics.values(), start, self._next_index))
         if self._view is not None and len(self._topics) > MAX_TOPICS_PER_UPDATE:
-            _update_statistics(batch, self._view, self._reported_at, self._clocks)
+            _update_statistics(batch, self._view, self._reported_s, self._clock_offsets_ns)
         for topic in batch:
-            if topic.gone_since is not None:
-                topic.gone_s = now - topic.gone_since
+            if topic.gone_since_s is not None:
+                topic.gone_s = now - topic.gone_since_s
                 if topic.gone_s >= GONE_DISPLAY_S:
                     self._remove_or_hide(topic)
             else:
-                topic.age_s = _age(topic, now, now_ns)
-                topic.silent_s = _silence_s(topic, now, self._reported_at)
+                topic.age_s = _age_s(topic, now, now_ns)
+                topic.silent_s = _silence_s(topic, now, self._reported_s)
 
     def _remove_or_hide(self, topic: Topic) -> None:
         # A vanished topic that is still watched only leaves the lists.
-        was_listed = topic.name not in self._hidden
+        was_listed = topic.name not in self._hidden_names
         if topic.is_watched:
-            self._hidden.add(topic.name)
+            self._hidden_names.add(topic.name)
         else:
-            self._hidden.discard(topic.name)
+            self._hidden_names.discard(topic.name)
             del self._topics[topic.name]
         self.revision += was_listed
 
@@ -315,9 +317,9 @@ class Topics:
         topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
         topic.newest = batch.messages[-1]
         topic.received += batch.arrived_count
-        kept_bytes = sum(message.size_bytes for message in batch.messages)
+        received_bytes = sum(message.size_bytes for message in batch.messages)
         # dropped messages are assumed to be as large as the others
-        topic.received_bytes += kept_bytes * batch.arrived_count // len(batch.messages)
+        topic.received_bytes += received_bytes * batch.arrived_count // len(batch.messages)
         topic.dropped += batch.dropped
         topic.last_received_s = topic.last_activity_s = now
         self.values_revision += 1
@@ -356,37 +358,37 @@ class Topics:
         self.values_revision += 1
 
     def _mark_vanished(self, topic: Topic, now: float) -> None:
-        topic.gone_since, topic.gone_s = now, 0.0
+        topic.gone_since_s, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()
         topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
-        topic.silent_s = topic.subscribed_since = topic.last_activity_s = None
+        topic.silent_s = topic.subscribed_since_s = topic.last_activity_s = None
         self.revision += 1
 
     def _apply_info(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
-        before = topic.static_values()
-        topic.subscribed_since = _subscribed_since(topic, info, now)
+        previous_values = topic.static_values()
+        topic.subscribed_since_s = _subscribed_since_s(topic, info, now)
         topic.msg_type, topic.codec = info.msg_type, info.codec
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _publisher_names(info, view)
-        topic.gone_since = topic.gone_s = None
+        topic.gone_since_s = topic.gone_s = None
         topic.is_stale = False
-        self._hidden.discard(topic.name)
-        _apply_statistics(topic, info, now, self._clocks)
-        if topic.static_values() != before:
+        self._hidden_names.discard(topic.name)
+        _apply_statistics(topic, info, now, self._clock_offsets_ns)
+        if topic.static_values() != previous_values:
             self.revision += 1
 
 
 def _update_statistics(
-    topics: Iterable[Topic], view: GraphView, now: float, clocks: Mapping[str, int]
+    topics: Iterable[Topic], view: GraphView, now: float, clock_offsets_ns: Mapping[str, int]
 ) -> None:
-    find = view.topics.get
+    find_info = view.topics.get
     for topic in topics:
-        info = find(topic.name)
-        if info is not None and info is not topic.info and topic.gone_since is None:
-            _apply_statistics(topic, info, now, clocks)
+        info = find_info(topic.name)
+        if info is not None and info is not topic.info and topic.gone_since_s is None:
+            _apply_statistics(topic, info, now, clock_offsets_ns)
 
 
-def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clocks: Mapping[str, int]) -> None:
+def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clock_offsets_ns: Mapping[str, int]) -> None:
     if info.last_stamp_ns is not None and (
         topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
     ):
@@ -397,19 +399,19 @@ def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clocks: Mapping
     if rate_hz is None and topic.measured_rates is not None:
         topic.rate_hz, topic.bandwidth_Bps = topic.measured_rates
     topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
-    stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
-    if clocks and any(each.node_id in clocks for each in info.publishers):
-        topic.last_stamp_ns = _newest_stamp_ns(info, clocks)
-    elif stamp_ns is not None and (before is None or stamp_ns > before):
+    stamp_ns, previous_ns = info.last_stamp_ns, topic.last_stamp_ns
+    if clock_offsets_ns and any(each.node_id in clock_offsets_ns for each in info.publishers):
+        topic.last_stamp_ns = _newest_stamp_ns(info, clock_offsets_ns)
+    elif stamp_ns is not None and (previous_ns is None or stamp_ns > previous_ns):
         topic.last_stamp_ns = stamp_ns
     if rate_hz is not None:
         topic.rates.append(rate_hz)
 
 
-def _newest_stamp_ns(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
+def _newest_stamp_ns(info: TopicInfo, clock_offsets_ns: Mapping[str, int]) -> int | None:
     # In this computer's clock.
     stamps = (
-        each.last_stamp_ns + clocks.get(each.node_id, 0)
+        each.last_stamp_ns + clock_offsets_ns.get(each.node_id, 0)
         for each in info.publishers
         if each.last_stamp_ns is not None
     )
@@ -421,37 +423,37 @@ def _publisher_names(info: TopicInfo, view: GraphView) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
-def _age(topic: Topic, now: float, now_ns: int) -> float | None:
-    stamp, newest = topic.last_stamp_ns, topic.newest
+def _age_s(topic: Topic, now: float, now_ns: int) -> float | None:
+    stamp_ns, newest = topic.last_stamp_ns, topic.newest
     if newest is not None and newest.stamp_ns is not None:
         difference = newest.kind.clock.difference
-        stamp = max(stamp or 0, newest.stamp_ns + (0 if difference is None else difference.offset_ns))
-    if stamp is not None:
-        return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
+        stamp_ns = max(stamp_ns or 0, newest.stamp_ns + (0 if difference is None else difference.offset_ns))
+    if stamp_ns is not None:
+        return (now_ns - stamp_ns) / 1e9 if now_ns > stamp_ns else 0.0
     return now - topic.last_received_s if topic.last_received_s is not None else None
 
 
-def _subscribed_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
+def _subscribed_since_s(topic: Topic, info: TopicInfo, now: float) -> float | None:
     # Start of the time in which the present publishers have had a subscriber.
     if not info.publishers or not info.subscribers:
         return None
-    before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
-    is_new = topic.subscribed_since is None or not before & {each.id for each in info.publishers}
-    return now if is_new else topic.subscribed_since
+    previous_ids = {each.id for each in topic.info.publishers} if topic.info is not None else set()
+    is_new = topic.subscribed_since_s is None or not previous_ids & {each.id for each in info.publishers}
+    return now if is_new else topic.subscribed_since_s
 
 
-def _silence_s(topic: Topic, now: float, told_at: float) -> float | None:
+def _silence_s(topic: Topic, now: float, reported_s: float) -> float | None:
     # By this computer's clock, because the publisher's may be wrong. For topics that are not watched, the
-    # last report of the master (`told_at`) counts.
-    if topic.subscribed_since is None or topic.last_activity_s is None:
+    # last report of the master (`reported_s`) counts.
+    if topic.subscribed_since_s is None or topic.last_activity_s is None:
         return None
-    until = now if topic.is_watched else told_at
-    since = (
+    end_s = now if topic.is_watched else reported_s
+    start_s = (
         topic.last_activity_s
-        if topic.last_activity_s >= topic.subscribed_since
-        else topic.subscribed_since + START_GRACE_S
+        if topic.last_activity_s >= topic.subscribed_since_s
+        else topic.subscribed_since_s + START_GRACE_S
     )
-    silent_s = max(0.0, until - since)
+    silent_s = max(0.0, end_s - start_s)
     return silent_s if topic.is_watched or silent_s >= MIN_REPORTED_SILENCE_S else 0.0
 
 

@@ -12,7 +12,7 @@ from nep.protocol.graph_view import GraphView
 WINDOW_S = 30.0
 
 SUM_INTERVAL_S = 0.5
-"""Interval in seconds at which the statistics of more than `BATCH_SIZE` topics are summed."""
+"""Interval in seconds at which the statistics of more than `MAX_TOPICS_PER_UPDATE` topics are summed."""
 
 
 class RecentLosses:
@@ -21,7 +21,7 @@ class RecentLosses:
     def __init__(self) -> None:
         # The first total is the baseline.
         self._increases: deque[tuple[float, int]] = deque()
-        self._before: int | None = None
+        self._last_total: int | None = None
 
     def count(self, total: int, now: float) -> int:
         """Return the number of messages lost in the last 30 s.
@@ -30,9 +30,9 @@ class RecentLosses:
             total: Total number of lost messages.
             now: Monotonic seconds.
         """
-        if self._before is not None and total > self._before:
-            self._increases.append((now, total - self._before))
-        self._before = total
+        if self._last_total is not None and total > self._last_total:
+            self._increases.append((now, total - self._last_total))
+        self._last_total = total
         while self._increases and now - self._increases[0][0] > WINDOW_S:
             self._increases.popleft()
         return sum(lost for _, lost in self._increases)
@@ -52,9 +52,9 @@ class Traffic:
     def __init__(self, topics: Topics) -> None:
         self._topics = topics
         self._losses = RecentLosses()
-        self._recent: deque[tuple[float, int, int]] = deque()
+        self._recent_counts: deque[tuple[float, int, int]] = deque()
         self._pending_view: GraphView | None = None
-        self._summed_at = -SUM_INTERVAL_S
+        self._summed_s = -SUM_INTERVAL_S
         self.messages_per_s: float | None = None
         self.lost_30s = 0
         self.shown_30s = 0
@@ -75,35 +75,35 @@ class Traffic:
         self._update_totals_if_due(now)
 
     def _update_totals_if_due(self, now: float) -> None:
-        if self._pending_view is not None and now - self._summed_at >= SUM_INTERVAL_S:
+        if self._pending_view is not None and now - self._summed_s >= SUM_INTERVAL_S:
             self._update_totals(self._pending_view, now)
 
     def _update_totals(self, view: GraphView, now: float) -> None:
-        self._pending_view, self._summed_at = None, now
+        self._pending_view, self._summed_s = None, now
         self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(view.topics.values())
 
-    def count_lost(self, missed: Mapping[str, int], now: float) -> None:
+    def count_lost(self, lost_counts: Mapping[str, int], now: float) -> None:
         """Count messages that were sent but not received.
 
         Args:
-            missed: Number of messages lost on each topic since its watch began.
+            lost_counts: Number of messages lost on each topic since its watch began.
             now: Monotonic seconds.
         """
-        grown = 0
-        for name, total in missed.items():
+        new_count = 0
+        for name, total in lost_counts.items():
             topic = self._topics.get(name)
             if topic is not None:
-                grown += max(0, total - topic.missed)
+                new_count += max(0, total - topic.missed)
                 topic.missed = total
-        self._count(0, grown, now)
+        self._count(0, new_count, now)
 
-    def _count(self, shown_count: int, sent: int, now: float) -> None:
-        if sent:
-            self._recent.append((now, shown_count, sent))
+    def _count(self, shown_count: int, sent_count: int, now: float) -> None:
+        if sent_count:
+            self._recent_counts.append((now, shown_count, sent_count))
             self.shown_30s += shown_count
-            self.sent_30s += sent
-        while self._recent and now - self._recent[0][0] > WINDOW_S:
-            _, shown_count, sent = self._recent.popleft()
+            self.sent_30s += sent_count
+        while self._recent_counts and now - self._recent_counts[0][0] > WINDOW_S:
+            _, shown_count, sent_count = self._recent_counts.popleft()
             self.shown_30s -= shown_count
-            self.sent_30s -= sent
+            self.sent_30s -= sent_count

@@ -77,13 +77,17 @@ class Watches:
 
     def __init__(
         self,
-        begin: Callable[[str], None],
-        end: Callable[[str], None],
-        forgotten: Callable[[str], None] = lambda _topic: None,
+        on_activated: Callable[[str], None],
+        on_deactivated: Callable[[str], None],
+        on_released: Callable[[str], None] = lambda _topic: None,
     ) -> None:
-        # `begin` is called at a topic's first active watch, `end` when the last one is suspended or closed,
-        # `forgotten` when the last one is closed.
-        self._begin, self._end, self._on_released = begin, end, forgotten
+        # `on_activated` is called at a topic's first active watch, `on_deactivated` when the last one is
+        # suspended or closed, `on_released` when the last one is closed.
+        self._on_activated, self._on_deactivated, self._on_released = (
+            on_activated,
+            on_deactivated,
+            on_released,
+        )
         self._active_counts: Counter[str] = Counter()
         self._open_counts: Counter[str] = Counter()
 
@@ -103,7 +107,7 @@ class Watches:
         for topic in topics:
             self._active_counts[topic] += 1
             if self._active_counts[topic] == 1:
-                self._begin(topic)
+                self._on_activated(topic)
 
     def deactivate(self, topics: Iterable[str]) -> None:
         """Decrement the number of active watches of each topic. Called by `Watch`."""
@@ -111,7 +115,7 @@ class Watches:
             self._active_counts[topic] -= 1
             if self._active_counts[topic] == 0:
                 del self._active_counts[topic]
-                self._end(topic)
+                self._on_deactivated(topic)
 
     def release(self, topics: Iterable[str]) -> None:
         """Release the topics of a closed watch, after `deactivate`. Called by `Watch`."""

@@ -44,8 +44,8 @@ class PageList:
     def __init__(self) -> None:
         self._pages: dict[int, ConnectedPage] = {}
         self._disconnect_times_s: dict[int, float] = {}
-        self._dropped: dict[tuple[int, str], int] = {}
-        self._drops_at: dict[tuple[int, str], float] = {}
+        self._dropped_counts: dict[tuple[int, str], int] = {}
+        self._last_drop_times_s: dict[tuple[int, str], float] = {}
         self._now = 0.0
         self.revision = 0
         """Counter that increases when a page connects or leaves."""
@@ -82,8 +82,8 @@ class PageList:
         for page in pages:
             self._pages[page.id] = page
             self._disconnect_times_s.pop(page.id, None)
-        for id_, left_at in tuple(self._disconnect_times_s.items()):
-            if now - left_at > GONE_DISPLAY_S:
+        for id_, left_s in tuple(self._disconnect_times_s.items()):
+            if now - left_s > GONE_DISPLAY_S:
                 del self._disconnect_times_s[id_], self._pages[id_]
         self._pages = dict(sorted(self._pages.items()))
         self._record_drops(pages, now)
@@ -96,22 +96,26 @@ class PageList:
         """Yield the topics on which messages to a connected page were dropped recently (`SLOW_DISPLAY_S`)."""
         for page in self.connected:
             for topic in page.topics:
-                dropped_at = self._drops_at.get((page.id, topic.topic))
-                if dropped_at is not None and self._now - dropped_at <= SLOW_DISPLAY_S:
+                dropped_s = self._last_drop_times_s.get((page.id, topic.topic))
+                if dropped_s is not None and self._now - dropped_s <= SLOW_DISPLAY_S:
                     yield SlowTopic(page, topic.topic, dropped_share(topic.sent_count, topic.dropped_count))
 
     def _record_drops(self, pages: Sequence[ConnectedPage], now: float) -> None:
-        dropped = {
+        dropped_counts = {
             (page.id, topic.topic): topic.dropped_count
             for page in pages
             for topic in page.topics
             if topic.dropped_count
         }
-        risen = {key: now for key, count in dropped.items() if count > self._dropped.get(key, 0)}
-        self._drops_at = {
-            key: dropped_at for key, dropped_at in (self._drops_at | risen).items() if key in dropped
+        new_drop_times_s = {
+            key: now for key, count in dropped_counts.items() if count > self._dropped_counts.get(key, 0)
         }
-        self._dropped = dropped
+        self._last_drop_times_s = {
+            key: dropped_s
+            for key, dropped_s in (self._last_drop_times_s | new_drop_times_s).items()
+            if key in dropped_counts
+        }
+        self._dropped_counts = dropped_counts
 
 
 def dropped_share(sent_count: int, dropped_count: int) -> float:

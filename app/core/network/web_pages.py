@@ -64,11 +64,11 @@ class RunningServer(Protocol):
             Number of disconnected clients.
         """
 
-    def set_rosbridge(self, on: bool) -> int:
+    def set_rosbridge(self, is_enabled: bool) -> int:
         """Switch the rosbridge protocol on or off.
 
         Args:
-            on: True to accept clients; False to disconnect all clients and reject new ones.
+            is_enabled: True to accept clients; False to disconnect all clients and reject new ones.
 
         Returns:
             Number of disconnected clients.
@@ -99,14 +99,13 @@ class WebServerStarted:
         number: Number of the start, which identifies results of outdated starts.
         server: Running server; None if the start failed.
         message: Reason for the failure, or "".
-        free_port: Unused port if the requested port is in use, else 0.
+        free_port: Unused port to offer if the requested port is in use, else 0.
     """
 
     number: int
     server: RunningServer | None
     message: str = ""
     free_port: int = 0
-    """Unused port to offer if the port is in use; 0 if the start failed for another reason."""
 
 
 def start_server(settings: server.WebSettings) -> RunningServer:
@@ -152,7 +151,7 @@ class WebPages:
         self._server: RunningServer | None = None
         self._last_started: RunningServer | None = None
         self._thread: threading.Thread | None = None
-        self._number = 0
+        self._start_number = 0
         self._page_list = PageList()
         self.port, self.host, self.token = DEFAULT_PORT, "", ""
         self.origins: tuple[str, ...] = ()
@@ -252,13 +251,13 @@ class WebPages:
 
     def switch_off(self) -> None:
         """Disconnect all pages and stop the server in the background."""
-        self._number += 1
+        self._start_number += 1
         self.state, self.sentence, self.free_port = "off", "", 0
         self.protocols = frozenset()
         self.blocked_pages.clear()
         self._page_list.clear(self._clock())
-        ended, self._server = self._server, None
-        self._run_in_thread(lambda: ended.close() if ended is not None else None)
+        stopped_server, self._server = self._server, None
+        self._run_in_thread(lambda: stopped_server.close() if stopped_server is not None else None)
 
     def use_free_port(self) -> None:
         """Start the server on an unused port with the protocols of the failed start.
@@ -344,7 +343,7 @@ class WebPages:
 
     def on_started(self, event: WebServerStarted) -> None:
         """Apply the result of a start. An outdated server (switched off or restarted meanwhile) is closed."""
-        if event.number != self._number:
+        if event.number != self._start_number:
             if event.server is not None:
                 self._run_in_thread(event.server.close)
             return
@@ -376,13 +375,13 @@ class WebPages:
             self._last_started.close()
 
     def _start_server(self) -> None:
-        self._number += 1
-        number = self._number
+        self._start_number += 1
+        number = self._start_number
         self.state, self.sentence, self.free_port = "starting", "", 0
         port, listen, robots = self.port, (self.host,) if self.host else (), frozenset(self.robots)
         origins, token, protocols = frozenset(self.origins), self.token, self.protocols
 
-        def work() -> None:
+        def start() -> None:
             settings = server.WebSettings(  # in the thread: its modules take a while to load
                 port=port,
                 listen=listen,
@@ -390,10 +389,10 @@ class WebPages:
                 allow_moving=robots,
                 master=self.master,
                 foxglove=channels.LiveChannels() if "foxglove" in protocols else None,
-                rosbridge="rosbridge" in protocols,
+                is_rosbridge_enabled="rosbridge" in protocols,
             )
             try:
-                running = self._start(settings)
+                running_server = self._start(settings)
             except AddressInUseError:
                 message, free_port = _port_conflict(port)
                 self._post_event(WebServerStarted(number, None, message, free_port))
@@ -403,21 +402,21 @@ class WebPages:
                     WebServerStarted(number, None, f"{error_message[:1].upper()}{error_message[1:]}.")
                 )
             else:
-                if number != self._number:  # switched off meanwhile
-                    running.close()
+                if number != self._start_number:  # switched off meanwhile
+                    running_server.close()
                     return
-                self._last_started = running
-                self._post_event(WebServerStarted(number, running))
+                self._last_started = running_server
+                self._post_event(WebServerStarted(number, running_server))
 
-        self._run_in_thread(work)
+        self._run_in_thread(start)
 
     def _run_in_thread(self, job: Callable[[], None]) -> None:
         # Runs one job after the other: a server ends before the next one binds its port.
-        before = self._thread
+        previous_thread = self._thread
 
         def run() -> None:
-            if before is not None:
-                before.join()
+            if previous_thread is not None:
+                previous_thread.join()
             job()
 
         self._thread = threading.Thread(target=run, name="studio-web", daemon=True)
@@ -433,5 +432,5 @@ def _port_conflict(port: int) -> tuple[str, int]:
         message = _("Port {port} is in use by {program} (process {pid}).").format(
             port=port, program=port_owner.name, pid=port_owner.pid
         )
-    others = range(port + 1, min(port + 1 + _MAX_PORTS_TRIED, MAX_PORT + 1))
-    return message, next((each for each in others if processes.is_free(each)), 0)
+    ports = range(port + 1, min(port + 1 + _MAX_PORTS_TRIED, MAX_PORT + 1))
+    return message, next((each for each in ports if processes.is_free(each)), 0)

@@ -178,27 +178,29 @@ def _blocked_notices(web: WebPages, rejection: Rejection) -> Iterator[WebNotice]
 
 def _create_notice(rejection: Rejection) -> WebNotice:
     key = (rejection.kind, rejection.client, rejection.robot)
-    client, clock = rejection.client, _clock_text(rejection.time_s)
+    client, time_text = rejection.client, _clock_text(rejection.time_s)
     if rejection.kind == "robot" and rejection.robot:
-        message = _("A page tried to move {robot} and was blocked.").format(robot=rejection.robot)
+        message = _("A page tried to move {robot}. The command was rejected.").format(robot=rejection.robot)
         return WebNotice(("robot", rejection.robot), "error", message, "choose robots", rejection.robot)
     if rejection.kind == "origin" or rejection.origin:
         message = _("{origin} was rejected at {time}. Its origin isn't allowed.")
         step: NextStep = "allow origin" if rejection.origin else ""
-        return WebNotice(key, "error", message.format(origin=client, time=clock), step, rejection.origin)
+        return WebNotice(key, "error", message.format(origin=client, time=time_text), step, rejection.origin)
     if rejection.kind == "token":
         message = _("{address} was rejected at {time}: wrong token.")
-        return WebNotice(key, "error", message.format(address=client, time=clock))
+        return WebNotice(key, "error", message.format(address=client, time=time_text))
     message = _("{address} was rejected at {time}: {reason}.")
-    return WebNotice(key, "error", message.format(address=client, time=clock, reason=rejection.reason))
+    return WebNotice(key, "error", message.format(address=client, time=time_text, reason=rejection.reason))
 
 
 def _slow_notices(web: WebPages) -> Iterator[WebNotice]:
-    for slow in web.slow_topics:
+    for slow_topic in web.slow_topics:
         message = _("{page} can't keep up with {topic}. {share} of the messages were dropped.").format(
-            page=page_name(slow.page), topic=slow.topic, share=share_text(slow.dropped_share)
+            page=page_name(slow_topic.page),
+            topic=slow_topic.topic,
+            share=share_text(slow_topic.dropped_share),
         )
-        yield WebNotice(("slow", slow.page.name, slow.topic), "warn", message)
+        yield WebNotice(("slow", slow_topic.page.name, slow_topic.topic), "warn", message)
 
 
 def share_text(share: float) -> str:

@@ -39,7 +39,7 @@ class NetworkKind:
     readable_type_of: Callable[[TopicInfo], str]
     qos: str = ""
 
-    def checked(self, address: str) -> str:
+    def validate_address(self, address: str) -> str:
         """Validate an address and return it in the form that the back end expects.
 
         A blank address becomes `default_address`. Raises `NepError` if the address is invalid.
@@ -74,7 +74,8 @@ KINDS = (
         lazy("Address of the ROS master"),
         "127.0.0.1:11311",
         lazy(
-            "A ROS master on another computer. This computer then accepts connections from that network, too."
+            "The ROS master may be on another computer; this computer then accepts connections from that "
+            "network."
         ),
         reports_stats=False,
         codec_of=lambda info: info.codec,
@@ -85,7 +86,10 @@ KINDS = (
         "ROS 2",
         lazy("Domain, 0 to 232"),
         "0",
-        lazy("Programs on this computer; others only if ROS_AUTOMATIC_DISCOVERY_RANGE allows it."),
+        lazy(
+            "Shows programs on this computer, and on other computers only if ROS_AUTOMATIC_DISCOVERY_RANGE "
+            "allows it."
+        ),
         reports_stats=False,
         codec_of=_ros_2_codec,
         readable_type_of=_ros_2_readable_type,

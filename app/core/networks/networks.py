@@ -75,7 +75,7 @@ class OtherNetwork:
     Attributes:
         state: State of the connection; "off" while the network isn't shown.
         sentence: Reason for the state "lost", or "".
-        unread: Reason why a watched topic can't be read, by topic.
+        read_problems: Reason why a watched topic can't be read, by topic.
     """
 
     def __init__(self, kind: NetworkKind) -> None:
@@ -90,9 +90,9 @@ class OtherNetwork:
         self.state: NetworkState = "off"
         self.sentence = ""
         self.topics, self.nodes = Topics(network=self.kind.name), Nodes(self.kind.name)
-        self.unread: dict[str, str] = {}
-        self._arrived: dict[str, tuple[int, int]] = {}
-        self._counted_at: float | None = None
+        self.read_problems: dict[str, str] = {}
+        self._received_totals: dict[str, tuple[int, int]] = {}
+        self._counted_s: float | None = None
 
     @property
     def is_selected(self) -> bool:
@@ -115,7 +115,7 @@ class OtherNetwork:
             case MasterFound():
                 pass  # the graph follows
             case WatchFailed():
-                self.unread[event.topic] = event.message
+                self.read_problems[event.topic] = event.message
             case _:
                 pass
 
@@ -128,9 +128,12 @@ class OtherNetwork:
         """
         self.topics.update_ages(now, now_ns)
         self.nodes.update_ages(now)
-        if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
-            passed_s = 0.0 if self._counted_at is None else now - self._counted_at
-            self._arrived, self._counted_at = self.topics.measure_rates(passed_s, self._arrived), now
+        if self._counted_s is None or now - self._counted_s >= COUNT_INTERVAL_S:
+            passed_s = 0.0 if self._counted_s is None else now - self._counted_s
+            self._received_totals, self._counted_s = (
+                self.topics.measure_rates(passed_s, self._received_totals),
+                now,
+            )
 
 
 class Networks:
@@ -145,16 +148,21 @@ class Networks:
         sinks: Sequence[Sink],
         post_event: Callable[[object], None],
         alerts: Alerts,
-        make: NetworkSourceFactory = OtherSource,
+        create_source: NetworkSourceFactory = OtherSource,
     ) -> None:
         # `sinks` get messages by topic key (`key_of`); `post_event` gets the sources' events.
         self._alerts = alerts
-        self._settings, self._sinks, self._post_event, self._make = settings, tuple(sinks), post_event, make
+        self._settings, self._sinks, self._post_event, self._create_source = (
+            settings,
+            tuple(sinks),
+            post_event,
+            create_source,
+        )
         self._networks = {kind.name: OtherNetwork(kind) for kind in KINDS}
-        self._watched: dict[str, set[str]] = {kind.name: set() for kind in KINDS}
+        self._watched_topics: dict[str, set[str]] = {kind.name: set() for kind in KINDS}
         self._numbers = count(1)
-        self._ending: list[NetworkSource] = []
-        self._changes = 0
+        self._ending_sources: list[NetworkSource] = []
+        self._change_count = 0
 
     def __iter__(self) -> Iterator[OtherNetwork]:
         return iter(self._networks.values())
@@ -171,7 +179,7 @@ class Networks:
     @property
     def revision(self) -> int:
         """Counter that increases with every change, except changes of statistics."""
-        return self._changes + sum(each.topics.revision + each.nodes.revision for each in self)
+        return self._change_count + sum(each.topics.revision + each.nodes.revision for each in self)
 
     @property
     def values_revision(self) -> int:
@@ -198,17 +206,17 @@ class Networks:
         """Return the reason why a watched topic can't be read, or ""."""
         name, topic = split_key(key)
         network = self._networks.get(name)
-        return network.unread.get(topic, "") if network is not None else ""
+        return network.read_problems.get(topic, "") if network is not None else ""
 
     # -- choosing --------------------------------------------------------------------------------------------
 
     def start(self) -> None:
         """Join the saved networks; invalid saved addresses are skipped."""
-        for name, address in self._saved().items():
+        for name, address in self._saved_addresses().items():
             network = self._networks.get(name)
             if network is not None and isinstance(address, str):
                 try:
-                    self._start(network, network.kind.checked(address))
+                    self._start(network, network.kind.validate_address(address))
                 except NepError:
                     continue
 
@@ -220,18 +228,18 @@ class Networks:
             SettingsError: The choice can't be saved.
         """
         network = self._networks[name]
-        checked = network.kind.checked(address)
-        if not network.is_selected or checked != network.address:
+        valid_address = network.kind.validate_address(address)
+        if not network.is_selected or valid_address != network.address:
             self._stop(network)
-            self._start(network, checked)
-        self._save({**self._saved(), name: checked})
+            self._start(network, valid_address)
+        self._save({**self._saved_addresses(), name: valid_address})
 
     def deselect(self, name: str) -> None:
         """Stop showing a network. Raises `SettingsError` if the choice can't be saved."""
         self._stop(self._networks[name])
-        self._save({kind: address for kind, address in self._saved().items() if kind != name})
+        self._save({kind: address for kind, address in self._saved_addresses().items() if kind != name})
 
-    def _saved(self) -> dict[str, object]:
+    def _saved_addresses(self) -> dict[str, object]:
         return self._settings.get(SETTING_KEY, {})
 
     def _save(self, selected: dict[str, object]) -> None:
@@ -245,19 +253,22 @@ class Networks:
         def post(event: object) -> None:
             self._post_event(NetworkEvent(kind.name, number, event))
 
-        network.source = self._make(kind, address, self._sinks, post)
-        for topic in self._watched[kind.name]:
+        network.source = self._create_source(kind, address, self._sinks, post)
+        for topic in self._watched_topics[kind.name]:
             network.source.watch(topic)
         network.source.start()
-        self._changes += 1
+        self._change_count += 1
 
     def _stop(self, network: OtherNetwork) -> None:
         if network.source is not None:
             network.source.request_stop()
-            self._ending = [*(each for each in self._ending if not each.has_ended), network.source]
+            self._ending_sources = [
+                *(each for each in self._ending_sources if not each.has_ended),
+                network.source,
+            ]
             network.source = None
             self._alerts.resolve(f"network:{network.kind.name}")
-            self._changes += network.topics.revision + network.nodes.revision + 1
+            self._change_count += network.topics.revision + network.nodes.revision + 1
             network.reset()
 
     # -- interface of the session ----------------------------------------------------------------------------
@@ -266,10 +277,10 @@ class Networks:
         """Apply an event of a network's source."""
         network = self._networks[network_event.kind]
         if network.is_selected and network_event.number == network.number:
-            before = network.state
+            previous_state = network.state
             network.on_event(network_event.event, now)
-            if network.state != before:
-                self._changes += 1
+            if network.state != previous_state:
+                self._change_count += 1
                 self._update_alert(network)
 
     def _update_alert(self, network: OtherNetwork) -> None:
@@ -291,11 +302,11 @@ class Networks:
         """Add messages received on a watched topic. Messages of other topics are discarded."""
         name, topic = split_key(key)
         network = self._networks.get(name)
-        if network is None or not network.is_selected or topic not in self._watched[name]:
+        if network is None or not network.is_selected or topic not in self._watched_topics[name]:
             return
         network.topics.add(topic, batch, now)
         network.topics[topic].is_watched = True
-        network.unread.pop(topic, None)
+        network.read_problems.pop(topic, None)
 
     def watch(self, key: str) -> None:
         """Watch the topic with this key (see `key_of`). Keys of native topics are ignored."""
@@ -303,7 +314,7 @@ class Networks:
         network = self._networks.get(name)
         if network is None:
             return
-        self._watched[name].add(topic)
+        self._watched_topics[name].add(topic)
         known_topic = network.topics.get(topic)
         if known_topic is not None:
             known_topic.is_watched = True
@@ -316,9 +327,9 @@ class Networks:
         network = self._networks.get(name)
         if network is None:
             return
-        self._watched[name].discard(topic)
+        self._watched_topics[name].discard(topic)
         network.topics.unwatch(topic)
-        network.unread.pop(topic, None)
+        network.read_problems.pop(topic, None)
         if network.source is not None:
             network.source.unwatch(topic)
 
@@ -337,17 +348,17 @@ class Networks:
         for network in self:
             if network.source is not None:
                 network.source.request_stop()
-                self._ending.append(network.source)
+                self._ending_sources.append(network.source)
                 network.source = None
-        for source in self._ending:
+        for source in self._ending_sources:
             source.close()
-        self._ending.clear()
+        self._ending_sources.clear()
 
 
 def lost_message(network: OtherNetwork) -> str:
     """Return the reason why the connection to a network was lost, or "".
 
-    Example: "ROS 1: no ROS master answers at ...".
+    Example: "ROS 1: no ROS master replied at ...".
     """
     if network.state != "lost":
         return ""
@@ -369,7 +380,7 @@ def topic_label(key: str) -> str:
 def split_by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
     """Split batches by topic key into batches of the native network and batches of all other networks."""
     native: dict[str, Batch] = {}
-    others: dict[str, Batch] = {}
+    other_batches: dict[str, Batch] = {}
     for key, batch in batches.items():
-        (others if split_key(key)[0] else native)[key] = batch
-    return native, others
+        (other_batches if split_key(key)[0] else native)[key] = batch
+    return native, other_batches

@@ -106,7 +106,7 @@ class NodeParameters:
     """Parameters of the selected node. Not thread-safe; use it from the main thread.
 
     Attributes:
-        changed: Time of the last change of each parameter, by name (monotonic seconds).
+        change_times_s: Time of the last change of each parameter, by name (monotonic seconds).
         revision: Counter that increases with every change.
     """
 
@@ -120,15 +120,15 @@ class NodeParameters:
         # `watch` opens a watch by topic key, `topic` returns its state; `has_master`: whether nodes can be
         # called.
         self._watch, self._topic, self._setter, self._has_master = watch, topic, setter, has_master
-        self.watching: WatchHandle | None = None
+        self.watch_handle: WatchHandle | None = None
         self.node: NodeEntry | None = None
         self.all: tuple[ReportedParameter, ...] = ()
-        self.changed: dict[str, float] = {}
+        self.change_times_s: dict[str, float] = {}
         self.has_received = False
         """True if the node has reported its parameters since it was selected."""
         self.problem = ""
         """Why the message with the parameters can't be read, or ""."""
-        self.setting = ""
+        self.pending_name = ""
         """Name of the parameter that is being set, or ""."""
         self.rejection_reason = ""
         """Why the last request to set a parameter was rejected, or ""."""
@@ -143,15 +143,15 @@ class NodeParameters:
         self.close()
         self.node = displayed
         if displayed is not None:
-            self.watching = self._watch(key_of(displayed.network, parameters_topic(displayed.id)))
+            self.watch_handle = self._watch(key_of(displayed.network, parameters_topic(displayed.id)))
 
     def close(self) -> None:
         """Stop showing a node."""
-        if self.watching is not None:
-            self.watching.close()
-        self.watching = self.node = self._applied_message = None
-        self.all, self.changed, self.has_received = (), {}, False
-        self.problem = self.setting = self.rejection_reason = ""
+        if self.watch_handle is not None:
+            self.watch_handle.close()
+        self.watch_handle = self.node = self._applied_message = None
+        self.all, self.change_times_s, self.has_received = (), {}, False
+        self.problem = self.pending_name = self.rejection_reason = ""
         self.revision += 1
 
     def find(self, name: str) -> ReportedParameter | None:
@@ -172,7 +172,7 @@ class NodeParameters:
         if newest is not None and newest is not self._applied_message:
             self._applied_message = newest
             self._apply(newest, now)
-        if self.setting:
+        if self.pending_name:
             self._check_result(node)
 
     def _apply(self, message: Message, now: float) -> None:
@@ -184,26 +184,27 @@ class NodeParameters:
         except NepError as error:  # also a `DecodeError`
             self.problem = str(error)
             return
-        before = {each.name: each.value for each in self.all}
+        previous_values = {each.name: each.value for each in self.all}
         if self.has_received:
-            self.changed.update(
+            self.change_times_s.update(
                 {
                     each.name: now
                     for each in parameters
-                    if each.name not in before or not _are_equal(before[each.name], each.value)
+                    if each.name not in previous_values
+                    or not _are_equal(previous_values[each.name], each.value)
                 }
             )
         self.all, self.has_received, self.problem = parameters, True, ""
 
     def _check_result(self, node: NodeEntry) -> None:
         try:
-            is_done = self._setter.has_been_set(node.id, self.setting)
+            is_done = self._setter.has_been_set(node.id, self.pending_name)
         except NepError as error:
-            self.rejection_reason, self.setting = str(error), ""
+            self.rejection_reason, self.pending_name = str(error), ""
             self.revision += 1
         else:
             if is_done:
-                self.setting = ""
+                self.pending_name = ""
                 self.revision += 1
 
     def set(self, name: str, text: str) -> None:
@@ -218,7 +219,7 @@ class NodeParameters:
             return
         self.rejection_reason = read_only_reason(node, parameter)
         if not self.rejection_reason and not self._has_master():
-            self.rejection_reason = _("no master responds, so the node can't be queried; try again later")
+            self.rejection_reason = _("no master responds, so the parameter can't be set; try again later")
         if self.rejection_reason:
             return
         try:
@@ -226,19 +227,19 @@ class NodeParameters:
         except ValueError as error:
             self.rejection_reason = str(error)
             return
-        self.setting = name
+        self.pending_name = name
         self._setter.set(node.id, name, value)
 
 
 def read_only_reason(node: NodeEntry, parameter: ReportedParameter) -> str:
     """Return the reason why a parameter can't be set from Studio, or ""."""
     if node.gone_s is not None:
-        return _("the node has disappeared")
+        return _("the node has left")
     if len(parameter.text) > MAX_TEXT_LENGTH:
         return _("the value is too long to edit here; use nep param set")
     if not node.can_set_parameters:
         return _("parameters on this network are read-only")
-    return _("only its own node can set it") if parameter.is_read_only else ""
+    return _("only the node itself can change this parameter") if parameter.is_read_only else ""
 
 
 def parse_parameters(state: object) -> tuple[ReportedParameter, ...]:
@@ -249,7 +250,7 @@ def parse_parameters(state: object) -> tuple[ReportedParameter, ...]:
     """
     entries = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(entries, list):
-        raise NepError(_("this isn't a list of parameters"))
+        raise NepError(_("the message contains no list of parameters"))
     parameters = [_parse_parameter(each) for each in entries[:MAX_PARAMETERS] if isinstance(each, Mapping)]
     return tuple({each.name: each for each in parameters}.values())
 

@@ -37,7 +37,7 @@ class OtherSource(LiveSource):
             address,
             [_keyed_sink(kind.name, sink) for sink in sinks],
             post_event,
-            thread=f"studio-{kind.name}",
+            thread_name=f"studio-{kind.name}",
         )
         self._kind = kind
         self._members: object = None

@@ -87,7 +87,7 @@ class RecorderState:
             off.
         ring_bytes: Size of the flight recorder's content.
         pending_saves: Files that are being saved from the flight recorder.
-        last: Last finished file.
+        last_path: Last finished file.
         reached_limit: Limit that ended this file: "time", "size", or "" if it was stopped.
     """
 
@@ -103,7 +103,7 @@ class RecorderState:
     ring_s: float | None = None
     ring_bytes: int = 0
     pending_saves: tuple[Path, ...] = ()
-    last: Path | None = None
+    last_path: Path | None = None
     reached_limit: str = ""
 
 
@@ -154,23 +154,23 @@ class RecorderProcess:
     def _run(self) -> None:
         detail = ""
         try:
-            with tempfile.TemporaryFile() as log:
+            with tempfile.TemporaryFile() as error_output:
                 try:
-                    detail = self._run_process(log)
+                    detail = self._run_process(error_output)
                 finally:
-                    detail = detail or _read_tail(log)
+                    detail = detail or _read_tail(error_output)
         except OSError as error:
             detail = str(error)
         finally:
             self._has_ended.set()
             self._post_event(RecorderExited(self._number, detail))
 
-    def _run_process(self, log: IO[bytes]) -> str:
+    def _run_process(self, error_output: IO[bytes]) -> str:
         process = subprocess.Popen(
             [*module_command("nep.recordings.child"), "--master", self._address],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=log,
+            stderr=error_output,
             creationflags=NO_CONSOLE,
             start_new_session=True,  # Ctrl+C in a terminal is for Studio, which stops it properly
         )
@@ -189,7 +189,7 @@ class RecorderProcess:
         return (
             ""
             if code == 0
-            else _read_tail(log) or _("the recorder exited with code {code}").format(code=code)
+            else _read_tail(error_output) or _("the recorder exited with code {code}").format(code=code)
         )
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
@@ -203,11 +203,11 @@ class RecorderProcess:
             process.stdin.close()
 
 
-def _read_tail(log: IO[bytes]) -> str:
+def _read_tail(output: IO[bytes]) -> str:
     # Last line of the output.
-    size = log.seek(0, 2)
-    log.seek(max(0, size - _TAIL_BYTES))
-    lines = log.read().decode("utf-8", "replace").split("\n")
+    size = output.seek(0, 2)
+    output.seek(max(0, size - _TAIL_BYTES))
+    lines = output.read().decode("utf-8", "replace").split("\n")
     return next((each.strip() for each in reversed(lines) if each.strip()), "")
 
 
@@ -232,7 +232,7 @@ class RecorderClient:
         self._process: CommandChannel | None = None
         self._number = 0
         self._ring: RingChoice | None = None
-        self._retry_at, self._backoff_s = 0.0, RETRY_S
+        self._retry_at_s, self._backoff_s = 0.0, RETRY_S
         self._handlers: Mapping[str, Callable[[Mapping[str, object]], None]] = {
             "recording": self._on_recording,
             "figures": self._on_stats,
@@ -252,40 +252,40 @@ class RecorderClient:
         self,
         path: Path,
         topics: Sequence[str] = (),
-        left_out: Sequence[str] = (),
+        excluded: Sequence[str] = (),
         note: str = "",
         *,
         seconds: float | None = None,
-        most_bytes: int | None = None,
+        max_bytes: int | None = None,
     ) -> bool:
         """Start a recording; return False if one is already in progress.
 
         Args:
             path: File to write.
             topics: Topics or patterns to record; empty for all topics.
-            left_out: Patterns of topics that are not recorded.
+            excluded: Patterns of topics that are not recorded.
             note: Note stored in the file.
             seconds: Maximum duration in seconds; None for no limit.
-            most_bytes: Maximum size of the file in bytes; None for no limit.
+            max_bytes: Maximum size of the file in bytes; None for no limit.
         """
         if self.state.phase:
             return False
         self._alerts.resolve_all("recorder:")
-        old = self.state
+        previous = self.state
         self._set_state(
             RecorderState(
                 "starting",
                 path,
-                ring_s=old.ring_s,
-                ring_bytes=old.ring_bytes,
-                pending_saves=old.pending_saves,
-                last=old.last,
+                ring_s=previous.ring_s,
+                ring_bytes=previous.ring_bytes,
+                pending_saves=previous.pending_saves,
+                last_path=previous.last_path,
             )
         )
-        limits = {"seconds": seconds, "size_bytes": most_bytes}
+        limits = {"seconds": seconds, "size_bytes": max_bytes}
         end_limits = {name: limit for name, limit in limits.items() if limit is not None}
         self._send(
-            op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note, **end_limits
+            op="record", path=str(path), topics=list(topics), left_out=list(excluded), note=note, **end_limits
         )
         return True
 
@@ -308,8 +308,8 @@ class RecorderClient:
             value: JSON content of the event.
             to: "recording" or "ring" to add the event only there; "" for both.
         """
-        is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
-        if self._process is not None and is_heard:
+        has_receiver = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
+        if self._process is not None and has_receiver:
             self._process.send_command({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def set_ring(self, choice: RingChoice | None) -> None:
@@ -320,7 +320,7 @@ class RecorderClient:
         if choice == self._ring:
             return
         was_on, self._ring = self._ring is not None, choice
-        self._retry_at, self._backoff_s = 0.0, RETRY_S
+        self._retry_at_s, self._backoff_s = 0.0, RETRY_S
         self._alerts.resolve("recorder:ring")
         if was_on and self._process is not None:
             self._send(op="end_ring")
@@ -346,14 +346,14 @@ class RecorderClient:
 
     def check(self) -> None:
         """Restart the flight recorder if its process ended unexpectedly. Called once a second."""
-        if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
+        if self._ring is not None and self._process is None and self._clock() >= self._retry_at_s:
             self._start_ring(self._ring)
 
     def close(self, wait_s: float = EXIT_TIMEOUT_S) -> None:
         """Close the input of the process, and wait at most ``wait_s`` seconds while it finishes its work."""
-        line, self._process = self._process, None
-        if line is not None:
-            line.close(wait_s)
+        channel, self._process = self._process, None
+        if channel is not None:
+            channel.close(wait_s)
 
     # ---- events of the process
 
@@ -393,7 +393,7 @@ class RecorderClient:
         status = content.get("status")
         status = status if isinstance(status, Mapping) else {}
         path = self.state.path
-        ended = replace(_with_status(self.state, status), phase="", last=path, free_bytes=None)
+        ended = replace(_with_status(self.state, status), phase="", last_path=path, free_bytes=None)
         self._set_state(replace(ended, reached_limit=str(content.get("limit", ""))))
         self._alerts.resolve("recorder:low")
         problem = status.get("problem")
@@ -422,7 +422,7 @@ class RecorderClient:
 
     def _on_saved(self, content: Mapping[str, object]) -> None:
         path = _parse_path(content)
-        self._set_state(replace(self._without_pending_save(path), last=path or self.state.last))
+        self._set_state(replace(self._without_pending_save(path), last_path=path or self.state.last_path))
 
     def _on_problem(self, content: Mapping[str, object]) -> None:
         op, message = content.get("op"), str(content.get("sentence", ""))
@@ -445,16 +445,16 @@ class RecorderClient:
             )
 
     def _on_exited(self, detail: str) -> None:
-        before, self._process = self.state, None
-        self._retry_at = self._clock() + self._backoff_s
+        previous, self._process = self.state, None
+        self._retry_at_s = self._clock() + self._backoff_s
         self._backoff_s = min(2 * self._backoff_s, MAX_RETRY_S)
         self._set_state(
-            replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, pending_saves=())
+            replace(previous, phase="", free_bytes=None, ring_s=None, ring_bytes=0, pending_saves=())
         )
-        if before.phase:
+        if previous.phase:
             title = _("The recorder stopped. Everything up to a second before that is saved.")
-            self._alerts.raise_alert("recorder:ended", "error", title, detail or _path_text(before.path))
-        if before.pending_saves:
+            self._alerts.raise_alert("recorder:ended", "error", title, detail or _path_text(previous.path))
+        if previous.pending_saves:
             title = _("The last seconds couldn't be saved.")
             self._alerts.raise_alert("recorder:keep", "error", title, detail)
         if self._ring is not None:
@@ -522,12 +522,12 @@ def _with_status(state: RecorderState, status: Mapping[str, object]) -> Recorder
     topics = {
         str(topic): each for topic, raw_stats in topic_items if (each := parse_stats(raw_stats)) is not None
     }
-    duration = status.get("duration_s")
+    duration_s = status.get("duration_s")
     return replace(
         state,
         message_count=_non_negative_int(status.get("message_count")) or 0,
         size_bytes=_non_negative_int(status.get("size_bytes")) or 0,
-        duration_s=float(duration) if isinstance(duration, int | float) else 0.0,
+        duration_s=float(duration_s) if isinstance(duration_s, int | float) else 0.0,
         lost=sum(each.lost or 0 for each in topics.values()),
         unwritten_count=_non_negative_int(status.get("unkept")) or 0,
         topics=topics,

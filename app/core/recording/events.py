@@ -61,16 +61,19 @@ class RecordedEvents:
 
     def update_run(self, run: RunState) -> None:
         """Send an event if the state of the run has changed. Called at each tick."""
-        before, self._run = self._run, run
-        if run is before:
+        previous, self._run = self._run, run
+        if run is previous:
             return
-        was_on, is_on = before is not None and before.state in _ACTIVE_STATES, run.state in _ACTIVE_STATES
-        is_same = was_on and before is not None and _is_unchanged(before, run)
-        if was_on and not (is_on and is_same):
-            self._end_run(run if is_same else None)
-        elif self._run_entry and not is_on:
+        was_active, is_active = (
+            previous is not None and previous.state in _ACTIVE_STATES,
+            run.state in _ACTIVE_STATES,
+        )
+        is_same_run = was_active and previous is not None and _is_unchanged(previous, run)
+        if was_active and not (is_active and is_same_run):
+            self._end_run(run if is_same_run else None)
+        elif self._run_entry and not is_active:
             self._send_result(run)
-        if is_on and not is_same:
+        if is_active and not is_same_run:
             self._run_entry = self._new_entry(f"run-{next(self._numbers)}", run.tried_label or run.name)
             self._add("runs", self._run_entry)
 
@@ -129,18 +132,18 @@ class RecordedEvents:
             self._active_events[key or str(content["id"])] = (role, content)
 
 
-def _is_unchanged(before: RunState, run: RunState) -> bool:
+def _is_unchanged(previous: RunState, run: RunState) -> bool:
     # The clock of the same run is set once more when its scripts begin.
-    return run.started_s == before.started_s or (run.is_started and not before.is_started)
+    return run.started_s == previous.started_s or (run.is_started and not previous.is_started)
 
 
 def _result(run: RunState) -> dict[str, object]:
     if run.errors:
         return {"result": "failed", "words": next(iter(run.errors.values()))[:MAX_TEXT_LENGTH]}
-    if run.finished:
+    if run.is_finished:
         return {"result": "ended", "words": ""}
     report = run.report
     if report is None or not report.is_confirmed or not report.robots:
         return {"result": "stopped", "words": ""}
-    elapsed = max(1, round(report.elapsed_ms))
-    return {"result": "stopped", "words": _("Stop, {elapsed} ms").format(elapsed=elapsed)}
+    elapsed_ms = max(1, round(report.elapsed_ms))
+    return {"result": "stopped", "words": _("Stop, {elapsed} ms").format(elapsed=elapsed_ms)}

@@ -31,7 +31,7 @@ class FilmStripPreview:
         pictures: Images at the centres of equal time intervals, of the topic with the most images. None
             for an image that can't be read; empty if the recording has no images.
         counts: Number of messages of all topics in each of several equal time intervals.
-        by_topic: Number of messages in these intervals, by topic.
+        counts_by_topic: Number of messages in these intervals, by topic.
         message_bytes: Average message size, by topic; topics with unknown size are missing.
     """
 
@@ -41,13 +41,13 @@ class FilmStripPreview:
     pictures: Sequence[Picture | None] = ()
     counts: Sequence[int] = ()
     topics: Sequence[RecordedTopic] = ()
-    by_topic: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    counts_by_topic: Mapping[str, Sequence[int]] = field(default_factory=dict)
     message_bytes: Mapping[str, float] = field(default_factory=dict)
 
     def size_of(self, topic: RecordedTopic) -> float | None:
         """Return the estimated size of all messages of a topic in bytes; None if unknown."""
-        each = self.message_bytes.get(topic.name)
-        return None if each is None else each * topic.message_count
+        mean_bytes = self.message_bytes.get(topic.name)
+        return None if mean_bytes is None else mean_bytes * topic.message_count
 
     def estimate_messages(
         self, begin_ns: int, end_ns: int, topics: Collection[str]
@@ -62,16 +62,16 @@ class FilmStripPreview:
             end_ns: End of the range.
             topics: Names of the topics to count.
         """
-        count = size = 0.0
+        count = size_bytes = 0.0
         is_known = True
         for topic in self.topics:
             if topic.name in topics:
-                share = self._share_in_range(self.by_topic.get(topic.name, ()), begin_ns, end_ns)
+                share = self._share_in_range(self.counts_by_topic.get(topic.name, ()), begin_ns, end_ns)
                 count += share * topic.message_count
                 topic_bytes = self.size_of(topic)
                 is_known = is_known and topic_bytes is not None
-                size += share * (topic_bytes or 0.0)
-        return count, size if is_known else None
+                size_bytes += share * (topic_bytes or 0.0)
+        return count, size_bytes if is_known else None
 
     def _share_in_range(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
         # Share of the counted messages within the range, 0 to 1.
@@ -83,11 +83,11 @@ class FilmStripPreview:
         bucket_ns = (self.end_ns + 1 - self.start_ns) / len(counts)
         first, last = (begin_ns - self.start_ns) / bucket_ns, (end_ns + 1 - self.start_ns) / bucket_ns
         overlaps = (max(0.0, min(last, index + 1) - max(first, index)) for index in range(len(counts)))
-        return sum(part * count for part, count in zip(overlaps, counts, strict=True)) / total
+        return sum(overlap * count for overlap, count in zip(overlaps, counts, strict=True)) / total
 
 
 def read_preview(
-    path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
+    path: Path, picture_count: int, interval_count: int, display_size: Size, opener: RecordingOpener
 ) -> FilmStripPreview | None:
     """Read the preview of a recording.
 
@@ -96,9 +96,9 @@ def read_preview(
 
     Args:
         path: File of the recording.
-        pictures: Number of images.
-        bars: Number of time intervals in which messages are counted.
-        fit: Size of the images in pixels.
+        picture_count: Number of images.
+        interval_count: Number of time intervals in which messages are counted.
+        display_size: Size of the images in pixels.
         opener: Opens the recording.
     """
     try:
@@ -106,27 +106,27 @@ def read_preview(
             if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
                 return None
             start_ns, end_ns = recording.start_ns, recording.end_ns
-            counted = recording.densities(start_ns, end_ns + 1, bars)
-            counts = tuple(map(sum, zip(*counted.values(), strict=True))) if counted else ()
+            counts_by_topic = recording.densities(start_ns, end_ns + 1, interval_count)
+            counts = tuple(map(sum, zip(*counts_by_topic.values(), strict=True))) if counts_by_topic else ()
             topics = tuple(recording.topics.values())
-            images = _pictures(recording, pictures, fit)
+            images = _pictures(recording, picture_count, display_size)
             sizes = _message_bytes(recording)
-            return FilmStripPreview(path, start_ns, end_ns, images, counts, topics, counted, sizes)
+            return FilmStripPreview(path, start_ns, end_ns, images, counts, topics, counts_by_topic, sizes)
     except (NepError, OSError):
         return None
 
 
-def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | None, ...]:
+def _pictures(recording: Recording, count: int, display_size: Size) -> tuple[Picture | None, ...]:
     topics = [each for each in recording.topics.values() if each.codec == "image"]
     if not topics:
         return ()
     topic = max(topics, key=lambda each: each.message_count).name
     images = []
     for index in range(count):
-        span = recording.end_ns - recording.start_ns
-        at_ns = recording.start_ns + (2 * index + 1) * span // (2 * count)
+        span_ns = recording.end_ns - recording.start_ns
+        at_ns = recording.start_ns + (2 * index + 1) * span_ns // (2 * count)
         entry = recording.newest(at_ns, (topic,)).get(topic) or recording.after(at_ns, topic)
-        images.append(decode(entry.message, 0.0, fit)[0] if entry is not None else None)
+        images.append(decode(entry.message, 0.0, display_size)[0] if entry is not None else None)
     return tuple(images)
 
 
@@ -138,18 +138,18 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
         for topic, each in stats.items()
         if each.received and topic in recording.topics
     }
-    others = [topic for topic in recording.topics if topic not in mean_bytes][:MAX_SAMPLED_TOPICS]
-    samples: dict[str, dict[int, int]] = {topic: {} for topic in others}
-    span = recording.end_ns - recording.start_ns
-    for index in range(SAMPLES_PER_TOPIC if others else 0):
-        at_ns = recording.start_ns + (index + 1) * span // SAMPLES_PER_TOPIC
-        for topic, entry in recording.newest(at_ns, others).items():
+    other_topics = [topic for topic in recording.topics if topic not in mean_bytes][:MAX_SAMPLED_TOPICS]
+    samples: dict[str, dict[int, int]] = {topic: {} for topic in other_topics}
+    span_ns = recording.end_ns - recording.start_ns
+    for index in range(SAMPLES_PER_TOPIC if other_topics else 0):
+        at_ns = recording.start_ns + (index + 1) * span_ns // SAMPLES_PER_TOPIC
+        for topic, entry in recording.newest(at_ns, other_topics).items():
             samples[topic][entry.log_ns] = entry.message.size_bytes
     return mean_bytes | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in samples.items() if sizes}
 
 
 def select_part(
-    preview: FilmStripPreview, begin_ns: int, end_ns: int, included: Sequence[str], unwanted: Sequence[str]
+    preview: FilmStripPreview, begin_ns: int, end_ns: int, included: Sequence[str], excluded: Sequence[str]
 ) -> Part:
     """Return the part of a recording in an inclusive time range, limited to topics that match patterns.
 
@@ -160,14 +160,14 @@ def select_part(
         begin_ns: Start of the range.
         end_ns: End of the range.
         included: Patterns of topics to include; empty for all topics.
-        unwanted: Patterns of topics to exclude.
+        excluded: Patterns of topics to exclude.
 
     Returns:
         Part of the recording. If no topic matches, its ``topics`` is empty.
     """
     topics = None
-    if included or unwanted:
-        selection = TopicSelection(tuple(included), tuple(unwanted))
+    if included or excluded:
+        selection = TopicSelection(tuple(included), tuple(excluded))
         topics = [each.name for each in preview.topics if selection.has(each.name)]
     return Part(
         None if begin_ns <= preview.start_ns else begin_ns,

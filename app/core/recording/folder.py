@@ -119,13 +119,13 @@ class RecordingFolder:
         self._info_cache: dict[Path, tuple[tuple[int, int], RecordingInfo]] = {}
         """Facts already read, with the size and time of each file. Used by the worker thread only."""
 
-    def start_scan(self, being_written: Path | None = None) -> None:
+    def start_scan(self, active_path: Path | None = None) -> None:
         """Start a scan in the background; `pop_result` returns the result.
 
         Args:
-            being_written: File of the recording in progress, which is not opened.
+            active_path: File of the recording in progress, which is not opened.
         """
-        self._worker.submit(_JOB_OWNER, lambda: self._scan(being_written))
+        self._worker.submit(_JOB_OWNER, lambda: self._scan(active_path))
 
     def pop_result(self) -> FolderScan | None:
         """Return and clear a new scan result; None if there is none."""
@@ -136,7 +136,7 @@ class RecordingFolder:
         self._opener.close()
         self._worker.close()
 
-    def _scan(self, being_written: Path | None) -> FolderScan:
+    def _scan(self, active_path: Path | None) -> FolderScan:
         try:
             with os.scandir(self.folder) as entries:
                 found_files = [
@@ -147,29 +147,29 @@ class RecordingFolder:
         except OSError as error:
             return FolderScan(problem=(error.strerror or str(error)).lower())
         found_files.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
-        listed_files, left_out = found_files[:MAX_FILES], max(0, len(found_files) - MAX_FILES)
+        listed_files, omitted_count = found_files[:MAX_FILES], max(0, len(found_files) - MAX_FILES)
         self._info_cache = {
-            path: self._info_cache[path] for path, _about in listed_files if path in self._info_cache
+            path: self._info_cache[path] for path, _file_stat in listed_files if path in self._info_cache
         }
-        files, opened, until = [], 0, time.monotonic() + MAX_SCAN_S
-        for path, about in listed_files:
-            mark = (about.st_mtime_ns, about.st_size)
+        files, opened_count, deadline_s = [], 0, time.monotonic() + MAX_SCAN_S
+        for path, file_stat in listed_files:
+            stamp = (file_stat.st_mtime_ns, file_stat.st_size)
             cached = self._info_cache.get(path)
-            if cached is not None and cached[0] == mark:
+            if cached is not None and cached[0] == stamp:
                 files.append(cached[1])
                 continue
-            info = RecordingInfo(path, about.st_size, about.st_mtime)
+            info = RecordingInfo(path, file_stat.st_size, file_stat.st_mtime)
             if (
-                path != being_written
-                and opened < MAX_READS_PER_SCAN
-                and (not opened or time.monotonic() < until)
+                path != active_path
+                and opened_count < MAX_READS_PER_SCAN
+                and (not opened_count or time.monotonic() < deadline_s)
             ):
-                opened += 1
+                opened_count += 1
                 info = read_info(info, self._opener)
-                self._info_cache[path] = (mark, info)
+                self._info_cache[path] = (stamp, info)
             files.append(info)
-        is_whole = all(each.is_read or each.path == being_written for each in files)
-        return FolderScan(tuple(files), "", left_out, is_whole)
+        is_complete = all(each.is_read or each.path == active_path for each in files)
+        return FolderScan(tuple(files), "", omitted_count, is_complete)
 
 
 def read_info(file_info: RecordingInfo, opener: RecordingOpener) -> RecordingInfo:
@@ -215,12 +215,12 @@ def _lost_count(recording: Recording) -> int | None:
     return sum((each.lost or 0) + each.unkept for each in stats.values()) if stats else None
 
 
-def read_picture(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
+def read_picture(path: Path, display_size: Size, opener: RecordingOpener) -> Picture | None:
     """Return an image of the topic with the most images; None if the recording has no readable image.
 
     Args:
         path: File of the recording.
-        fit: Size of the view in pixels.
+        display_size: Size of the view in pixels.
         opener: Opens the recording.
     """
     try:
@@ -229,8 +229,8 @@ def read_picture(path: Path, fit: Size, opener: RecordingOpener) -> Picture | No
             if not topics:
                 return None
             topic = max(topics, key=lambda each: each.message_count).name
-            middle = (recording.start_ns + recording.end_ns) // 2
-            entry = recording.newest(middle, (topic,)).get(topic) or recording.after(middle, topic)
-            return decode(entry.message, 0.0, fit)[0] if entry is not None else None
+            middle_ns = (recording.start_ns + recording.end_ns) // 2
+            entry = recording.newest(middle_ns, (topic,)).get(topic) or recording.after(middle_ns, topic)
+            return decode(entry.message, 0.0, display_size)[0] if entry is not None else None
     except (NepError, OSError):
         return None

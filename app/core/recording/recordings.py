@@ -74,17 +74,17 @@ class SessionRecordings:
         start: StartRecorder = RecorderProcess,
         clock: Callable[[], float] = time.monotonic,
         now: Callable[[], datetime] = datetime.now,
-        reads_apart: bool = True,
+        uses_reader_process: bool = True,
     ) -> None:
-        # `reads_apart`: recordings are read in separate processes.
-        self._reads_apart = reads_apart
+        # `uses_reader_process`: recordings are read in separate processes.
+        self._uses_reader_process = uses_reader_process
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
         self.events = RecordedEvents(self.client.add_event)
         self.choice = parse_choice(settings.get(CHOICE_KEY, {}))
         self.ring_settings = parse_ring_settings(settings.get(RING_KEY, {}))
         self.on_created: Callable[[Path, str], object] = _ignore_created
-        self.recorded = self.choice
+        self.active_choice = self.choice
         """Selection of the recording in progress."""
         self._started_s: float | None = None
         self._pending_saves: dict[Path, DoneCallback | None] = {}
@@ -130,7 +130,7 @@ class SessionRecordings:
 
     def new_opener(self) -> openers.RecordingOpener:
         """Return a new opener of recordings. The caller must close it."""
-        return openers.process_opener() if self._reads_apart else openers.LocalOpener()
+        return openers.process_opener() if self._uses_reader_process else openers.LocalOpener()
 
     # ---- recording
 
@@ -176,9 +176,9 @@ class SessionRecordings:
             selection.excluded,
             note,
             seconds=None if choice.max_minutes is None else 60.0 * choice.max_minutes,
-            most_bytes=None if choice.max_gb is None else round(choice.max_gb * _GB),
+            max_bytes=None if choice.max_gb is None else round(choice.max_gb * _GB),
         )
-        self.recorded, self._started_s = choice, None
+        self.active_choice, self._started_s = choice, None
         return ""
 
     def stop(self) -> None:
@@ -277,19 +277,19 @@ class SessionRecordings:
 
     def on_event(self, event: RecorderEvent | RecorderExited) -> None:
         """Apply an event of the recorder's process."""
-        was = self.client.state
+        previous = self.client.state
         self.client.on_event(event)
         state = self.client.state
-        if was.phase == "starting" and state.phase == "recording":
+        if previous.phase == "starting" and state.phase == "recording":
             self._started_s = self._clock()
             self.events.resend("recording")
-        if was.phase and not state.phase:
+        if previous.phase and not state.phase:
             self._started_s = None
-            if state.last is not None and state.last == was.path:
-                self.on_created(state.last, "recorded")
+            if state.last_path is not None and state.last_path == previous.path:
+                self.on_created(state.last_path, "recorded")
         for path in [each for each in self._pending_saves if each not in state.pending_saves]:
             on_done = self._pending_saves.pop(path)
-            is_saved = state.last == path
+            is_saved = state.last_path == path
             if is_saved:
                 self.on_created(path, "kept")
             if on_done is not None:
@@ -306,6 +306,6 @@ class SessionRecordings:
 
 
 def saved_file_name(text: str) -> str:
-    """Return the file name in a text such as "kept alarm-2026-11-27-10-00-00.mcap"; "" if there is none."""
+    """Return the file name in a text such as "saved alarm-2026-11-27-10-00-00.mcap"; "" if there is none."""
     match = _SAVED_FILE_PATTERN.search(text)
     return match[0] if match is not None else ""

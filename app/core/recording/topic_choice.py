@@ -49,24 +49,24 @@ class RecordingChoice:
     max_gb: float | None = None
 
     def expected_end(
-        self, elapsed_s: float, size_bytes: float, speed: float | None
+        self, elapsed_s: float, size_bytes: float, bytes_per_s: float | None
     ) -> tuple[float, float] | None:
         """Return the expected duration (s) and size (bytes) of the finished recording.
 
-        Returns None if the recording has no limit, or if `speed` is unknown.
+        Returns None if the recording has no limit, or if `bytes_per_s` is unknown.
 
         Args:
             elapsed_s: Current duration in seconds.
             size_bytes: Current size in bytes.
-            speed: Current data rate in bytes per second, or None.
+            bytes_per_s: Current data rate in bytes per second, or None.
         """
         limits_s = [] if self.max_minutes is None else [60.0 * self.max_minutes]
-        if self.max_gb is not None and speed:
-            limits_s.append(elapsed_s + (1e9 * self.max_gb - size_bytes) / speed)
-        if speed is None or not limits_s:
+        if self.max_gb is not None and bytes_per_s:
+            limits_s.append(elapsed_s + (1e9 * self.max_gb - size_bytes) / bytes_per_s)
+        if bytes_per_s is None or not limits_s:
             return None
-        at_s = max(elapsed_s, min(limits_s))
-        return at_s, size_bytes + speed * (at_s - elapsed_s)
+        end_s = max(elapsed_s, min(limits_s))
+        return end_s, size_bytes + bytes_per_s * (end_s - elapsed_s)
 
     @property
     def selection(self) -> recorder.TopicSelection:
@@ -189,17 +189,17 @@ def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         Patterns of topics to record, and patterns of topics to exclude.
     """
     included: list[str] = []
-    unwanted: list[str] = []
-    is_not = False
+    excluded: list[str] = []
+    is_exclusion = False
     for token in text.replace(",", " ").split():
         if token.casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
-            is_not = True
+            is_exclusion = True
             continue
-        target = unwanted if is_not else included
+        target = excluded if is_exclusion else included
         if token not in target:
             target.append(token)
-        is_not = False
-    return tuple(included), tuple(unwanted)
+        is_exclusion = False
+    return tuple(included), tuple(excluded)
 
 
 def file_stem(name: str) -> str:

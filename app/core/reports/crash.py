@@ -55,15 +55,15 @@ class Crash:
     version: str = __version__
 
 
-def crash_extra(part: Part, how: str, text: str = "") -> dict[str, object]:
+def crash_extra(part: Part, cause: str, text: str = "") -> dict[str, object]:
     """Return the ``extra`` argument for a log record about a crash.
 
     Args:
         part: Part that crashed.
-        how: Cause, in English.
+        cause: Cause, in English.
         text: Details such as a traceback.
     """
-    return {"crash": Crash(part, how, text)}
+    return {"crash": Crash(part, cause, text)}
 
 
 def is_crash(code: int) -> bool:

@@ -1,6 +1,6 @@
 """Stored crash reports: one text file for each crash, at most ten.
 
-Each is offered once, at the next start.
+Each report is offered once, at the next start.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class CrashReports:
                 path, _format_report(crash, now).encode("utf-8", "replace"), durable=False, private=True
             )
         except OSError as error:
-            _log.warning("a crash report can't be kept: %s", error, extra=CONSOLE_EXTRA)
+            _log.warning("a crash report can't be saved: %s", error, extra=CONSOLE_EXTRA)
             return None
         for old in self.all()[MAX_REPORTS:]:
             with suppress(OSError):  # another instance has done this already
@@ -170,23 +170,23 @@ def read_reports(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
 def _read_version(report: CrashReport) -> str:
     # From the report's first line; "" if it has none.
     try:
-        first = read_regular_file(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
+        first_line = read_regular_file(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
     except OSError:
         return ""
-    version = first.removeprefix(HEADING).strip()
-    return version if first.startswith(HEADING) and VERSION_PATTERN.fullmatch(version) else ""
+    version = first_line.removeprefix(HEADING).strip()
+    return version if first_line.startswith(HEADING) and VERSION_PATTERN.fullmatch(version) else ""
 
 
 def _format_report(crash: Crash, now_s: float) -> str:
     # For developers, therefore in English.
-    noticed = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
-    by = "" if crash.version == __version__ else f" by NEP Studio {__version__}"
+    detected_time = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
+    detector = "" if crash.version == __version__ else f" by NEP Studio {__version__}"
     lines = (
         f"{HEADING}{crash.version or '(version not known)'}",
         "",
         f"part: {crash.part}",
         f"how: {crash.cause}",
-        f"noticed: {noticed}{by}",
+        f"noticed: {detected_time}{detector}",
         "",
         crash.text[-MAX_REPORT_CHARS:],
     )
@@ -199,7 +199,7 @@ def _parse_report(path: Path) -> CrashReport | None:
     if match is None or part is None:
         return None
     try:
-        noticed = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
+        detected_s = time.mktime(time.strptime(match["stamp"], _STAMP_FORMAT))
     except (ValueError, OverflowError):
         return None
-    return CrashReport(path, part, noticed, match["new"] is not None)
+    return CrashReport(path, part, detected_s, match["new"] is not None)

@@ -98,7 +98,7 @@ class MissingLibraries:
     def start_remedy(self) -> str:
         """Instructions for installing the libraries that the window needs."""
         if not self.command:
-            return _("Install the package that contains it, then start Studio again.")
+            return _("Install the packages that contain the missing libraries, then start Studio again.")
         template = _("On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again.")
         return template.format(command=self.command)
 
@@ -117,12 +117,12 @@ class MissingLibraries:
         """Instructions for installing the libraries that the block editor needs."""
         if not self.command:
             return _(
-                "Install the package that contains it, then start Studio again. The Developer layout works "
-                "without it."
+                "Install the packages that contain the missing libraries, then start Studio again. The "
+                "Developer layout works without the block editor."
             )
         return _(
             "On Debian and Ubuntu, run “{command}” in a terminal, then start Studio again. The "
-            "Developer layout works without it."
+            "Developer layout works without the block editor."
         ).format(command=self.command)
 
 

@@ -95,19 +95,19 @@ def file_name(now_s: float) -> str:
 
 def describe_contents(parts: ReportParts) -> list[str]:
     """Return a list of the contents, so that the user can decide whether to share them."""
-    size = sum(path.stat().st_size for path in _list_logs(parts.log)) / 1000
+    size_kb = sum(path.stat().st_size for path in _list_logs(parts.log)) / 1000
     lines = [
         _("Versions of Studio, Python, Qt and the operating system, and the screen size"),
-        _("Studio log with recent errors ({size} kB)").format(size=number(size, ".1f"))
-        if size
+        _("Studio log with recent errors ({size} kB)").format(size=number(size_kb, ".1f"))
+        if size_kb
         else _("Studio log (empty)"),
         _("Results of the connection doctor: NEP programs, and the addresses of this computer"),
         _("Your settings, such as language and theme"),
     ]
-    crashed = len(parts.crashes.all())
-    if crashed:
-        template = ngettext("{count} crash report", "{count} crash reports", crashed)
-        lines.append(template.format(count=crashed))
+    crash_count = len(parts.crashes.all())
+    if crash_count:
+        template = ngettext("{count} crash report", "{count} crash reports", crash_count)
+        lines.append(template.format(count=crash_count))
     return lines
 
 
@@ -117,17 +117,17 @@ def work_text(names: Sequence[str]) -> str:
     return _("Open behaviours: {names}").format(names=format_list(quoted))
 
 
-def create_report(parts: ReportParts, happened: str, documents: Sequence[ReportedWork] = ()) -> bytes:
+def create_report(parts: ReportParts, description: str, documents: Sequence[ReportedWork] = ()) -> bytes:
     """Create the content of the zip file. Slow because of the doctor; don't call it in the main thread.
 
     Args:
         parts: Sources of the report.
-        happened: Description by the user.
+        description: Description by the user.
         documents: Behaviours to include.
     """
     files: list[tuple[str, bytes]] = [
         ("README.txt", README_TEXT.format(version=__version__).encode()),
-        ("what-happened.txt", (happened.strip() or "(no description)").encode("utf-8", "replace")),
+        ("what-happened.txt", (description.strip() or "(no description)").encode("utf-8", "replace")),
         ("versions.txt", _anonymize(_format_versions(parts))),
         ("settings.json", _anonymize(_format_settings(parts.settings))),
         ("doctor.txt", _anonymize(parts.doctor())),
@@ -150,8 +150,8 @@ def write_report(path: Path, data: bytes) -> None:
     try:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
-        full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRNOS
-        advice = _("free some space or choose another folder") if full else _("choose another folder")
+        is_disk_full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRNOS
+        advice = _("free some space or choose another folder") if is_disk_full else _("choose another folder")
         reason = getattr(error, "strerror", None) or str(error)
         raise ReportError(path, reason, advice) from error
 
@@ -159,12 +159,12 @@ def write_report(path: Path, data: bytes) -> None:
 class ReportWriter:
     """Background thread that creates and writes one report."""
 
-    def __init__(self, path: Path, make: Callable[[], bytes]) -> None:
-        # Starts at once; `make` is called in the thread.
+    def __init__(self, path: Path, create_content: Callable[[], bytes]) -> None:
+        # Starts at once; `create_content` is called in the thread.
         self.path = path
         self.problem = ""
         """Why the report could not be written, as a sentence without a full stop; "" if there is no error."""
-        self._make = make
+        self._create_content = create_content
         self._thread = threading.Thread(target=self._run, name="studio-report")
         self._thread.start()
 
@@ -180,7 +180,7 @@ class ReportWriter:
 
     def _run(self) -> None:
         try:
-            write_report(self.path, self._make())
+            write_report(self.path, self._create_content())
         except ReportError as error:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  shown to the user

@@ -63,15 +63,15 @@ class StudioRun:
         self._folder = folder if folder is not None else state_home() / "runs"
         self._log = log if log is not None else log_folder()
         self._clock = clock
-        self._mark = self._folder / f"{uuid.uuid4().hex}.json"
-        self._lock = FileLock(self._mark)
+        self._marker = self._folder / f"{uuid.uuid4().hex}.json"
+        self._lock = FileLock(self._marker)
         self._trace: IO[str] | None = None
         self._began_s = 0.0
 
     @property
     def is_recorded(self) -> bool:
         """True if the marker file exists; otherwise a crash of this run can't be detected."""
-        return self._mark.exists()
+        return self._marker.exists()
 
     def start(self) -> None:
         """Create the marker file. A failure is logged."""
@@ -114,11 +114,11 @@ class StudioRun:
         computer restarted or because Studio was asked to exit are not crashes.
         """
         try:
-            marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]
+            markers = [marker for marker in self._folder.glob("*.json") if marker != self._marker]
         except OSError:
             return []
-        checked = [self._check_marker(mark) for mark in marks]
-        return [crash for crash in checked if crash is not None]
+        crashes = [self._check_marker(marker) for marker in markers]
+        return [crash for crash in crashes if crash is not None]
 
     # -- this run -------------------------------------------------------------------------------------------
 
@@ -127,16 +127,16 @@ class StudioRun:
             "pid": os.getpid(),
             "began_s": self._began_s,
             "version": __version__,
-            "trace": _trace_name(self._mark),
+            "trace": _trace_name(self._marker),
             "asked": is_exit_requested,
         }
-        write_atomically(self._mark, json.dumps(entry).encode(), durable=False, private=True)
+        write_atomically(self._marker, json.dumps(entry).encode(), durable=False, private=True)
 
     def _enable_faulthandler(self) -> None:
         create_private_folder(self._log)
-        path = self._log / _trace_name(self._mark)
-        number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
-        self._trace = os.fdopen(number, "a", encoding="utf-8")
+        path = self._log / _trace_name(self._marker)
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
+        self._trace = os.fdopen(descriptor, "a", encoding="utf-8")
         faulthandler.enable(self._trace)
 
     def _delete_files(self) -> None:
@@ -145,46 +145,46 @@ class StudioRun:
             self._trace.close()
             self._trace = None
         self._lock.release()
-        _remove_files(self._mark, self._log)
+        _remove_files(self._marker, self._log)
 
     # -- earlier runs ------------------------------------------------------------------------------
 
-    def _check_marker(self, mark: Path) -> Crash | None:
-        lock = FileLock(mark)
+    def _check_marker(self, marker: Path) -> Crash | None:
+        lock = FileLock(marker)
         if not lock.acquire():
             return None  # its process is running
-        judged: tuple[Mapping[str, object], float] | None = None
+        content: tuple[Mapping[str, object], float] | None = None
         try:
-            entry = json.loads(read_regular_file(mark))
+            entry = json.loads(read_regular_file(marker))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
             if _is_running(pid, began_s):  # on a file system without locks
                 return None
-            mark.unlink()  # only one instance succeeds, which then reports it
-            judged = entry, began_s
+            marker.unlink()  # only one instance succeeds, which then reports it
+            content = entry, began_s
         except OSError:
             return None
         except (ValueError, TypeError, KeyError, RecursionError):
             pass  # damaged, so nothing is known
         finally:
             lock.release()  # before it is deleted: Windows can't delete an open file
-        trace = self._read_trace(mark)
-        _remove_files(mark, self._log)
-        return self._detect_crash(*judged, trace) if judged is not None else None
+        trace = self._read_trace(marker)
+        _remove_files(marker, self._log)
+        return self._detect_crash(*content, trace) if content is not None else None
 
     def _detect_crash(self, entry: Mapping[str, object], began_s: float, trace: str) -> Crash | None:
-        how = fatal_line(trace)
-        if not how:
+        cause = fatal_line(trace)
+        if not cause:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_TOLERANCE_S:
                 return None
-            how = NO_TRACE_CAUSE
+            cause = NO_TRACE_CAUSE
         start_time = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
         version = parse_version(entry.get("version"))
         text = f"Version {version or 'unknown'}, started {start_time}.\n\n{trace}\n{self._log_tail()}"
-        return Crash("studio", how, text, version)
+        return Crash("studio", cause, text, version)
 
-    def _read_trace(self, mark: Path) -> str:
+    def _read_trace(self, marker: Path) -> str:
         try:
-            return read_regular_file(self._log / _trace_name(mark), MAX_TRACE_BYTES).decode(
+            return read_regular_file(self._log / _trace_name(marker), MAX_TRACE_BYTES).decode(
                 "utf-8", "replace"
             )
         except OSError:
@@ -198,12 +198,12 @@ class StudioRun:
         return "\n".join(["The end of the log:", *lines[-MAX_LOG_LINES:]]) + "\n"
 
 
-def _trace_name(mark: Path) -> str:
-    return f"crash-{mark.stem}.trace"
+def _trace_name(marker: Path) -> str:
+    return f"crash-{marker.stem}.trace"
 
 
-def _remove_files(mark: Path, log: Path) -> None:
-    for path in (mark, mark.with_name(f"{mark.name}.lock"), log / _trace_name(mark)):
+def _remove_files(marker: Path, log: Path) -> None:
+    for path in (marker, marker.with_name(f"{marker.name}.lock"), log / _trace_name(marker)):
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
 
@@ -212,7 +212,7 @@ def _is_running(pid: int, began_s: float) -> bool:
     # Checks the start time too, because process ids are reused.
     try:
         process = psutil.Process(pid)
-        is_old = process.create_time() <= began_s + CLOCK_TOLERANCE_S
-        return is_old and process.status() != psutil.STATUS_ZOMBIE
+        is_same_process = process.create_time() <= began_s + CLOCK_TOLERANCE_S
+        return is_same_process and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
         return False

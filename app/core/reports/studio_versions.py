@@ -39,14 +39,14 @@ def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
     for entry in entries if isinstance(entries, list) else ():
         if not isinstance(entry, Mapping):
             continue
-        version, since = parse_version(entry.get("version")), entry.get("since_s")
+        version, since_s = parse_version(entry.get("version")), entry.get("since_s")
         if (
-            isinstance(since, int | float)
-            and not isinstance(since, bool)
-            and 0 <= since <= _MAX_TIME_S
+            isinstance(since_s, int | float)
+            and not isinstance(since_s, bool)
+            and 0 <= since_s <= _MAX_TIME_S
             and version
         ):
-            versions.append((version, float(since)))
+            versions.append((version, float(since_s)))
     return versions[-MAX_VERSIONS:]
 
 
@@ -61,10 +61,13 @@ def add_this_version(
         is_first: True if Studio was never started on this computer before.
         version: Version to add.
     """
-    before = known_versions(values) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
-    if before and before[-1][0] == version:
+    earlier_versions = known_versions(values) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
+    if earlier_versions and earlier_versions[-1][0] == version:
         return None
-    return [{"version": each, "since_s": s} for each, s in [*before, (version, now_s)][-MAX_VERSIONS:]]
+    return [
+        {"version": each, "since_s": since_s}
+        for each, since_s in [*earlier_versions, (version, now_s)][-MAX_VERSIONS:]
+    ]
 
 
 def format_versions(values: Mapping[str, object]) -> str:

@@ -95,7 +95,7 @@ class Announcements:
         self._is_proven = is_proven
         self._watches, self._senders, self._clock = watches, senders, clock
         self._parse_budget_s, self._budget_updated_s = MAX_PARSE_BUDGET_S, clock()
-        self._waiting: set[str] = set()
+        self._pending_topics: set[str] = set()
         self._topics: dict[str, _Announcement] = {}
         self.omitted_topics: tuple[str, ...] = ()
         """Description topics of robots beyond `MAX_ROBOTS`."""
@@ -141,10 +141,13 @@ class Announcements:
                     _("{count} programs announce themselves as {robot}.").format(
                         count=len(announcement.other_owners) + 1, robot=name
                     ),
-                    _("{first} was first and is used; {others} is ignored. Close all but one.").format(
+                    _(
+                        "{first} announced the robot first and is used. Ignored: {others}. Close the "
+                        "programs that you don't need."
+                    ).format(
                         first=announcement.owner.display_name,
                         others=format_list(
-                            [twin.display_name for twin in announcement.other_owners[:MAX_CLAIMANTS]]
+                            [other.display_name for other in announcement.other_owners[:MAX_CLAIMANTS]]
                         ),
                     ),
                 )
@@ -170,12 +173,12 @@ class Announcements:
         for topic, announcement in self._topics.items():
             if topic not in nodes_by_topic:
                 self._mark_vanished(announcement)
-        left_out: list[str] = []
+        omitted_topics: list[str] = []
         for rank, topic in _fair_topic_order(nodes_by_topic):
             nodes = nodes_by_topic[topic]
-            added = self._topics.get(topic) or self._add_topic(topic, rank, left_out)
+            added = self._topics.get(topic) or self._add_topic(topic, rank, omitted_topics)
             if added is None:
-                left_out.append(topic)
+                omitted_topics.append(topic)
                 continue
             announcement, added.rank = added, rank
             if announcement.watch is None:
@@ -188,16 +191,16 @@ class Announcements:
                 )
                 announcement.claim = None
                 announcement.owners = tuple(dict.fromkeys((nodes[0], *announcement.owners)))[:MAX_OWNERS]
-            others = (node for node in nodes if node != announcement.owner.node_id)
-            announcement.other_owners = tuple(identity_of(view, node) for node in others)
+            other_nodes = (node for node in nodes if node != announcement.owner.node_id)
+            announcement.other_owners = tuple(identity_of(view, node) for node in other_nodes)
             ids = {publisher.id for publisher in view.topics[topic].publishers}
             announcement.messages = {
                 id: message
                 for id, message in announcement.messages.items()
                 if id in ids or self._senders.node_of(message) in announcement.owners
             }
-            self._waiting.add(topic)
-        self.omitted_topics = tuple(left_out)
+            self._pending_topics.add(topic)
+        self.omitted_topics = tuple(omitted_topics)
         self._parse_pending()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
@@ -210,24 +213,24 @@ class Announcements:
                     announcement.messages[message.publisher] = message
             while len(announcement.messages) > MAX_CLAIMANTS:
                 self._evict_one(announcement)
-            self._waiting.add(topic)
+            self._pending_topics.add(topic)
         return self._parse_pending()
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _add_topic(self, topic: str, rank: int, left_out: list[str]) -> _Announcement | None:
+    def _add_topic(self, topic: str, rank: int, omitted_topics: list[str]) -> _Announcement | None:
         # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
         # more robots than this one.
         if len(self._topics) >= MAX_ROBOTS:
-            strangers = [name for name in self._topics if not self._is_proven(name)]
-            evicted = next((name for name in strangers if self._topics[name].watch is None), None)
-            last = max(strangers, key=lambda name: self._topics[name].rank, default=None)
-            if evicted is None and last is not None and self._topics[last].rank > rank:
-                evicted = last
-                left_out.append(last)
-            if evicted is None:
+            unproven_topics = [name for name in self._topics if not self._is_proven(name)]
+            evicted_topic = next((name for name in unproven_topics if self._topics[name].watch is None), None)
+            last_topic = max(unproven_topics, key=lambda name: self._topics[name].rank, default=None)
+            if evicted_topic is None and last_topic is not None and self._topics[last_topic].rank > rank:
+                evicted_topic = last_topic
+                omitted_topics.append(last_topic)
+            if evicted_topic is None:
                 return None
-            self._mark_vanished(self._topics.pop(evicted))
+            self._mark_vanished(self._topics.pop(evicted_topic))
         return self._topics.setdefault(topic, _Announcement())
 
     def _mark_vanished(self, announcement: _Announcement) -> None:
@@ -268,9 +271,11 @@ class Announcements:
         )
         self._budget_updated_s = now
         pending = {
-            topic: newest for topic in self._waiting if (newest := self._unparsed_message(topic)) is not None
+            topic: newest
+            for topic in self._pending_topics
+            if (newest := self._unparsed_message(topic)) is not None
         }
-        self._waiting = set(pending)
+        self._pending_topics = set(pending)
 
         def sort_key(item: tuple[str, Message]) -> tuple[bool, int]:
             return self._topics[item[0]].parsed_message is not None, len(item[1].data)
@@ -281,8 +286,8 @@ class Announcements:
             start_time_s = self._clock()
             self._parse(topic, newest)
             self._parse_budget_s -= self._clock() - start_time_s
-            self._waiting.discard(topic)
-        return len(self._waiting) < len(pending)
+            self._pending_topics.discard(topic)
+        return len(self._pending_topics) < len(pending)
 
     def _unparsed_message(self, topic: str) -> Message | None:
         # None if the newest description of the robot's own program has been parsed.
@@ -375,5 +380,5 @@ def _match_name(node: str, names: Collection[str]) -> str:
     stem = node
     for suffix in NODE_NAME_SUFFIXES:
         stem = stem.removesuffix(suffix)
-    same = {stem.lower(), node.lower()}
-    return next((name for name in names if name.lower() in same), stem or node)
+    accepted_names = {stem.lower(), node.lower()}
+    return next((name for name in names if name.lower() in accepted_names), stem or node)

@@ -26,23 +26,28 @@ def awaited_values(
         event: Description of the event.
         name: Name of the field in the event's data.
     """
-    hat = block_type_of(robot.model, "when", event.name)
+    event_block_type = block_type_of(robot.model, "when", event.name)
     argument = BlockTemplate(event.text, event.filters).arguments.get(name, "")
-    sensors = {block_type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"}
+    sensor_block_types = {
+        block_type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"
+    }
     values: dict[str, None] = {}
     for workspace in workspaces:
         for block in saved_blocks(workspace):
-            if block.get("type") == hat and _fields(block).get("ROBOT", robot.name) == robot.name:
+            if (
+                block.get("type") == event_block_type
+                and _fields(block).get("ROBOT", robot.name) == robot.name
+            ):
                 values[str(_fields(block).get(argument) or "").strip()] = None
             else:
-                values.update(dict.fromkeys(_compared_texts(block, sensors)))
+                values.update(dict.fromkeys(_compared_texts(block, sensor_block_types)))
     parameter = next((each for each in event.fields if each.name == name), None)
     if parameter is not None and isinstance(parameter.default, str):
         values[parameter.default] = None
     return tuple(value for value in values if MIN_LENGTH <= len(value) <= MAX_LENGTH)[:MAX_VALUES]
 
 
-def _compared_texts(block: Mapping[str, object], sensors: set[str]) -> list[str]:
+def _compared_texts(block: Mapping[str, object], sensor_block_types: set[str]) -> list[str]:
     # Texts compared with a sensor in one block: “last word heard” = “yes”.
     inputs = block.get("inputs")
     connected: list[Mapping[str, object]] = []
@@ -50,7 +55,7 @@ def _compared_texts(block: Mapping[str, object], sensors: set[str]) -> list[str]
         child = connection.get("block", connection.get("shadow")) if isinstance(connection, Mapping) else None
         if isinstance(child, Mapping):
             connected.append(child)
-    if not any(each.get("type") in sensors for each in connected):
+    if not any(each.get("type") in sensor_block_types for each in connected):
         return []
     texts = [_fields(each).get("TEXT") for each in connected]
     return [text.strip() for text in texts if isinstance(text, str)]

@@ -30,13 +30,15 @@ class CommandPublishers:
         link.is_opening = True
 
         def open_job(node: Node) -> None:
-            native = link.robot.dialect == "native"
+            is_native = link.robot.dialect == "native"
             try:
                 if link.robot.topics != topics:
                     return  # the description changed; the next graph opens the new topics
-                world = node.new_pub(topics.world, "json") if topics.world is not None else None
-                link.world_publisher = world
-                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
+                world_publisher = node.new_pub(topics.world, "json") if topics.world is not None else None
+                link.world_publisher = world_publisher
+                link.publisher = node.new_pub(
+                    topics.command, COMMAND_TYPE if is_native else "json", batch=False
+                )
             finally:
                 link.is_opening = False
 
@@ -62,7 +64,7 @@ class CommandPublishers:
 
 
 def _failure_text(template: str, link: RobotLink) -> str:
-    # Template for `Source.submit`, which inserts only the error. Braces in the name stay what they are.
+    # Template for `Source.submit`, which inserts only the error. Braces in the name are escaped.
     return template.format(robot=link.name.replace("{", "{{").replace("}", "}}"), error="{error}")
 
 

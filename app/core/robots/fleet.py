@@ -70,18 +70,18 @@ class Fleet:
         self._senders = Senders()
         self._own_filter = OwnMessageFilter(self._senders, self._links)
         self._announcements = Announcements(watches, self._senders, clock, self._must_keep_topic)
-        self._unlisted: tuple[StopTarget, ...] = ()
+        self._unlisted_targets: tuple[StopTarget, ...] = ()
         self._settings = settings
-        self._names: dict[str, str] = {}
+        self._names_by_topic: dict[str, str] = {}
         self._foreign_claims: dict[str, Claim] = {}
-        self._notes: list[str] = []
+        self._notices: list[str] = []
         self._rize_names = RizeNames()
         self._rize_events: Watch | None = None
         self._heartbeat = Heartbeat(SENDER, "studio-alive")
         self.permission = MotionPermission(settings, self._identity_of)
-        self.known = KnownRobots(settings)
-        self._movable = MovableRobots(self._links, self._names)
-        self.gate = MotionGate(self.permission, self._movable)
+        self.known_robots = KnownRobots(settings)
+        self._movable_robots = MovableRobots(self._links, self._names_by_topic)
+        self.gate = MotionGate(self.permission, self._movable_robots)
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own_filter.other_programs)
         """Robots that may move, and so must be named by a Stop."""
@@ -90,9 +90,9 @@ class Fleet:
         self._selected_name = ""
         self._has_graph = False
         self.revision = 0
-        self.stops = 0
+        self.stop_count = 0
         """Number of stops sent to robots so far."""
-        self.used: Callable[[], Collection[str]] = tuple
+        self.robots_in_use: Callable[[], Collection[str]] = tuple
         """Returns the names of the robots that the running program uses."""
 
     @property
@@ -108,7 +108,7 @@ class Fleet:
     @property
     def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots, including robots whose descriptions can't be read."""
-        return self._movable.moving_topics
+        return self._movable_robots.moving_topics
 
     def is_present(self, name: str) -> bool | None:
         """Return True if a robot with this name is connected or announced; None before the first graph."""
@@ -125,7 +125,7 @@ class Fleet:
 
     @property
     def current(self) -> RobotLink | None:
-        """Robot shown by panels that show one robot, or None if there is none.
+        """Robot shown by panels that display a single robot, or None if there is none.
 
         This is the chosen robot if it is connected, else a connected virtual robot, else the first
         connected robot, else the chosen robot although it is disconnected.
@@ -137,7 +137,7 @@ class Fleet:
         return next((link for link in connected if link.is_virtual), connected[0] if connected else chosen)
 
     def select(self, name: str) -> None:
-        """Choose the robot that is shown by panels that show one robot."""
+        """Select the robot for panels that display a single robot."""
         if name != self._selected_name:
             self._selected_name = name
             self.revision += 1
@@ -168,20 +168,20 @@ class Fleet:
                 sent.
         """
         link = self._get_link(name)
-        described = link.robot.action(action)
-        if described is None:
+        description = link.robot.action(action)
+        if description is None:
             raise RobotInputError((_("{robot} has no action “{action}”").format(robot=name, action=action),))
-        problems = described.check(input)
+        problems = description.check(input)
         if problems:
-            raise RobotInputError(problems, described.problems(input))
+            raise RobotInputError(problems, description.problems(input))
         if not self.permission.request_permission(
             [(link.robot, [action])], lambda: self._retry_invoke(name, action, input)
         ):
             raise MayNotMoveError([name])
-        invocation = self._invocations.start(link, described, input)
+        invocation = self._invocations.start(link, description, input)
         if invocation.is_running:  # a speed continues after its final reply: only a Stop ends it
             self.moved.record_command(
-                [name], "form", id="" if described.repeat_s is not None else invocation.id
+                [name], "form", id="" if description.repeat_s is not None else invocation.id
             )
         if invocation.is_running and link.publisher is not None and link.robot.dialect == "native":
             self._heartbeat.start(name, link.publisher.publish)
@@ -227,13 +227,13 @@ class Fleet:
         """True if virtual robots move to their start position when a behaviour starts."""
         return self._settings is None or self._settings.get(RESET_SETTING, True)
 
-    def set_resets_at_start(self, *, begins: bool) -> None:
+    def set_resets_at_start(self, *, is_enabled: bool) -> None:
         """Set and save `resets_at_start`; without settings, do nothing.
 
         Raises SettingsError if the settings can't be written.
         """
         if self._settings is not None:
-            self._settings.set(RESET_SETTING, begins)
+            self._settings.set(RESET_SETTING, is_enabled)
 
     def return_to_start(self, names: Iterable[str]) -> None:
         """If `resets_at_start` is set, move the virtual robots among ``names`` to their start position."""
@@ -248,7 +248,7 @@ class Fleet:
 
     def mark_stopping(self, names: Iterable[str]) -> None:
         """Set robots to the state "stopping", until `apply_stop` applies the result of the Stop."""
-        self.stops += 1
+        self.stop_count += 1
         for link in map(self._links.get, names):
             if link is not None and link.pending_stop_start_s is None:
                 link.pending_stop_start_s = self._clock()
@@ -266,13 +266,13 @@ class Fleet:
     @property
     def stoppable_robots(self) -> tuple[str, ...]:
         """Names of the robots whose replies a Stop of all robots waits for."""
-        unlisted = (target.robot.name for target in self._unlisted if target.is_expected)
+        unlisted = (target.robot.name for target in self._unlisted_targets if target.is_expected)
         return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names, *unlisted)))
 
     @property
     def stop_targets(self) -> tuple[StopTarget, ...]:
         """Targets of a Stop of all robots, including robots whose replies are not awaited."""
-        return targets_of(self._links.values(), self.moved, self._unlisted)
+        return targets_of(self._links.values(), self.moved, self._unlisted_targets)
 
     @staticmethod
     def _is_responsive(link: RobotLink | None) -> bool:
@@ -317,22 +317,24 @@ class Fleet:
 
     def update(self, view: GraphView) -> None:
         """Apply a new graph, by which robots are connected, replaced or disconnected."""
-        self._has_graph, before = True, self._own_filter.view
-        self._movable.view = view
+        self._has_graph, previous_view = True, self._own_filter.view
+        self._movable_robots.view = view
         self._own_filter.update(view)
         self._announcements.update(view)
         topics = (self._own_filter.topics(link.robot) for link in self._links.values())
         self._senders.update(view, {rize.ANSWERS}.union(*topics))
         self._update_announced_robots()
         announcements = self._announcements
-        self._unlisted = (
+        self._unlisted_targets = (
             *unlisted_targets(view, announcements.omitted_topics),
             *unlisted_targets(view, announcements.unreadable_topics, is_expected=False),
         )
         self._update_rize(view)
-        commanded = map(self._links.get, self.moved.recently_commanded)
-        newcomers = {link.name: self._own_filter.new_programs(link, before) for link in commanded if link}
-        self.moved.record_new_programs(newcomers)
+        commanded_links = map(self._links.get, self.moved.recently_commanded)
+        new_programs = {
+            link.name: self._own_filter.new_programs(link, previous_view) for link in commanded_links if link
+        }
+        self.moved.record_new_programs(new_programs)
         self._messages.apply_held_replies(self._links)
         for link in self._links.values():
             if link.is_connected and link.publisher is None:
@@ -351,8 +353,10 @@ class Fleet:
                 self._rize_names.add(name)
         for link in self._links.values():
             self._messages.read(link, batches)
-            began_s = link.pending_stop_start_s
-            link.is_stopping = began_s is not None and self._clock() - began_s >= STOPPING_DISPLAY_DELAY_S
+            stop_start_s = link.pending_stop_start_s
+            link.is_stopping = (
+                stop_start_s is not None and self._clock() - stop_start_s >= STOPPING_DISPLAY_DELAY_S
+            )
         self._invocations.check_timeouts(self._links.values())
         self.gate.update()
         for link in self._links.values():
@@ -368,12 +372,12 @@ class Fleet:
 
     def take_notices(self) -> tuple[str, ...]:
         """Return and clear the notices for the user about restarted robots."""
-        notes, self._notes = tuple(self._notes), []
-        return notes
+        notices, self._notices = tuple(self._notices), []
+        return notices
 
     def close(self) -> None:
         """Record the connected robots as known, stop the heartbeat, and close the command publishers."""
-        self.known.record([link.robot for link in self.connected])
+        self.known_robots.record([link.robot for link in self.connected])
         self._heartbeat.close()
         for link in self._links.values():
             close_publishers(link)
@@ -405,7 +409,7 @@ class Fleet:
         link.motion_warning = motion.reason if motion is not None and not self._is_responsive(link) else ""
 
     def _must_keep_topic(self, topic: str) -> bool:
-        link = self._links.get(self._names.get(topic, ""))
+        link = self._links.get(self._names_by_topic.get(topic, ""))
         return link is not None and (link.has_confirmed_stop or link.name in self.moved)
 
     def _get_link(self, name: str) -> RobotLink:
@@ -430,12 +434,12 @@ class Fleet:
     def _update_announced_robots(self) -> None:
         # Connects announced robots; disconnects those whose program is no longer listed.
         announced = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
-        for topic, name in list(self._names.items()):
-            link, now = self._links.get(name), announced.get(topic)
+        for topic, name in list(self._names_by_topic.items()):
+            link, newest = self._links.get(name), announced.get(topic)
             if link is None or not link.is_connected:
                 continue
-            is_same = now is not None and now[0].name == name and now[1] == link.identity
-            if not is_same and not (now is None and self._is_listed(topic, link)):
+            is_same = newest is not None and newest[0].name == name and newest[1] == link.identity
+            if not is_same and not (newest is None and self._is_listed(topic, link)):
                 self._disconnect(link)
         for topic in self._foreign_claims.keys() - announced.keys():
             del self._foreign_claims[topic]
@@ -476,7 +480,7 @@ class Fleet:
         link = self._links.get(robot.name)
         was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
         if identity is not None:
-            self._names[topic] = robot.name
+            self._names_by_topic[topic] = robot.name
             is_virtual = not was_real and self._processes.is_started_by_studio(identity)
             robot = replace(robot, virtual=is_virtual)
         if link is None:
@@ -485,32 +489,32 @@ class Fleet:
             return
         self._apply_identity(link, identity)
         link.was_real = was_real
-        before, link.robot = link.robot, robot
+        previous, link.robot = link.robot, robot
         link.is_connected, link.gone_s = True, None
-        if before.topics != robot.topics or before.dialect != robot.dialect:
-            if before.dialect == robot.dialect:
-                earlier_topics = dict.fromkeys((*link.earlier_topics, before.topics))
+        if previous.topics != robot.topics or previous.dialect != robot.dialect:
+            if previous.dialect == robot.dialect:
+                earlier_topics = dict.fromkeys((*link.earlier_topics, previous.topics))
                 link.earlier_topics = tuple(earlier_topics)[:MAX_TOPICS]
             self._close_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.reply])
         self._senders.update(self._own_filter.view, self._own_filter.topics(robot))
         self._publishers.open(link)
-        self.known.record([robot])
+        self.known_robots.record([robot])
         self.revision += 1
 
     def _apply_identity(self, link: RobotLink, identity: Identity | None) -> None:
         # The previous program may still run on another computer and move the robot.
-        before, link.identity = link.identity, identity
-        if before is None or identity is None or before.node_id == identity.node_id:
+        previous, link.identity = link.identity, identity
+        if previous is None or identity is None or previous.node_id == identity.node_id:
             return
-        link.rejected, link.errors = ReportedCount(), ReportedCount()
-        self._notes.append(
+        link.rejected_messages, link.driver_exceptions = ReportedCount(), ReportedCount()
+        self._notices.append(
             _("{robot} was restarted as {now} (previously {before})").format(
-                robot=link.name, now=identity.display_name, before=before.display_name
+                robot=link.name, now=identity.display_name, before=previous.display_name
             )
         )
-        self._record_unended_actions(link, before)
+        self._record_unended_actions(link, previous)
         self._drop_ended(link)
 
     def _close_topics(self, link: RobotLink) -> None:
@@ -534,7 +538,7 @@ class Fleet:
     def _disconnect(self, link: RobotLink) -> None:
         link.is_connected, link.gone_s = False, self._clock()
         self._record_unended_actions(link, link.identity)
-        self.known.record([link.robot])
+        self.known_robots.record([link.robot])
         self._heartbeat.stop(link.name)
         if link.watch is not None:
             link.watch.close()
@@ -549,11 +553,11 @@ class Fleet:
 
     def _evict_disconnected(self) -> None:
         # Limits disconnected robots: any program can announce any number of names.
-        in_use = {self._selected_name, *self.used(), *self.moved.names}
+        in_use = {self._selected_name, *self.robots_in_use(), *self.moved.names}
         for link in excess_disconnected(self._links.values(), in_use):
             del self._links[link.name]
-            for topic in [topic for topic, name in self._names.items() if name == link.name]:
-                del self._names[topic]
+            for topic in [topic for topic, name in self._names_by_topic.items() if name == link.name]:
+                del self._names_by_topic[topic]
             self._messages.discard(link.name)
             self._publishers.close(link)
             self.revision += 1

@@ -52,12 +52,12 @@ class Health:
 
     def __init__(self, topics: Topics, fleet: Fleet, alerts: Alerts, clock: Callable[[], float]) -> None:
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
-        self._from_graph: set[str] = set()
-        self._claims: set[str] = set()
-        self._unreachable: set[str] = set()
+        self._graph_alert_ids: set[str] = set()
+        self._claim_ids: set[str] = set()
+        self._unreachable_names: set[str] = set()
         self._bad_topics: dict[str, _BadTopic] = {}
-        self._gone_since: dict[str, float] = {}
-        self._robots: set[str] = set()
+        self._gone_since_s: dict[str, float] = {}
+        self._robot_names: set[str] = set()
 
     def update(self, results: Mapping[str, CheckResult]) -> None:
         """Raise alerts about topics with undecodable messages.
@@ -68,30 +68,30 @@ class Health:
         Args:
             results: Results of the decode checks, by topic.
         """
-        for topic, checked in results.items():
+        for topic, result in results.items():
             bad_topic = self._bad_topics.get(topic)
-            if bad_topic is None and checked.bad_count:
+            if bad_topic is None and result.bad_count:
                 bad_topic = self._bad_topics[topic] = _BadTopic()
             if bad_topic is None:
                 continue
-            bad_topic.has_recovered = checked.is_newest_readable
-            bad_topic.unchecked_count += checked.unchecked_count
-            if checked.bad_count:
+            bad_topic.has_recovered = result.is_newest_readable
+            bad_topic.unchecked_count += result.unchecked_count
+            if result.bad_count:
                 bad_topic.last_error_s = self._clock()
-                bad_topic.count += checked.bad_count
-                self._alert_bad_topic(topic, bad_topic, checked)
+                bad_topic.count += result.bad_count
+                self._alert_bad_topic(topic, bad_topic, result)
 
     def discard(self, topic: str) -> None:
         """Discard the problems of a topic that is no longer watched or has recovered."""
         self._bad_topics.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
 
-    def check(self, used_names: Container[str] = (), started: Container[str] = ()) -> None:
+    def check(self, used_names: Container[str] = (), started_names: Container[str] = ()) -> None:
         """Update all alerts. Called once a second.
 
         Args:
             used_names: Names of the robots that a program uses.
-            started: Names of the virtual robots that this Studio started and that are still running.
+            started_names: Names of the virtual robots that this Studio started and that are still running.
         """
         now = self._clock()
         for topic in [
@@ -107,7 +107,7 @@ class Health:
             self._check_motion(link)
             self._check_driver(link, now)
             if link.is_connected:
-                self._gone_since.pop(link.name, None)
+                self._gone_since_s.pop(link.name, None)
                 self._alerts.resolve(f"robot:{link.name}")
             elif link.name in used_names:
                 self._alerts.raise_alert(
@@ -122,7 +122,7 @@ class Health:
                     count=0,
                 )
             else:
-                self._check_presence(link, now, runs_here=link.name in started)
+                self._check_presence(link, now, is_running_here=link.name in started_names)
 
     def report_journal_problem(self, reason: str | None) -> None:
         """Raise or resolve the alert that unsaved work can't be backed up.
@@ -160,7 +160,9 @@ class Health:
             DISCARD_ALERT,
             "error",
             _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
-            _("{why}. Close again to discard it.").format(why=f"{reason[0].upper()}{reason[1:]}"),
+            _("{why}. Close Studio again to discard the work.").format(
+                why=f"{reason[0].upper()}{reason[1:]}"
+            ),
             button=_("Save somewhere else"),
             action="file.save_as",
             count=0,
@@ -184,13 +186,13 @@ class Health:
             count=0,
         )
 
-    def report_executable_state(self, fate: ExecutableState) -> None:
+    def report_executable_state(self, state: ExecutableState) -> None:
         """Raise or resolve the alert that Studio's executable file was replaced or removed.
 
         Args:
-            fate: State of the file, see `OwnProgram.executable_state`.
+            state: State of the file, see `OwnProgram.executable_state`.
         """
-        if fate == "replaced":
+        if state == "replaced":
             self._alerts.raise_alert(
                 INSTALLATION_ALERT,
                 "warn",
@@ -198,7 +200,7 @@ class Health:
                 _("Save your behaviours and restart Studio: until then, parts of it may not open."),
                 count=0,
             )
-        elif fate == "gone":
+        elif state == "gone":
             self._alerts.raise_alert(
                 INSTALLATION_ALERT,
                 "error",
@@ -223,9 +225,9 @@ class Health:
         if ports:
             ids.add(PORTS_ALERT)
             self._alert_ports(ports)
-        for alert_id in self._from_graph - ids:
+        for alert_id in self._graph_alert_ids - ids:
             self._alerts.resolve(alert_id)
-        self._from_graph = ids
+        self._graph_alert_ids = ids
 
     def _alert_ports(self, port_alerts: Sequence[Alert]) -> None:
         # One alert for all occupied ports of the original NEP: only its programs need them.
@@ -236,22 +238,22 @@ class Health:
             )
             title = _("Other programs are using ports {ports}.").format(ports=format_list(numbers))
             detail = _("Programs of the original NEP can't connect. The connection doctor shows the cause.")
-        step = _(OPEN_DOCTOR_LABEL)
+        button = _(OPEN_DOCTOR_LABEL)
         self._alerts.raise_alert(
             PORTS_ALERT,
             "warn",
             title,
             detail,
-            button=step,
+            button=button,
             action="help.doctor",
             count=0,
             for_developers=True,
         )
 
-    def _alert_bad_topic(self, topic: str, bad_topic: _BadTopic, checked: CheckResult) -> None:
+    def _alert_bad_topic(self, topic: str, bad_topic: _BadTopic, result: CheckResult) -> None:
         title = ngettext(
-            "{topic} sends messages that can't be decoded ({count} message).",
-            "{topic} sends messages that can't be decoded ({count} messages).",
+            "{count} message on {topic} can't be decoded.",
+            "{count} messages on {topic} can't be decoded.",
             bad_topic.count,
         )
         detail = (
@@ -259,7 +261,7 @@ class Health:
             if bad_topic.unchecked_count
             else _("{why} See the raw bytes in the Inspector.")
         )
-        reason = f"{checked.error[:1].upper()}{checked.error[1:]}."
+        reason = f"{result.error[:1].upper()}{result.error[1:]}."
         self._alerts.raise_alert(
             f"message:{topic}",
             "warn",
@@ -267,13 +269,13 @@ class Health:
             detail.format(why=reason, count=bad_topic.unchecked_count),
             button=_("Show"),
             action=f"inspect:{topic}",
-            count=checked.bad_count,
+            count=result.bad_count,
         )
 
-    def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
+    def _check_presence(self, link: RobotLink, now: float, *, is_running_here: bool) -> None:
         # A real robot that left, or a virtual one that hangs.
-        since = self._gone_since.setdefault(link.name, now)
-        if now - since < RESTART_TIMEOUT_S or (link.is_virtual and not runs_here):
+        since_s = self._gone_since_s.setdefault(link.name, now)
+        if now - since_s < RESTART_TIMEOUT_S or (link.is_virtual and not is_running_here):
             self._alerts.resolve(f"robot:{link.name}")
             return
         self._alerts.raise_alert(
@@ -283,7 +285,7 @@ class Health:
                 robot=link.name
             ),
             _(VIRTUAL_ROBOT_HINT if link.is_virtual else REAL_ROBOT_HINT),
-            button=_("Restart it") if link.is_virtual else _(OPEN_DOCTOR_LABEL),
+            button=_("Restart the robot") if link.is_virtual else _(OPEN_DOCTOR_LABEL),
             action=f"connect:{link.name}" if link.is_virtual else "help.doctor",
             count=0,
         )
@@ -291,19 +293,19 @@ class Health:
     def _discard_robots(self) -> None:
         # Resolves the alerts of robots that Studio has discarded.
         names = {link.name for link in self._fleet.links}
-        for name in self._robots - names:
-            self._gone_since.pop(name, None)
+        for name in self._robot_names - names:
+            self._gone_since_s.pop(name, None)
             for kind in ROBOT_ALERT_PREFIXES:
                 self._alerts.resolve(f"{kind}:{name}")
-        self._robots = names
+        self._robot_names = names
 
     def _check_claims(self) -> None:
         claims = self._fleet.claims
-        for id in self._claims - claims.keys():
+        for id in self._claim_ids - claims.keys():
             self._alerts.resolve(f"claim:{id}")
         for id, claim in claims.items():
             self._alerts.raise_alert(f"claim:{id}", "error", claim.title, claim.detail, count=0)
-        self._claims = set(claims)
+        self._claim_ids = set(claims)
 
     def update_unreachable(self, problems: Mapping[str, str]) -> None:
         """Raise alerts for robots that a Stop can't reach, and resolve those of all other robots.
@@ -311,7 +313,7 @@ class Health:
         Args:
             problems: Reason for each of these robots, by name.
         """
-        for name in self._unreachable - problems.keys():
+        for name in self._unreachable_names - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, reason in problems.items():
             detail = _("{why}. Studio tries again every second.").format(
@@ -319,7 +321,7 @@ class Health:
             )
             title = _("Stop can't reach {robot}.").format(robot=name)
             self._alerts.raise_alert(f"stop:{name}", "error", title, detail, count=0)
-        self._unreachable = set(problems)
+        self._unreachable_names = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
         # A robot that reports an action it couldn't end, or that may move and doesn't answer.
@@ -342,7 +344,7 @@ class Health:
 
     def _check_driver(self, link: RobotLink, now: float) -> None:
         # Resolved when the counts have not increased for a while.
-        rejected, errors = link.rejected, link.errors
+        rejected, errors = link.rejected_messages, link.driver_exceptions
         counters = {
             "rejected": (
                 rejected,
@@ -374,14 +376,14 @@ class Health:
         id = f"camera:{link.name}"
         camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
         topic = self._topics.get(camera.topic) if camera is not None else None
-        silent = (
+        is_silent = (
             link.is_connected
             and topic is not None
-            and topic.gone_since is None
+            and topic.gone_since_s is None
             and topic.silent_s is not None
             and topic.silent_s > SILENCE_TIMEOUT_S
         )
-        if not silent or topic is None or topic.silent_s is None:
+        if not is_silent or topic is None or topic.silent_s is None:
             link.silence_reason = None
             self._alerts.resolve(id)
             return

@@ -25,7 +25,7 @@ WARM_MOTOR_C = 60
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = plazy("row of a table", "Stop"), lazy("Camera"), lazy("Sensors")
 REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
-SAFETY_STOP, HEARTBEAT = lazy("Safety stop"), lazy("Last response")
+SAFETY_STOP, HEARTBEAT = lazy("Safety stop"), lazy("Heartbeat")
 REPORTED_TITLES = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
 FormatAge = Callable[[float], str]
@@ -51,24 +51,29 @@ class HealthItem:
         return self.status in ("warn", "error")
 
 
-def health_items(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) -> tuple[HealthItem, ...]:
+def health_items(
+    link: RobotLink, topics: Topics, now: float, format_age: FormatAge
+) -> tuple[HealthItem, ...]:
     """Return the health of a robot; items that need attention come first.
 
     Args:
         link: State of the robot.
         topics: Topics of the live network.
         now: Monotonic seconds, on the same clock as the times in ``link``.
-        age_words: Formats a duration, such as "14 s".
+        format_age: Formats a duration, such as "14 s".
     """
-    items = [_connection(link, now, age_words)]
+    items = [_connection(link, now, format_age)]
     if link.is_connected:
         items += [*_battery(link), *_temperature(link)]
     items.append(_stop(link))
     if link.is_connected:
-        items += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
-        items += [*_count_items(REJECTED, link.rejected, now), *_count_items(ERRORS, link.errors, now)]
+        items += [*_camera(link, topics, format_age), *_sensors(link, topics, format_age)]
+        items += [
+            *_count_items(REJECTED, link.rejected_messages, now),
+            *_count_items(ERRORS, link.driver_exceptions, now),
+        ]
     items += [_watchdog_item(link), *_heartbeat_items(link)]
-    return tuple(sorted(items, key=lambda fact: not fact.needs_attention))
+    return tuple(sorted(items, key=lambda item: not item.needs_attention))
 
 
 def has_reported(link: RobotLink, items: Sequence[HealthItem]) -> bool:
@@ -78,8 +83,8 @@ def has_reported(link: RobotLink, items: Sequence[HealthItem]) -> bool:
     )
 
 
-def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthItem:
-    age = age_words(now - link.last_reply_s) if link.last_reply_s is not None else ""
+def _connection(link: RobotLink, now: float, format_age: FormatAge) -> HealthItem:
+    age = format_age(now - link.last_reply_s) if link.last_reply_s is not None else ""
     if not link.is_connected:
         if link.gone_s is None:
             template = (
@@ -93,7 +98,7 @@ def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthItem
             if link.is_virtual
             else _("disconnected {age} ago; check that it is switched on")
         )
-        return HealthItem(CONNECTION, "warn", template.format(age=age_words(now - link.gone_s)))
+        return HealthItem(CONNECTION, "warn", template.format(age=format_age(now - link.gone_s)))
     if link.is_unresponsive:
         return HealthItem(CONNECTION, "error", _unresponsive_text(link, age))
     template = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
@@ -149,8 +154,8 @@ def _temperatures(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tupl
     if sensor.unit == "°C" and degrees is not None:
         yield degrees, sensor.title
     for field in sensor.fields:
-        inner = value.get(field.name) if isinstance(value, Mapping) else None
-        degrees = finite_float(inner)
+        nested_value = value.get(field.name) if isinstance(value, Mapping) else None
+        degrees = finite_float(nested_value)
         if field.unit == "°C" and degrees is not None:
             yield degrees, field.title
 
@@ -170,50 +175,52 @@ def _stop(link: RobotLink) -> HealthItem:
     return HealthItem(STOP, "off", text)
 
 
-def _camera(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthItem]:
+def _camera(link: RobotLink, topics: Topics, format_age: FormatAge) -> Iterable[HealthItem]:
     camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
     if camera is None:
         return
     topic = topics.get(camera.topic)
     if link.silence_reason is not None and topic is not None and topic.silent_s is not None:
-        yield HealthItem(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
+        yield HealthItem(CAMERA, "error", _("silent for {age}").format(age=format_age(topic.silent_s)))
     elif topic is not None and topic.rate_hz:
         rate = round(topic.rate_hz)
         template = ngettext("sends {rate} image per second", "sends {rate} images per second", rate)
         yield HealthItem(CAMERA, "ok", template.format(rate=rate))
-    elif topic is not None and topic.gone_s is None and topic.subscribed_since is None:
+    elif topic is not None and topic.gone_s is None and topic.subscribed_since_s is None:
         yield HealthItem(CAMERA, "off", _("ready (not in use)"))
     else:
         yield HealthItem(CAMERA, "off", _("no image yet"))
 
 
-def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthItem]:
-    felt = [sensor for sensor in link.robot.sensors if not sensor.is_image]
-    silent = [(sensor, topic) for sensor in felt if _is_silent(sensor, topic := topics.get(sensor.topic))]
-    if not felt:
+def _sensors(link: RobotLink, topics: Topics, format_age: FormatAge) -> Iterable[HealthItem]:
+    sensors = [sensor for sensor in link.robot.sensors if not sensor.is_image]
+    silent = [(sensor, topic) for sensor in sensors if _is_silent(sensor, topic := topics.get(sensor.topic))]
+    if not sensors:
         return
     if silent:
-        age = age_words(max(topic.silent_s or 0.0 for _sensor, topic in silent if topic is not None))
-        first, more = silent[0][0].title, len(silent) - 1
+        age = format_age(max(topic.silent_s or 0.0 for _sensor, topic in silent if topic is not None))
+        first_title, other_count = silent[0][0].title, len(silent) - 1
         template = (
-            _("{sensor} silent for {age}") if not more else _("{sensor} and {more} more silent for {age}")
+            _("{sensor} silent for {age}")
+            if not other_count
+            else _("{sensor} and {more} more silent for {age}")
         )
-        yield HealthItem(SENSORS, "warn", template.format(sensor=first, more=more, age=age))
+        yield HealthItem(SENSORS, "warn", template.format(sensor=first_title, more=other_count, age=age))
         return
-    sent = sum(1 for sensor in felt if _has_sent(topics.get(sensor.topic)))
-    if not sent:
-        template = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(felt))
-        yield HealthItem(SENSORS, "off", template.format(count=len(felt)))
-    elif sent < len(felt):
+    sent_count = sum(1 for sensor in sensors if _has_sent(topics.get(sensor.topic)))
+    if not sent_count:
+        template = ngettext("has sent nothing yet", "none of {count} has sent anything yet", len(sensors))
+        yield HealthItem(SENSORS, "off", template.format(count=len(sensors)))
+    elif sent_count < len(sensors):
         yield HealthItem(
-            SENSORS, "ok", _("{sent} of {count} have sent data").format(sent=sent, count=len(felt))
+            SENSORS, "ok", _("{sent} of {count} have sent data").format(sent=sent_count, count=len(sensors))
         )
     else:
         yield HealthItem(
             SENSORS,
             "ok",
-            ngettext("{count} sensor is sending", "all {count} are sending", len(felt)).format(
-                count=len(felt)
+            ngettext("{count} sensor is sending", "all {count} are sending", len(sensors)).format(
+                count=len(sensors)
             ),
         )
 
@@ -231,16 +238,20 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
 
 def _count_items(title: str, count: ReportedCount, now: float) -> Iterable[HealthItem]:
     if count.is_growing(now):
-        yield HealthItem(title, "warn", _("{count} so far; see its log").format(count=count.value))
+        yield HealthItem(title, "warn", _("{count} so far; see the driver's log").format(count=count.value))
     elif count.value:
-        yield HealthItem(title, "off", _("{count} since it started").format(count=count.value))
+        yield HealthItem(title, "off", _("{count} since the driver started").format(count=count.value))
 
 
 def _watchdog_item(link: RobotLink) -> HealthItem:
-    after = link.robot.safe_stop.watchdog_s
-    if after is None:
-        return HealthItem(SAFETY_STOP, "off", _("keeps moving; stay near its power switch"))
-    return HealthItem(SAFETY_STOP, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
+    watchdog_s = link.robot.safe_stop.watchdog_s
+    if watchdog_s is None:
+        return HealthItem(SAFETY_STOP, "off", _("none; stay near the robot's power switch"))
+    return HealthItem(
+        SAFETY_STOP,
+        "ok",
+        _("stops {seconds} s after its program disappears").format(seconds=number(watchdog_s)),
+    )
 
 
 def _heartbeat_items(link: RobotLink) -> Iterable[HealthItem]:

@@ -30,12 +30,12 @@ class ManualInvocations:
     def __init__(
         self,
         send: Callable[[RobotLink, Payload], bool],
-        rest: Callable[[str], None],
+        on_idle: Callable[[str], None],
         clock: Callable[[], float],
-        wall: Callable[[], float] = time.time,
+        wall_clock: Callable[[], float] = time.time,
     ) -> None:
-        # `send` sends a command to a robot; `rest` is called with its name once it is idle.
-        self._send, self._on_idle, self._clock, self._wall = send, rest, clock, wall
+        # `send` sends a command to a robot; `on_idle` is called with its name once it is idle.
+        self._send, self._on_idle, self._clock, self._wall_clock = send, on_idle, clock, wall_clock
 
     def start(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
         """Send an invocation and return its state.
@@ -49,7 +49,7 @@ class ManualInvocations:
             clock=self._clock,
             input=dict(input),
             timeout_s=action.timeout_s,
-            sent_at_s=self._wall(),
+            sent_at_s=self._wall_clock(),
         )
         link.invocations[action.name] = invocation
         link.past_invocations.append(invocation)
@@ -119,19 +119,19 @@ class ManualInvocations:
                     _("{robot} isn't responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
-        silence = (
+        max_silence_s = (
             max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s)
             if robot.heartbeat_interval_s
             else None
         )
-        if silence is not None and now - link.last_contact_s > silence:
+        if max_silence_s is not None and now - link.last_contact_s > max_silence_s:
             error = _(
                 "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
             ).format(robot=link.name)
             self._mark_unresponsive(link, invocation, error)
             return
-        left_s = invocation.remaining_s
-        if left_s is not None and left_s < -GRACE_S:
+        remaining_s = invocation.remaining_s
+        if remaining_s is not None and remaining_s < -GRACE_S:
             link.is_unresponsive = True  # until it replies
             self._send_cancel(link, invocation)
             self._end(

@@ -50,8 +50,8 @@ class KnownRobots:
         names = [robot.name for robot in robots if not robot.virtual]
         if names:
             now = self._clock()
-            others = [robot for robot in self.robots if robot.name not in names]
-            self._save([*(KnownRobot(name, now) for name in names), *others])
+            other_robots = [robot for robot in self.robots if robot.name not in names]
+            self._save([*(KnownRobot(name, now) for name in names), *other_robots])
 
     def discard(self, name: str) -> None:
         """Remove a robot from the list. It is added again when it connects."""
@@ -61,7 +61,8 @@ class KnownRobots:
         if self._settings is None:
             return
         entries = [{"name": robot.name, "seen_s": robot.last_connected_s} for robot in robots[:MAX_ROBOTS]]
-        # Only an entry of a list is lost, and saving other settings alerts problems of the same file.
+        # At most an entry of this list is lost. Problems with the file are reported when other settings are
+        # saved.
         with contextlib.suppress(SettingsError):
             self._settings.set(SETTING_KEY, entries)
 

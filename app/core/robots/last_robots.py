@@ -28,7 +28,7 @@ class LastRobots:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._saved: dict[str, str] = {}
+        self._saved_models: dict[str, str] = {}
 
     @property
     def is_restart_enabled(self) -> bool:
@@ -57,7 +57,7 @@ class LastRobots:
         Called during the session, so that the names survive a crash. The settings report errors
         themselves.
         """
-        if launcher.models_by_name != self._saved:
-            self._saved = dict(launcher.models_by_name)
+        if launcher.models_by_name != self._saved_models:
+            self._saved_models = dict(launcher.models_by_name)
             with suppress(SettingsError):
-                self._settings.set(ROBOTS_SETTING, dict(self._saved))
+                self._settings.set(ROBOTS_SETTING, dict(self._saved_models))

@@ -129,19 +129,19 @@ class Launcher:
         self._clock = clock
         self._start = start
         self._requests: dict[str, _StartRequest] = {}
-        self._starting: dict[str, float] = {}  # end of the starting state, by the robot's name
+        self._starting_deadlines_s: dict[str, float] = {}  # end of the starting state, by the robot's name
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
         self.models_by_name: dict[str, str] = {}
         """Virtual robots that the user started here and did not stop, with their models."""
-        self.ended: frozenset[str] = frozenset()
+        self.ended_robots: frozenset[str] = frozenset()
         """Virtual robots started here whose processes ended unexpectedly."""
         title = (
             _("The master can't be started.") if is_loopback(address) else _("The master doesn't respond.")
         )
         self._master = MasterStarter(
-            address, lambda why: post_event(LaunchFailed("master", title, why, False))
+            address, lambda reason: post_event(LaunchFailed("master", title, reason, False))
         )
 
     @property
@@ -154,11 +154,11 @@ class Launcher:
     def starting_robots(self) -> tuple[str, ...]:
         """Names of the virtual robots that are starting."""
         now = self._clock()
-        return tuple(name for name, until in self._starting.items() if now < until)
+        return tuple(name for name, deadline_s in self._starting_deadlines_s.items() if now < deadline_s)
 
     def on_started(self, name: str) -> None:
         """Record that a robot has finished starting."""
-        self._starting.pop(name, None)
+        self._starting_deadlines_s.pop(name, None)
 
     @property
     def process_ids(self) -> tuple[int, ...]:
@@ -173,11 +173,11 @@ class Launcher:
 
     def ensure_master(self) -> None:
         """Start a master if none is running. Returns immediately; a failure is posted as `LaunchFailed`."""
-        self._master.ensure()
+        self._master.ensure_running()
 
     def ensure_master_with_backoff(self) -> None:
         """Call `ensure_master`, unless a failed start was too recent. Call this method repeatedly."""
-        self._master.ensure_with_backoff()
+        self._master.ensure_running_with_backoff()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
         """Request the start of a virtual robot, unless a robot with this name is listed.
@@ -188,7 +188,7 @@ class Launcher:
         """
         now = self._clock()
         self.models_by_name[name] = model
-        self._starting[name] = now + STARTUP_TIMEOUT_S
+        self._starting_deadlines_s[name] = now + STARTUP_TIMEOUT_S
         self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_LIFETIME_S)
         self.start_requested_robots()
 
@@ -225,7 +225,7 @@ class Launcher:
                 process = self._start(command, environment, log)
             except OSError as error:
                 log.close()
-                self._starting.pop(name, None)
+                self._starting_deadlines_s.pop(name, None)
                 self._post_event(
                     LaunchFailed(
                         name, _("The virtual robot {robot} can't be started.").format(robot=name), str(error)
@@ -233,7 +233,7 @@ class Launcher:
                 )
                 return
             self._robots[name] = (process, log)
-            self.ended -= {name}
+            self.ended_robots -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Restart a virtual robot. The process that this Studio started, if any, is killed."""
@@ -245,7 +245,7 @@ class Launcher:
             process_and_log[0].kill()
             process_and_log[0].wait()
             process_and_log[1].close()
-        self._starting[name] = self._clock() + STARTUP_TIMEOUT_S
+        self._starting_deadlines_s[name] = self._clock() + STARTUP_TIMEOUT_S
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
@@ -255,7 +255,7 @@ class Launcher:
 
     def _stop_robot(self, name: str) -> None:
         self._requests.pop(name, None)
-        self._starting.pop(name, None)
+        self._starting_deadlines_s.pop(name, None)
         with self._lock:
             process_and_log = self._robots.pop(name, None)
         if process_and_log is not None:
@@ -270,13 +270,15 @@ class Launcher:
                 if code is None:
                     continue
                 _process, log = self._robots.pop(name)
-                self.ended |= {name}
-                self._starting.pop(name, None)
+                self.ended_robots |= {name}
+                self._starting_deadlines_s.pop(name, None)
                 output, trace = split_trace(_read_tail(log))
                 if is_crash(code):
-                    how = f"the process of a virtual robot {exit_text(code)}"
+                    cause = f"the process of a virtual robot {exit_text(code)}"
                     _log.error(
-                        "%s", how, extra={**CONSOLE_EXTRA, **crash_extra("robot", how, f"{output}{trace}")}
+                        "%s",
+                        cause,
+                        extra={**CONSOLE_EXTRA, **crash_extra("robot", cause, f"{output}{trace}")},
                     )
                 self._post_event(
                     LaunchFailed(
@@ -323,9 +325,9 @@ def _read_tail(log: IO[bytes]) -> str:
 class VirtualProcesses:
     """Detection of the processes of virtual robots on this computer, with cached results. Not thread-safe."""
 
-    def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:
+    def __init__(self, modules: Collection[str], started_pids: Callable[[], Collection[int]] = tuple) -> None:
         self._modules = frozenset(modules)
-        self._started = started
+        self._started_pids = started_pids
         self._result_cache: dict[Identity, bool] = {}
 
     def is_started_by_studio(self, identity: Identity) -> bool:
@@ -361,10 +363,10 @@ class VirtualProcesses:
     def _is_own_process(self, pid: int) -> bool:
         import psutil  # noqa: PLC0415 (slow import)
 
-        started = set(self._started())
+        started_pids = set(self._started_pids())
         try:
             process = psutil.Process(pid)
-            if pid in started or any(parent.pid in started for parent in process.parents()):
+            if pid in started_pids or any(parent.pid in started_pids for parent in process.parents()):
                 return True
             return process.username() == psutil.Process().username() and self._is_virtual(process.cmdline())
         except psutil.Error:

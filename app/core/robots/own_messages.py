@@ -24,7 +24,7 @@ class OwnMessageFilter:
         self._senders, self._links = senders, links
         self.view = GraphView(0, 0)
         """Newest graph."""
-        self._lapsed: dict[str, dict[int, Identity]] = {}
+        self._suspended_programs: dict[str, dict[int, Identity]] = {}
         """Programs that left the graph but are still connected, by robot and subscriber id."""
 
     def update(self, view: GraphView) -> None:
@@ -33,22 +33,27 @@ class OwnMessageFilter:
         Programs that left the graph are remembered while they are still connected, because they may
         only be suspended.
         """
-        before, self.view = self.view, view
-        for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
-            topic, serving = before.topics.get(link.robot.topics.command), self._serving_nodes(link, before)
+        previous, self.view = self.view, view
+        for link in self._links.values() if previous.nodes.keys() - view.nodes.keys() else ():
+            topic, serving_nodes = (
+                previous.topics.get(link.robot.topics.command),
+                self._serving_nodes(link, previous),
+            )
             for subscriber in (
                 topic.subscribers if topic is not None and link.robot.dialect == "native" else ()
             ):
-                if subscriber.node_id in serving and subscriber.node_id not in view.nodes:
-                    self._lapsed.setdefault(link.name, {})[subscriber.id] = identity_of(
-                        before, subscriber.node_id
+                if subscriber.node_id in serving_nodes and subscriber.node_id not in view.nodes:
+                    self._suspended_programs.setdefault(link.name, {})[subscriber.id] = identity_of(
+                        previous, subscriber.node_id
                     )
-        for name, lapsed in list(self._lapsed.items()):
-            ended = lapsed.keys() - self._connected_ids(self._links.get(name))
-            for id in ended | {id for id, subscriber in lapsed.items() if subscriber.node_id in view.nodes}:
-                del lapsed[id]
-            if not lapsed:
-                del self._lapsed[name]
+        for name, programs in list(self._suspended_programs.items()):
+            ended_ids = programs.keys() - self._connected_ids(self._links.get(name))
+            for id in ended_ids | {
+                id for id, subscriber in programs.items() if subscriber.node_id in view.nodes
+            }:
+                del programs[id]
+            if not programs:
+                del self._suspended_programs[name]
 
     @staticmethod
     def _connected_ids(link: RobotLink | None) -> frozenset[int]:
@@ -75,27 +80,29 @@ class OwnMessageFilter:
         programs = [
             identity_of(self.view, node) for node in self._serving_nodes(link, self.view) if node != own_node
         ]
-        connected = self._connected_ids(link)
-        return programs + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
+        connected_ids = self._connected_ids(link)
+        return programs + [
+            each for id, each in self._suspended_programs.get(name, {}).items() if id in connected_ids
+        ]
 
-    def new_programs(self, link: RobotLink, before: GraphView) -> list[Identity]:
-        """Return the programs that serve the robot now but did not in the graph ``before``.
+    def new_programs(self, link: RobotLink, previous: GraphView) -> list[Identity]:
+        """Return the programs that serve the robot now but did not in the graph ``previous``.
 
         A program serves a robot if it receives the robot's commands and publishes replies.
         """
         if link.robot.dialect != "native":
             return []
-        earlier = self._serving_nodes(link, before)
+        earlier_nodes = self._serving_nodes(link, previous)
         return [
             identity_of(self.view, node)
             for node in self._serving_nodes(link, self.view)
-            if node not in earlier
+            if node not in earlier_nodes
         ]
 
     @staticmethod
     def _serving_nodes(link: RobotLink, view: GraphView) -> list[str]:
-        answering = publisher_nodes(view, link.robot.topics.reply)
-        return [node for node in subscriber_nodes(view, link.robot.topics.command) if node in answering]
+        replying_nodes = publisher_nodes(view, link.robot.topics.reply)
+        return [node for node in subscriber_nodes(view, link.robot.topics.command) if node in replying_nodes]
 
     def is_from_robot(self, link: RobotLink, message: Message) -> bool | None:
         """Return True if the robot's own program sent a message; None while the sender is unknown.

@@ -108,8 +108,8 @@ class RobotLink:
         identity: Program of the robot; None for a robot of RIZE.
         earlier_topics: Topics of the robot's earlier descriptions.
         is_opening: True while the publishers are being opened.
-        rejected: Number of messages that the robot's driver rejected.
-        errors: Number of exceptions that the robot's driver caught.
+        rejected_messages: Number of messages that the robot's driver rejected.
+        driver_exceptions: Number of exceptions that the robot's driver caught.
         was_real: True if the robot's program has ever described the robot as real.
     """
 
@@ -137,8 +137,8 @@ class RobotLink:
     identity: Identity | None = None
     earlier_topics: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
-    rejected: ReportedCount = field(default_factory=ReportedCount)
-    errors: ReportedCount = field(default_factory=ReportedCount)
+    rejected_messages: ReportedCount = field(default_factory=ReportedCount)
+    driver_exceptions: ReportedCount = field(default_factory=ReportedCount)
     was_real: bool = False
     publisher: Publisher | None = None
     world_publisher: Publisher | None = None
@@ -152,7 +152,7 @@ class RobotLink:
     @property
     def can_confirm_stop(self) -> bool:
         """True if the robot confirms that it has stopped. Robots of RIZE can't."""
-        return self.robot.safe_stop.confirmed
+        return self.robot.safe_stop.can_confirm
 
     @property
     def state(self) -> str:

@@ -29,13 +29,18 @@ class RobotMessages:
     def __init__(
         self,
         own_filter: OwnMessageFilter,
-        tries: ManualInvocations,
-        moved: MovedRobots,
+        invocations: ManualInvocations,
+        moved_robots: MovedRobots,
         clock: Callable[[], float],
     ) -> None:
-        self._own_filter, self._invocations, self._moved, self._clock = own_filter, tries, moved, clock
+        self._own_filter, self._invocations, self._moved_robots, self._clock = (
+            own_filter,
+            invocations,
+            moved_robots,
+            clock,
+        )
         self._pending_messages: dict[str, PendingMessages] = {}
-        self._settled: dict[str, None] = {}
+        self._settled_robots: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
         """Apply the replies, the newest sensor values and the newest drawing of a robot.
@@ -77,8 +82,8 @@ class RobotMessages:
 
     def pop_settled_robots(self) -> tuple[str, ...]:
         """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""
-        settled, self._settled = tuple(self._settled), {}
-        return settled
+        settled_robots, self._settled_robots = tuple(self._settled_robots), {}
+        return settled_robots
 
     def _apply_reply(self, link: RobotLink, message: Message) -> None:
         reply = decode_mapping(message)
@@ -100,19 +105,19 @@ class RobotMessages:
             return
         id, error = reply.get("id"), reply.get("error")
         if isinstance(id, str) and not is_may_move_error(link.name, safe_error_text(error) if error else ""):
-            self._moved.end_motion(link.name, id, link.identity)
+            self._moved_robots.end_motion(link.name, id, link.identity)
 
     def _apply_heartbeat(self, link: RobotLink, reply: Payload) -> None:
         # Drivers omit counts that are zero.
         now_s = self._clock()
-        link.rejected.update(reply.get("rejected", 0), now_s)
-        link.errors.update(reply.get("errors", 0), now_s)
+        link.rejected_messages.update(reply.get("rejected", 0), now_s)
+        link.driver_exceptions.update(reply.get("errors", 0), now_s)
         if "not_ended" not in reply:
             return
-        before, link.unended_actions = link.unended_actions, ""
+        previous_text, link.unended_actions = link.unended_actions, ""
         if reply["not_ended"]:
             link.unended_actions = stop_error_text(
                 link.name, reply.get("error") or _("an action is still running")
             )
-        elif before and link.stop_problem:
-            self._settled[link.name] = None
+        elif previous_text and link.stop_problem:
+            self._settled_robots[link.name] = None

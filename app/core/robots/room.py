@@ -74,9 +74,9 @@ class SessionRoom:
             y: New y coordinate in metres.
             robots: Position and radius (x, y, radius) of each robot in metres, by name.
         """
-        moved = self.room.with_moved(name, x, y).thing(name)
+        moved_object = self.room.with_moved(name, x, y).thing(name)
         for pose in robots.values():
-            if isinstance(moved, (Box, Person)) and _touches(moved, *pose):
+            if isinstance(moved_object, (Box, Person)) and _touches(moved_object, *pose):
                 return False
         return self._publish() if self._map.move(name, x, y) else False
 

@@ -109,16 +109,16 @@ class RobotSound:
     def parse(cls, drawing: Mapping[str, object]) -> RobotSound:
         """Parse the audible part of a drawing. Missing and malformed fields become silence."""
         speech, sound = drawing.get("speech"), drawing.get("sound")
-        played = sound if isinstance(sound, Mapping) else {}
-        number = played.get("number")
+        sound_fields = sound if isinstance(sound, Mapping) else {}
+        number = sound_fields.get("number")
         return cls(
             speech=speech.strip() if isinstance(speech, str) else "",
             spoken_fraction=_fraction(drawing.get("spoken")),
             language=str(drawing.get("language") or "en"),
             volume=_fraction(drawing.get("volume"), 60.0, 100.0),
             sound_number=number if isinstance(number, int) else 0,
-            played_fraction=_fraction(played.get("played")),
-            notes=_notes(played.get("notes")),
+            played_fraction=_fraction(sound_fields.get("played")),
+            notes=_notes(sound_fields.get("notes")),
         )
 
 
@@ -143,11 +143,11 @@ class RobotVoices:
         self.speaker: Speaker | None = None
         self._watches: dict[str, Watch] = {}
         self._last_drawings: dict[str, tuple[object, RobotSound]] = {}
-        self._waiting: deque[Utterance] = deque()
+        self._queue: deque[Utterance] = deque()
         self._current: Utterance | None = None
-        self._until_s = 0.0
+        self._voice_deadline_s = 0.0
         self._playing_robot = ""
-        self._stops = fleet.stops
+        self._known_stop_count = fleet.stop_count
 
     @property
     def is_on(self) -> bool:
@@ -188,82 +188,86 @@ class RobotVoices:
         for name in self._watches.keys() - links_by_name.keys():
             self._watches.pop(name).close()
             self._stop_interrupted(name, self._last_drawings.pop(name, (None, RobotSound()))[1], RobotSound())
-        stopped = self._fleet.stops != self._stops
-        if stopped:
-            self._stops = self._fleet.stops
+        was_stopped = self._fleet.stop_count != self._known_stop_count
+        if was_stopped:
+            self._known_stop_count = self._fleet.stop_count
             self.silence()
         for name, link in links_by_name.items():
             if name not in self._watches and link.robot.topics.state is not None:
                 self._watches[name] = self._watch(link.robot.topics.state)
-            self._process(name, link.drawing, is_heard=not stopped)
+            self._process(name, link.drawing, is_audible=not was_stopped)
         self._speak_next(self.speaker)
 
-    def _process(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
-        last_drawing, before = self._last_drawings.get(name, (None, RobotSound()))
+    def _process(self, name: str, drawing: Mapping[str, object] | None, *, is_audible: bool) -> None:
+        last_drawing, previous = self._last_drawings.get(name, (None, RobotSound()))
         if drawing is None or drawing is last_drawing:
             return
-        now = RobotSound.parse(drawing)
-        first = name not in self._last_drawings
-        self._last_drawings[name] = (drawing, now)
-        self._stop_interrupted(name, before, now)
+        current = RobotSound.parse(drawing)
+        is_first = name not in self._last_drawings
+        self._last_drawings[name] = (drawing, current)
+        self._stop_interrupted(name, previous, current)
         if (
-            now.speech
-            and is_heard
-            and (now.speech != before.speech or now.spoken_fraction < before.spoken_fraction)
+            current.speech
+            and is_audible
+            and (current.speech != previous.speech or current.spoken_fraction < previous.spoken_fraction)
         ):
-            self._enqueue(Utterance(name, now.speech, now.language, now.volume))
+            self._enqueue(Utterance(name, current.speech, current.language, current.volume))
         if (
-            now.notes
-            and is_heard
-            and not first
-            and now.sound_number != before.sound_number
+            current.notes
+            and is_audible
+            and not is_first
+            and current.sound_number != previous.sound_number
             and self.speaker is not None
         ):
             self._playing_robot = name
-            self.speaker.play(now.notes, now.volume)
+            self.speaker.play(current.notes, current.volume)
 
-    def _stop_interrupted(self, name: str, before: RobotSound, now: RobotSound) -> None:
+    def _stop_interrupted(self, name: str, previous: RobotSound, current: RobotSound) -> None:
         if self.speaker is None:
             return
-        if before.speech and before.spoken_fraction < FINISHED_RATIO and now.speech != before.speech:
-            self._waiting = deque(each for each in self._waiting if each.robot != name)
+        if (
+            previous.speech
+            and previous.spoken_fraction < FINISHED_RATIO
+            and current.speech != previous.speech
+        ):
+            self._queue = deque(each for each in self._queue if each.robot != name)
             if self._current is not None and self._current.robot == name:
                 self._current = None
                 self.speaker.stop_voice()
         if (
-            before.notes
-            and before.played_fraction < FINISHED_RATIO
-            and not now.notes
+            previous.notes
+            and previous.played_fraction < FINISHED_RATIO
+            and not current.notes
             and self._playing_robot == name
         ):
             self._playing_robot = ""
             self.speaker.play((), 0.0)
 
     def _enqueue(self, utterance: Utterance) -> None:
-        if len(self._waiting) >= MAX_QUEUED:
-            lost = self._waiting.popleft()
+        if len(self._queue) >= MAX_QUEUED:
+            dropped = self._queue.popleft()
             message = _("“{words}” was shown but not spoken: too many texts were waiting").format(
-                words=lost.text
+                words=dropped.text
             )
-            self._log("info", lost.robot, message)
-        self._waiting.append(utterance)
+            self._log("info", dropped.robot, message)
+        self._queue.append(utterance)
 
     def _speak_next(self, speaker: Speaker) -> None:
         if self._current is not None and speaker.is_busy:
-            if self._clock() < self._until_s:
+            if self._clock() < self._voice_deadline_s:
                 return
             speaker.stop_voice()
         self._current = None
-        if self._waiting:
-            utterance = self._current = self._waiting.popleft()
-            self._until_s = (
+        if self._queue:
+            utterance = self._current = self._queue.popleft()
+            self._voice_deadline_s = (
                 self._clock() + SPEECH_TIMEOUT_S + SPEECH_TIMEOUT_PER_LETTER_S * len(utterance.text)
             )
             speaker.speak(utterance.text, utterance.language, utterance.volume)
 
     def silence(self) -> None:
         """Stop and discard all speech and sounds."""
-        self._waiting.clear()
+        self._queue.clear()
         self._current, self._playing_robot = None, ""
         if self.speaker is not None:
             self.speaker.stop()
@@ -292,15 +296,15 @@ def _notes(value: object) -> Notes:
     if not isinstance(value, list):
         return ()
     notes: list[tuple[float, float]] = []
-    left_s = MAX_NOTES_S
+    remaining_s = MAX_NOTES_S
     for note in value[:MAX_NOTES]:
         if not (isinstance(note, list) and len(note) == 2):
             return ()
         hz, seconds = note
         if not all(isinstance(item, (int, float)) and not isinstance(item, bool) for item in note):
             return ()
-        if (hz != 0 and not LOWEST_HZ <= hz <= HIGHEST_HZ) or not 0 < seconds <= left_s:
+        if (hz != 0 and not LOWEST_HZ <= hz <= HIGHEST_HZ) or not 0 < seconds <= remaining_s:
             return tuple(notes)
         notes.append((float(hz), float(seconds)))
-        left_s -= seconds
+        remaining_s -= seconds
     return tuple(notes)

@@ -24,13 +24,13 @@ class OutputReader:
     """
 
     def __init__(
-        self, stream: IO[bytes], stopped: threading.Event, clock: Callable[[], float] = time.monotonic
+        self, stream: IO[bytes], stop_event: threading.Event, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        # `stopped` ends the pauses between floods.
-        self._stream, self._stopped, self._clock = stream, stopped, clock
+        # `stop_event` ends the pauses between floods.
+        self._stream, self._stop_event, self._clock = stream, stop_event, clock
         self.unexpected_bytes = 0
         """Number of bytes that don't belong to the protocol."""
-        self._second, self._lines, self._bytes = clock(), 0, 0
+        self._period_start_s, self._line_count, self._byte_count = clock(), 0, 0
 
     def __iter__(self) -> Iterator[bytes]:
         # Possible protocol lines until the pipe's end.
@@ -41,7 +41,7 @@ class OutputReader:
             if len(remainder) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
                 self.unexpected_bytes += len(remainder) - 1
                 remainder = b"-"  # placeholder, so that the rest of the line isn't parsed either
-            self._throttle(read=len(chunk))
+            self._throttle(byte_count=len(chunk))
         self.unexpected_bytes += len(remainder)
 
     def _protocol_lines(self, data: bytes) -> Iterator[bytes]:
@@ -52,7 +52,7 @@ class OutputReader:
             if data.startswith(PROTOCOL_PREFIX, offset):
                 end = data.index(b"\n", offset)
                 if end - offset <= MAX_LINE_LENGTH:
-                    self._throttle(lines=1)
+                    self._throttle(line_count=1)
                     yield data[offset:end]
                 else:
                     self.unexpected_bytes += end + 1 - offset
@@ -60,10 +60,10 @@ class OutputReader:
                 continue
             next_offset = data.find(b"\n" + PROTOCOL_PREFIX, offset)
             end = len(data) if next_offset < 0 else next_offset + 1
-            strange = data[offset:end]
-            while b"\n\n" in strange:  # skip empty lines
-                strange = strange.replace(b"\n\n", b"\n")
-            self.unexpected_bytes += len(strange.lstrip(b"\n"))
+            unexpected = data[offset:end]
+            while b"\n\n" in unexpected:  # skip empty lines
+                unexpected = unexpected.replace(b"\n\n", b"\n")
+            self.unexpected_bytes += len(unexpected.lstrip(b"\n"))
             offset = end
 
     def _read(self) -> bytes:
@@ -72,15 +72,15 @@ class OutputReader:
         except (OSError, ValueError):
             return b""
 
-    def _throttle(self, *, lines: int = 0, read: int = 0) -> None:
+    def _throttle(self, *, line_count: int = 0, byte_count: int = 0) -> None:
         # Pauses when this second's limit is exceeded.
         now = self._clock()
-        if now - self._second >= 1.0:
-            self._second, self._lines, self._bytes = now, 0, 0
-        self._lines += lines
-        self._bytes += read
-        if self._lines > MAX_LINES_PER_S or self._bytes > MAX_BYTES_PER_S:
-            self._stopped.wait(THROTTLE_PAUSE_S)
+        if now - self._period_start_s >= 1.0:
+            self._period_start_s, self._line_count, self._byte_count = now, 0, 0
+        self._line_count += line_count
+        self._byte_count += byte_count
+        if self._line_count > MAX_LINES_PER_S or self._byte_count > MAX_BYTES_PER_S:
+            self._stop_event.wait(THROTTLE_PAUSE_S)
 
 
 class RateLimiter:
@@ -88,23 +88,23 @@ class RateLimiter:
 
     def __init__(self, per_second: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._per_second, self._clock = per_second, clock
-        self._second, self._passed = clock(), 0
+        self._period_start_s, self._passed_count = clock(), 0
         self.rejected_count = 0
 
     def try_acquire(self) -> bool:
         """Return True if another item may pass now; otherwise count the item as rejected."""
         now = self._clock()
-        if now - self._second >= 1.0:
-            self._second, self._passed = now, 0
-        if self._passed >= self._per_second:
+        if now - self._period_start_s >= 1.0:
+            self._period_start_s, self._passed_count = now, 0
+        if self._passed_count >= self._per_second:
             self.rejected_count += 1
             return False
-        self._passed += 1
+        self._passed_count += 1
         return True
 
     def take_rejected_count(self) -> int:
         """Return and clear the number of rejected items; 0 while items are still being rejected."""
-        if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
+        if self._clock() - self._period_start_s < 1.0 and self._passed_count >= self._per_second:
             return 0
         count, self.rejected_count = self.rejected_count, 0
         return count

@@ -36,13 +36,13 @@ class ChildProcess:
         command: Sequence[str],
         cwd: Path | None,
         *,
-        most_bytes: int = MAX_MEMORY_BYTES,
+        max_bytes: int = MAX_MEMORY_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # Raises RunnerError if the process can't be started.
-        self._most_bytes, self._clock = most_bytes, clock
-        self._family: list[psutil.Process] = []
-        self._next_family_s = clock() + CHILD_CHECK_INTERVAL_S
+        self._max_bytes, self._clock = max_bytes, clock
+        self._child_processes: list[psutil.Process] = []
+        self._next_search_s = clock() + CHILD_CHECK_INTERVAL_S
         self.exceeds_memory_limit = False
         """True if the process was killed because of its memory use."""
         try:
@@ -70,10 +70,10 @@ class ChildProcess:
         """Search for new child processes, and kill all processes if together they use too much memory."""
         if self._process is None:
             return
-        if self._clock() >= self._next_family_s:
-            self._next_family_s = self._clock() + CHILD_CHECK_INTERVAL_S
-            self._family = _descendants(self._process)
-        if sum(map(_memory_bytes, (self._process, *self._family))) > self._most_bytes:
+        if self._clock() >= self._next_search_s:
+            self._next_search_s = self._clock() + CHILD_CHECK_INTERVAL_S
+            self._child_processes = _descendants(self._process)
+        if sum(map(_memory_bytes, (self._process, *self._child_processes))) > self._max_bytes:
             self.exceeds_memory_limit = True
             self.kill()
 
@@ -88,7 +88,7 @@ class ChildProcess:
     def kill(self) -> None:
         """Kill the process and its child processes."""
         if self._process is not None and not self.has_ended:
-            self._family = [*self._family, *_descendants(self._process)]
+            self._child_processes = [*self._child_processes, *_descendants(self._process)]
         self.popen.kill()
         self.kill_descendants()
 
@@ -97,7 +97,7 @@ class ChildProcess:
         if os.name == "posix":
             with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is empty
                 os.killpg(self.popen.pid, signal.SIGKILL)
-        for process in self._family:
+        for process in self._child_processes:
             try:
                 process.kill()  # psutil checks that the id was not reused
             except psutil.Error:

@@ -76,18 +76,18 @@ class Runs:
         console: Console,
         post_event: Callable[[object], None],
         clock: Callable[[], float] = time.monotonic,
-        make_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
+        create_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
     ) -> None:
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
-        self._make_runner = make_runner
+        self._create_runner = create_runner
         self.starting_robots: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
         self.before_stop: Callable[[], object] = tuple  # called by Stop before it stops robots
         self.document: Document | None = None  # the run's behaviour
         self._runner: Runner | None = None
         self._current_request: RequestedRun | None = None  # the current run, else the last
         self._trial = Trial()
-        self.asking = OpenQuestion()
+        self.open_question = OpenQuestion()
         self._pending_request: RequestedRun | None = (
             None  # begins once the current run is proven to be stopped
         )
@@ -97,7 +97,7 @@ class Runs:
         self._program_key: str | None = None  # robots reject later commands of the last program by its key
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
-        fleet.used = lambda: self.used_robots
+        fleet.robots_in_use = lambda: self.used_robots
         self._stop_reporter = StopReporter(fleet, alerts, console)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
@@ -108,7 +108,7 @@ class Runs:
         self.stopped_blocks: tuple[str, ...] = ()
         self.ran_blocks: frozenset[str] = frozenset()  # since the start, also between two ticks
         self._errors = BlockErrors()
-        self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
+        self._warnings = RunWarnings(lambda text: self._console.add("warn", self._run.name, text))
         self.values: Mapping[str, VariableValue] = {}
         """Values of the run's variables by id; still available after the run."""
         self._variables: Mapping[str, Variable] = {}
@@ -154,14 +154,14 @@ class Runs:
         ):
             self._run = replace(self._run, unrunnable_program=None)  # another tab, or an edit
         self._settle()
-        edits = 0 if self.document is None else self.document.edits
-        if self._warnings.clear_if_edited(edits) | self._errors.discard_fixed():
+        edit_count = 0 if self.document is None else self.document.edits
+        if self._warnings.clear_if_edited(edit_count) | self._errors.discard_fixed():
             self.blocks_revision += 1
         if self.active:
             self._update_breakpoints()
-        edited = self.active and self._edits.has_edits()
-        if edited != self._run.is_edited:
-            self._run = replace(self._run, is_edited=edited)
+        is_edited = self.active and self._edits.has_edits()
+        if is_edited != self._run.is_edited:
+            self._run = replace(self._run, is_edited=is_edited)
 
     def _update_breakpoints(self) -> None:
         # Sends changed breakpoints to the running program.
@@ -176,14 +176,14 @@ class Runs:
         run, current = self._run, self._documents.current
         if self._view is None or self._view[0] is not run or self._view[1] is not current:
             names = [link.name for link in self._fleet.connected]
-            elsewhere = self.document not in {None, current}
+            is_elsewhere = self.document not in {None, current}
             view = view_of(
                 run,
                 names,
                 self._clock(),
-                coming=self.starting_robots(),
-                elsewhere=elsewhere,
-                slow=self.pace_s > 0,
+                starting_robots=self.starting_robots(),
+                is_elsewhere=is_elsewhere,
+                is_slow=self.pace_s > 0,
             )
             self._view = (run, current, view)
         return self._view[2]
@@ -286,9 +286,9 @@ class Runs:
         run = self._run
         if run.state == "paused" and self._runner is not None:
             self._runner.resume()
-            held_s = 0.0 if run.pause_start_s is None else self._clock() - run.pause_start_s
+            pause_s = 0.0 if run.pause_start_s is None else self._clock() - run.pause_start_s
             self._run = replace(
-                self._run, state="running", paused_s=run.paused_s + held_s, pause_start_s=None
+                self._run, state="running", paused_s=run.paused_s + pause_s, pause_start_s=None
             )
             self._mark_blocks(stopped=())
 
@@ -342,10 +342,10 @@ class Runs:
     def confirm_stopped(self) -> None:
         """Record that the user has confirmed that the robots without a reply are not moving."""
         if self._run.state == "unanswered" and self._run.report is not None:
-            silent = self._run.report.unconfirmed_names
-            self._fleet.confirm_stopped(silent)
+            unconfirmed_names = self._run.report.unconfirmed_names
+            self._fleet.confirm_stopped(unconfirmed_names)
             if self._network.stopper is not None:
-                self._network.stopper.discard_late(silent)
+                self._network.stopper.discard_late(unconfirmed_names)
             self._settle()
 
     def _settle(self) -> None:
@@ -369,7 +369,7 @@ class Runs:
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._mark_started(event)
-        self.asking.on_event(event)
+        self.open_question.on_event(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
                 if event.description and event.description != run.description:
@@ -418,8 +418,8 @@ class Runs:
                 replies = (*self._run.replies, event.robot)
                 self._run = replace(self._run, replies=replies)
                 if event.robot.problem or not event.robot.is_waiting:
-                    same = [robot for robot in replies if robot.name == event.robot.name]
-                    self._stop_reporter.update_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
+                    robot_replies = [robot for robot in replies if robot.name == event.robot.name]
+                    self._stop_reporter.update_fleet(StopReport(tuple(robot_replies), 0.0), self._stop_mark)
             else:
                 self._run = replace(self._run, has_stopped_blocks=bool(self.stopped_blocks))
                 self._apply_report(event.report)
@@ -475,7 +475,7 @@ class Runs:
         except AppError as error:
             self._alerts.raise_alert("program", "error", _("The behaviour can't be started."), str(error))
             return
-        self.asking.reset(runner)
+        self.open_question.reset(runner)
         self._runner, self._used_robots, self._labels = runner, program.robots, program.labels
         self._robots.start(runner, requested_actions, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
@@ -490,7 +490,7 @@ class Runs:
     def _start_runner(
         self, program: Program, name: str, request: RequestedRun, owners: Mapping[str, str]
     ) -> Runner:
-        runner = self._make_runner(self._post_event)
+        runner = self._create_runner(self._post_event)
         runner.start(
             program,
             [link.robot.source for link in self._fleet.connected],
@@ -502,15 +502,15 @@ class Runs:
         )
         return runner
 
-    def _show_start(self, title: str, trying: str) -> None:
-        run, before = RunState("running", title, is_started=False, tried_label=trying), self._run
+    def _show_start(self, title: str, tried_label: str) -> None:
+        run, previous = RunState("running", title, is_started=False, tried_label=tried_label), self._run
         self._run = replace(
             run,
             started_s=self._clock(),
-            last_stop_text=before.last_stop_text,
-            last_stop_status=before.last_stop_status,
+            last_stop_text=previous.last_stop_text,
+            last_stop_status=previous.last_stop_status,
         )
-        text = _("trying “{block}”").format(block=trying) if trying else _("started")
+        text = _("trying “{block}”").format(block=tried_label) if tried_label else _("started")
         self._console.add("info", self._run.name, text)
 
     def _runnable_program(self, request: RequestedRun) -> Program | None:
@@ -520,13 +520,13 @@ class Runs:
         if program is None or (program.starts and not problems):
             return program
         if request.stack is None or not problems:  # problems of a tried block are shown at the block
-            before = self._run
+            previous = self._run
             self._run = RunState(
                 unrunnable_program=program,
-                last_stop_text=before.last_stop_text,
-                last_stop_status=before.last_stop_status,
+                last_stop_text=previous.last_stop_text,
+                last_stop_status=previous.last_stop_status,
             )
-        self._set_errors(problems, not_started=True)
+        self._set_errors(problems, prevents_start=True)
         return None
 
     def _start_if_ready(self, request: RequestedRun) -> None:
@@ -554,17 +554,17 @@ class Runs:
         self._robots.stop()
         if not self.active:
             return  # Stop was first
-        finished = event.is_ok and not self._run.errors
-        if finished:
+        is_finished = event.is_ok and not self._run.errors
+        if is_finished:
             self._mark_blocks()
         # the end of a program is a Stop like any other: every robot that it used must reply
         self._stop(tuple(dict.fromkeys((*self._used_robots, *event.unresponsive_robots))))
-        self._run = replace(self._run, finished=finished)
+        self._run = replace(self._run, is_finished=is_finished)
         if not event.is_ok and not self._run.errors:
             self._alerts.raise_alert("program", "error", _("The behaviour stopped unexpectedly."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
-        self.asking.clear()
+        self.open_question.clear()
         run = self._run
         now, elapsed_s = self._clock(), run.elapsed_s
         if self.active:
@@ -585,7 +585,7 @@ class Runs:
             elapsed_s=elapsed_s,
             report=None,
             replies=(),
-            finished=False,
+            is_finished=False,
             is_edited=False,
             is_restarting=False,
             robots_to_stop=robots_to_stop,
@@ -607,8 +607,8 @@ class Runs:
         self._stop_thread = threading.Thread(target=target, name="studio-stop", daemon=True)
         self._stop_thread.start()
 
-    def _set_errors(self, errors: Mapping[str, str], *, not_started: bool = False) -> None:
-        self._errors.set_errors(errors, not_started=not_started)
+    def _set_errors(self, errors: Mapping[str, str], *, prevents_start: bool = False) -> None:
+        self._errors.set_errors(errors, prevents_start=prevents_start)
         self._run = replace(self._run, errors=errors)
         self.blocks_revision += 1
 

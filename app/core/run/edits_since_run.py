@@ -25,10 +25,10 @@ class EditsSinceRun:
 
     def __init__(self) -> None:
         self._document: RunDocument | None = None
-        self._edits = 0
-        self._ran = ""
-        self._compared: Program | None = None
-        self._differs = False
+        self._edit_count = 0
+        self._started_code = ""
+        self._compared_program: Program | None = None
+        self._is_edited = False
 
     def set_program(self, document: RunDocument | None, program: Program) -> None:
         """Set the running program.
@@ -37,19 +37,21 @@ class EditsSinceRun:
             document: Behaviour of the program; None to ignore edits.
             program: Program that was started.
         """
-        self._document, self._ran = document, program.runnable
-        self._edits = 0 if document is None else document.edits
-        self._compared, self._differs = program, False
+        self._document, self._started_code = document, program.runnable
+        self._edit_count = 0 if document is None else document.edits
+        self._compared_program, self._is_edited = program, False
 
     def has_edits(self) -> bool:
         """Return True if the current blocks differ from the running program."""
         if self._document is None:
             return False
         newest = self._document.newest_program()
-        if newest is None or newest is self._compared:
-            return self._differs
-        self._compared = newest
-        if self._document.edits == self._edits:
-            self._ran = newest.runnable  # robots connected or disconnected: Restart would not apply an edit
-        self._differs = newest.runnable != self._ran
-        return self._differs
+        if newest is None or newest is self._compared_program:
+            return self._is_edited
+        self._compared_program = newest
+        if self._document.edits == self._edit_count:
+            self._started_code = (
+                newest.runnable
+            )  # robots connected or disconnected: Restart would not apply an edit
+        self._is_edited = newest.runnable != self._started_code
+        return self._is_edited

@@ -27,25 +27,33 @@ class ProgramRobots:
         self._requested_actions: Mapping[str, Sequence[str]] = {}
         self._known_owners: Mapping[str, str] = {}
         self._revision = -1
-        self._moving = MovingTopics()
-        self._topics: Mapping[str, Sequence[str]] = {}
+        self._moving_topics = MovingTopics()
+        self._reported_topics: Mapping[str, Sequence[str]] = {}
 
     def start(
-        self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
+        self,
+        runner: Runner,
+        requested_actions: Sequence[tuple[Robot, Sequence[str]]],
+        owners: Mapping[str, str],
     ) -> None:
         """Start reporting to a program.
 
         Args:
             runner: Runner of the program.
-            asked: Robots that the program uses, and the actions that it invokes.
+            requested_actions: Robots that the program uses, and the actions that it invokes.
             owners: Node ids of the robots that the program already knows, by name.
         """
         self._runner, self._known_owners, self._revision = runner, owners, self._fleet.revision
-        moving, connected = self._fleet.moving_topics, {link.name for link in self._fleet.connected}
+        moving_topics, connected_names = (
+            self._fleet.moving_topics,
+            {link.name for link in self._fleet.connected},
+        )
         # the program was started with the connected robots; unreadable ones are reported at the next tick
-        self._moving = moving if connected.issuperset(moving.robots) else MovingTopics()
-        self._topics = self._moving.topics
-        self._requested_actions = {robot.name: actions for robot, actions in asked}
+        self._moving_topics = (
+            moving_topics if connected_names.issuperset(moving_topics.robots) else MovingTopics()
+        )
+        self._reported_topics = self._moving_topics.topics
+        self._requested_actions = {robot.name: actions for robot, actions in requested_actions}
 
     def stop(self) -> None:
         """Stop reporting after the program has ended."""
@@ -57,36 +65,36 @@ class ProgramRobots:
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)
         links = [self._fleet.link(name) for name in self._requested_actions]
-        replaced = [
+        replaced_links = [
             link
             for link in links
             if link is not None
             and link.name in owners
             and owners[link.name] != self._known_owners.get(link.name)
         ]
-        moving = [(link.robot, self._requested_actions[link.name]) for link in replaced]
-        if self._fleet.permission.request_permission(moving, self._send):
+        requested_actions = [(link.robot, self._requested_actions[link.name]) for link in replaced_links]
+        if self._fleet.permission.request_permission(requested_actions, self._send):
             self._send()
         else:
-            self._send(without=[link.name for link in replaced])
+            self._send(excluded_names=[link.name for link in replaced_links])
 
     def _has_changed(self) -> bool:
         is_same = self._fleet.revision == self._revision
-        if is_same and self._fleet.moving_topics is self._moving:
+        if is_same and self._fleet.moving_topics is self._moving_topics:
             return False
-        self._moving = self._fleet.moving_topics
-        return not is_same or self._moving.topics != self._topics
+        self._moving_topics = self._fleet.moving_topics
+        return not is_same or self._moving_topics.topics != self._reported_topics
 
-    def _send(self, without: Collection[str] = ()) -> None:
+    def _send(self, excluded_names: Collection[str] = ()) -> None:
         if self._runner is None:
             return
-        owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
-        replaced = [
+        owners = {name: id for name, id in owners_of(self._fleet).items() if name not in excluded_names}
+        replaced_names = [
             name
             for name, id in owners.items()
             if name in self._requested_actions and self._known_owners.get(name) != id
         ]
-        self._fleet.moved.record_command(replaced, "behaviour")
+        self._fleet.moved.record_command(replaced_names, "behaviour")
         self._known_owners = {**self._known_owners, **owners}
-        self._topics = self._fleet.moving_topics.topics
-        self._runner.set_robots(owners, self._topics)
+        self._reported_topics = self._fleet.moving_topics.topics
+        self._runner.set_robots(owners, self._reported_topics)

@@ -57,8 +57,8 @@ class RequestedRun:
             or "_get_" not in self.stack.first_block_type(self.document.workspace)
         ):
             return ""
-        name, part = program.sensors[0]
-        sensors = (robot.sensor(part) for robot in robots if robot.name == name)
+        name, sensor_name = program.sensors[0]
+        sensors = (robot.sensor(sensor_name) for robot in robots if robot.name == name)
         sensor = next((each for each in sensors if each is not None), None)
         if sensor is None or sensor.kind == "object":
             return ""

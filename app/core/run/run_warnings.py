@@ -15,7 +15,7 @@ class RunWarnings:
         self.by_block: Mapping[str, str] = {}
         self._counts: dict[tuple[str, str], int] = {}
         self._logged_counts: dict[tuple[str, str], int] = {}
-        self._edits = 0
+        self._edit_count = 0
 
     def reset(self) -> None:
         """Clear all warnings at the start of a run."""
@@ -28,7 +28,7 @@ class RunWarnings:
         Args:
             edits: Current number of edits of the behaviour.
         """
-        if not self.by_block or edits == self._edits:
+        if not self.by_block or edits == self._edit_count:
             return False
         self.by_block = {}
         return True
@@ -42,7 +42,7 @@ class RunWarnings:
             count: Number of occurrences in this run.
             edits: Current number of edits of the behaviour.
         """
-        self._edits = edits
+        self._edit_count = edits
         key = (block, message)
         self._counts[key] = count
         self.by_block = {**self.by_block, block: with_count(message, count)}

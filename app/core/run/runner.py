@@ -103,7 +103,7 @@ class Runner:
         on_event: Callable[[RunnerEvent], object],
         *,
         command: Sequence[str] | None = None,
-        most_bytes: int = MAX_MEMORY_BYTES,
+        max_bytes: int = MAX_MEMORY_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `command` starts the child; the default is this Python or this frozen Studio.
@@ -117,14 +117,14 @@ class Runner:
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
-        self._clock, self._most_bytes = clock, most_bytes
+        self._clock, self._max_bytes = clock, max_bytes
         self._child: ChildProcess | None = None
         self._threads: list[threading.Thread] = []
-        self._errors: deque[str] = deque(maxlen=MAX_ERROR_LINES)
+        self._error_lines: deque[str] = deque(maxlen=MAX_ERROR_LINES)
         self._commands: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
-        self._began_s = 0.0
+        self._start_s = 0.0
         self._ended, self._output_ended = threading.Event(), threading.Event()
-        self._last: RunnerEvent | None = None
+        self._end_event: RunnerEvent | None = None
 
     @property
     def pid(self) -> int | None:
@@ -159,15 +159,15 @@ class Runner:
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
-        self._child = child = ChildProcess(self._command, source_root(), most_bytes=self._most_bytes)
-        self._began_s = self._clock()
+        self._child = child = ChildProcess(self._command, source_root(), max_bytes=self._max_bytes)
+        self._start_s = self._clock()
         self.state = "paused" if paused else "running"
-        encoded = program.to_json() | ({} if name is None else {"name": name})
+        encoded_program = program.to_json() | ({} if name is None else {"name": name})
         self._commands.put(
             {
                 "do": "start",
                 "id": self.program_id,
-                "program": encoded,
+                "program": encoded_program,
                 "robots": list(robots),
                 "owners": dict(owners or {}),
                 "master": master,
@@ -272,8 +272,8 @@ class Runner:
             return
         try:
             with child.popen.stdin as stream:
-                while (order := self._commands.get()) is not None:
-                    stream.write(json.dumps(order).encode() + b"\n")
+                while (command := self._commands.get()) is not None:
+                    stream.write(json.dumps(command).encode() + b"\n")
                     stream.flush()
         except (OSError, ValueError):
             return  # the child has ended; the reader reports it
@@ -281,7 +281,7 @@ class Runner:
     def _read(self, child: ChildProcess) -> None:
         if child.popen.stdout is None:
             return
-        output, gate = (
+        output, limiter = (
             OutputReader(child.popen.stdout, self._ended, self._clock),
             RateLimiter(MAX_EVENTS_PER_S, self._clock),
         )
@@ -290,33 +290,33 @@ class Runner:
             if event is None:
                 output.unexpected_bytes += len(line)
             elif event.kind == "ended":
-                self._last = event
+                self._end_event = event
                 break
-            elif event.kind in ("ready", "variables", "ask") or gate.try_acquire():
-                self._deliver(event, gate)
-        self._report_dropped(gate.rejected_count, output.unexpected_bytes)
+            elif event.kind in ("ready", "variables", "ask") or limiter.try_acquire():
+                self._deliver(event, limiter)
+        self._report_dropped(limiter.rejected_count, output.unexpected_bytes)
         child.popen.stdout.close()
         self._output_ended.set()
 
-    def _deliver(self, event: RunnerEvent, gate: RateLimiter) -> None:
+    def _deliver(self, event: RunnerEvent, limiter: RateLimiter) -> None:
         if event.kind in ("running", "paused") and self.state in ("running", "paused"):
             self.state = "paused" if event.kind == "paused" else "running"
-        missed = gate.take_rejected_count()
-        if missed:
-            self._report_dropped(missed, 0)
+        rejected_count = limiter.take_rejected_count()
+        if rejected_count:
+            self._report_dropped(rejected_count, 0)
         self._on_event(event)
 
-    def _report_dropped(self, events: int, strange_bytes: int) -> None:
-        if events:
+    def _report_dropped(self, event_count: int, unexpected_bytes: int) -> None:
+        if event_count:
             text = ngettext(
                 "{count} line was dropped: too many at once",
                 "{count} lines were dropped: too many at once",
-                events,
-            ).format(count=events)
+                event_count,
+            ).format(count=event_count)
             self._on_event(RunnerEvent("print", self.run, text=text))
-        if strange_bytes >= MIN_REPORTED_BYTES:
+        if unexpected_bytes >= MIN_REPORTED_BYTES:
             text = _("{size} MB of unexpected output were discarded").format(
-                size=number(strange_bytes / 1e6, ".1f")
+                size=number(unexpected_bytes / 1e6, ".1f")
             )
             self._on_event(RunnerEvent("print", self.run, text=text))
 
@@ -324,8 +324,8 @@ class Runner:
         while not child.has_ended and not self._output_ended.wait(MEMORY_CHECK_INTERVAL_S):
             child.check()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
-        hung = not child.wait(EXIT_TIMEOUT_S)
-        if hung:
+        is_hung = not child.wait(EXIT_TIMEOUT_S)
+        if is_hung:
             child.kill()
             child.wait(EXIT_TIMEOUT_S)
         child.kill_descendants()  # remaining children would hold its pipes open
@@ -333,35 +333,37 @@ class Runner:
         errors.join(timeout=PIPE_TIMEOUT_S)  # its last output
         was_stopped = self.state == "stopping"
         self.state = "ended"
-        last = self._last
-        if last is None:
-            text = "" if was_stopped else self._failure_reason(child, hung=hung)
-            last = RunnerEvent("ended", self.run, text=text, is_ok=was_stopped, elapsed_s=self._elapsed())
-        self._on_event(last)
+        end_event = self._end_event
+        if end_event is None:
+            text = "" if was_stopped else self._failure_reason(child, is_hung=is_hung)
+            end_event = RunnerEvent(
+                "ended", self.run, text=text, is_ok=was_stopped, elapsed_s=self._elapsed()
+            )
+        self._on_event(end_event)
         self._ended.set()
 
     def _elapsed(self) -> float:
-        return round(self._clock() - self._began_s, 3)
+        return round(self._clock() - self._start_s, 3)
 
-    def _failure_reason(self, child: ChildProcess, *, hung: bool) -> str:
+    def _failure_reason(self, child: ChildProcess, *, is_hung: bool) -> str:
         if child.exceeds_memory_limit:
             return _("The program used more than {size} GB of memory and was stopped.").format(
-                size=number(self._most_bytes / 1e9)
+                size=number(self._max_bytes / 1e9)
             )
-        if hung:
+        if is_hung:
             return _("The program lost its connection to Studio and was stopped.")
         code = child.popen.returncode
-        output, trace = split_trace("".join(f"{line}\n" for line in self._errors))
+        output, trace = split_trace("".join(f"{line}\n" for line in self._error_lines))
         if is_crash(code):
-            how = f"the program's process {exit_text(code)}"
-            extra = {**CONSOLE_EXTRA, **crash_extra("behaviour", how, f"{output}{trace}")}
-            _log.error("%s", how, extra=extra)
+            cause = f"the program's process {exit_text(code)}"
+            extra = {**CONSOLE_EXTRA, **crash_extra("behaviour", cause, f"{output}{trace}")}
+            _log.error("%s", cause, extra=extra)
         last_line = next((line for line in reversed(output.splitlines()) if line.strip()), "")
         if code < 0:
-            how = _("The program's process was killed (signal {signal})").format(signal=-code)
+            cause = _("The program's process was killed (signal {signal})").format(signal=-code)
         else:
-            how = _("The program's process ended with exit code {code}").format(code=code)
-        return f"{how}: {last_line.strip()}." if last_line else f"{how}."
+            cause = _("The program's process ended with exit code {code}").format(code=code)
+        return f"{cause}: {last_line.strip()}." if last_line else f"{cause}."
 
     def _read_errors(self, child: ChildProcess) -> None:
         # Keeps the last lines; a line without an end is cut.
@@ -370,7 +372,7 @@ class Runner:
             return
         try:
             for line in iter(lambda: stream.readline(MAX_ERROR_LENGTH), b""):
-                self._errors.append(line.decode("utf-8", "replace")[:500].rstrip())
+                self._error_lines.append(line.decode("utf-8", "replace")[:500].rstrip())
         finally:
             stream.close()
 
@@ -383,10 +385,10 @@ class Runner:
             return None
         kind = event.get("is")
         block = event.get("block")
-        first = (block,) if isinstance(block, str) else ()
+        first_block = (block,) if isinstance(block, str) else ()
         blocks = (
-            *first,
-            *(each for each in parse_texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first),
+            *first_block,
+            *(each for each in parse_texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first_block),
         )
         if kind == "ready":
             return RunnerEvent("ready", self.run)
@@ -394,12 +396,18 @@ class Runner:
             description, text = text_of(event, "says"), text_of(event, "warning")
             return RunnerEvent(kind, self.run, blocks=blocks, description=description, text=text)
         if kind == "error":
-            return RunnerEvent("error", self.run, blocks=first, text=text_of(event, "sentence"), is_ok=False)
-        if kind == "warning" and first:
+            return RunnerEvent(
+                "error", self.run, blocks=first_block, text=text_of(event, "sentence"), is_ok=False
+            )
+        if kind == "warning" and first_block:
             count = event.get("count")
             text = text_of(event, "sentence")
             return RunnerEvent(
-                "warning", self.run, blocks=first, text=text, count=count if isinstance(count, int) else 1
+                "warning",
+                self.run,
+                blocks=first_block,
+                text=text,
+                count=count if isinstance(count, int) else 1,
             )
         if kind in ("print", "ask"):
             question = event.get("question")

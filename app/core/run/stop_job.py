@@ -18,7 +18,7 @@ def stop_program(
     runner: Runner | None,
     stopper: RobotStopper | None,
     names: tuple[str, ...],
-    ends: str | None,
+    program_key: str | None,
     *,
     is_for_all: bool,
 ) -> None:
@@ -30,7 +30,7 @@ def stop_program(
         runner: Runner of the program, or None.
         stopper: Connections to the robots, or None.
         names: Names of the robots to stop.
-        ends: See `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+        program_key: See `app.core.robots.stop.stopper.RobotStopper.stop_all`.
         is_for_all: See `app.core.robots.stop.stopper.RobotStopper.stop_all`.
     """
 
@@ -44,12 +44,17 @@ def stop_program(
         if stopper is not None:
             with log_errors(
                 "send Stop to the robots at once"
-            ):  # sent again below, also to robots without `ends`
-                stopper.send_stop(ends=ends)
+            ):  # sent again below, also to robots without `program_key`
+                stopper.send_stop(program_key=program_key)
         with log_errors("stop the program"):
             runner.stop()
     report = stop_and_report(
-        stopper, names, on_answer=on_reply, ends=ends, on_late=on_late_reply, is_for_all=is_for_all
+        stopper,
+        names,
+        on_answer=on_reply,
+        program_key=program_key,
+        on_late=on_late_reply,
+        is_for_all=is_for_all,
     )
     post_event(StopCompleted(number, report))
 

@@ -26,9 +26,10 @@ class StopReporter:
             mark: Value of `MovedRobots.mark` when the Stop started.
         """
         self._fleet.moved.apply_report(report, mark)
-        clock = clock_text(time.localtime())
+        time_of_day = clock_text(time.localtime())
         texts_by_robot = {
-            name: (stop_text(each, clock), each.status) for name, each in report.results_by_robot.items()
+            name: (stop_text(each, time_of_day), each.status)
+            for name, each in report.results_by_robot.items()
         }
         self._fleet.apply_stop(texts_by_robot, report)
 
@@ -67,7 +68,9 @@ class StopReporter:
             self._console.add("info", origin, result)
             self._alerts.resolve("stop")
         else:
-            title, detail, _compact, _confirm = unconfirmed_texts(report, self.motion_warnings(report))
+            title, detail, _compact_text, _confirm_label = unconfirmed_texts(
+                report, self.motion_warnings(report)
+            )
             self._console.add("error", origin, f"{result}: {title}")
             self._alerts.raise_alert(
                 "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop"

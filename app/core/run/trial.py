@@ -36,7 +36,7 @@ class Trial:
 
     def __init__(self) -> None:
         self.value: TriedValue | None = None
-        self._tries = itertools.count(1)
+        self._numbers = itertools.count(1)
         self._request: RequestedRun | None = None
         self._unit = ""
 
@@ -65,12 +65,12 @@ class Trial:
         self.set_value(request.document, request.stack, text)
         return text
 
-    def set_value(self, document: Document, stack: Stack, words: str) -> None:
+    def set_value(self, document: Document, stack: Stack, text: str) -> None:
         """Set the value of a tried block.
 
         Args:
             document: Behaviour of the block.
             stack: Stack that was tried.
-            words: Formatted value.
+            text: Formatted value.
         """
-        self.value = TriedValue(document, stack.id, words, next(self._tries))
+        self.value = TriedValue(document, stack.id, text, next(self._numbers))

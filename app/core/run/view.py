@@ -59,7 +59,7 @@ class RunState:
     robots_to_stop: tuple[str, ...] = ()
     replies: tuple[RobotStop, ...] = ()
     report: StopReport | None = None
-    finished: bool = False
+    is_finished: bool = False
     has_stopped_blocks: bool = False
     errors: Mapping[str, str] = field(default_factory=dict)
     unrunnable_program: object = (
@@ -130,9 +130,9 @@ def view_of(
     connected: Sequence[str],
     now: float,
     *,
-    coming: Sequence[str] = (),
-    elsewhere: bool = False,
-    slow: bool = False,
+    starting_robots: Sequence[str] = (),
+    is_elsewhere: bool = False,
+    is_slow: bool = False,
 ) -> RunView:
     """Return the contents of the run bar.
 
@@ -140,15 +140,15 @@ def view_of(
         run: State of the run.
         connected: Names of the connected robots.
         now: Monotonic seconds.
-        coming: Names of the robots that are starting.
-        elsewhere: True if the run belongs to a behaviour in another tab. The title then names that
+        starting_robots: Names of the robots that are starting.
+        is_elsewhere: True if the run belongs to a behaviour in another tab. The title then names that
             behaviour, and Run applies to the current tab.
-        slow: True if blocks run with a delay.
+        is_slow: True if blocks run with a delay.
     """
-    view = replace(_view(run, connected, coming, now), is_slow=slow)
+    view = replace(_view(run, connected, starting_robots, now), is_slow=is_slow)
     if run.tried_label:
         return _tried_view(view, run)
-    is_named = elsewhere and run.name and (run.state != "ready" or _ended_without_robots(run))
+    is_named = is_elsewhere and run.name and (run.state != "ready" or _ended_without_robots(run))
     return _named_view(view, run, now) if is_named else view
 
 
@@ -160,22 +160,24 @@ def _tried_view(view: RunView, run: RunState) -> RunView:
     if view.state == "proven" or _ended_without_robots(run):
         template = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
         detail = view.detail
-        if run.finished:
+        if run.is_finished:
             template = _("Tried “{block}”")
             detail = _("Finished") if run.value is None else run.value
         title = template.format(block=run.tried_label)
-        compact = view.compact_text if view.result else title
-        return replace(view, title=title, detail=detail, compact_text=compact)
+        compact_text = view.compact_text if view.result else title
+        return replace(view, title=title, detail=detail, compact_text=compact_text)
     return view
 
 
 def _named_view(view: RunView, run: RunState, now: float) -> RunView:
     # With the behaviour's name, because another tab is shown.
     if view.state in {"running", "paused"}:
-        runs = view.state == "running"
+        is_running = view.state == "running"
         if view.is_edited:
-            view = replace(view, is_edited=False, detail=run.description if runs else _paused_detail(run))
-        view = replace(view, run_label=RUN if runs else view.run_label)
+            view = replace(
+                view, is_edited=False, detail=run.description if is_running else _paused_detail(run)
+            )
+        view = replace(view, run_label=RUN if is_running else view.run_label)
     if view.state == "running":
         # just pressed: the previous text and the time of the run remain
         if run.state == "stopping" and run.elapsed_s is None:
@@ -199,8 +201,8 @@ def _named_view(view: RunView, run: RunState, now: float) -> RunView:
     return view
 
 
-def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: float) -> RunView:
-    early = (
+def _view(run: RunState, connected: Sequence[str], starting_robots: Sequence[str], now: float) -> RunView:
+    is_early = (
         run.state == "stopping"
         and not run.is_stop_repeated
         and now - run.stop_pressed_s < STOPPING_DISPLAY_DELAY_S
@@ -208,7 +210,7 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
     views: dict[str, Callable[[RunState, float], RunView]] = {
         "running": _running_view,
         "paused": _paused_view,
-        "stopping": _early_stopping_view if early else _stopping_view,
+        "stopping": _early_stopping_view if is_early else _stopping_view,
         "proven": _proven_view,
         "unanswered": _unanswered_view,
     }
@@ -216,7 +218,7 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
         return views[run.state](run, now)
     if _ended_without_robots(run):
         return replace(_proven_view(run, now), state="ready", is_stop_filled=bool(connected))
-    title, detail = _("Ready"), connected_text(connected, coming)
+    title, detail = _("Ready"), connected_text(connected, starting_robots)
     if run.unrunnable_program and run.errors:
         title, detail = _("Not started"), next(iter(run.errors.values()))
     elif run.unrunnable_program:
@@ -235,20 +237,20 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
 
 def _ended_without_robots(run: RunState) -> bool:
     # Only the end is reported; nothing is proven.
-    ran = run.finished or bool(run.errors) or run.elapsed_s is not None
-    return run.state == "ready" and run.report is not None and ran
+    has_run = run.is_finished or bool(run.errors) or run.elapsed_s is not None
+    return run.state == "ready" and run.report is not None and has_run
 
 
 def _running_view(run: RunState, now: float) -> RunView:
-    title, compact = _("Starting"), _("{name} is starting")
+    title, compact_template = _("Starting"), _("{name} is starting")
     if run.is_started:
-        title, compact = _("Running, {time}"), _("{name} is running, {time}")
-    time_words = duration_text(run.elapsed(now))
+        title, compact_template = _("Running, {time}"), _("{name} is running, {time}")
+    time_text = duration_text(run.elapsed(now))
     return RunView(
         "running",
-        title.format(time=time_words),
+        title.format(time=time_text),
         _(APPLIES_LATER_HINT) if run.is_edited else run.description,
-        compact.format(name=run.name, time=time_words),
+        compact_template.format(name=run.name, time=time_text),
         can_pause=True,
         can_step=True,
         can_restart=True,
@@ -299,9 +301,11 @@ def _early_stopping_view(run: RunState, now: float) -> RunView:
 
 def _stopping_view(run: RunState, now: float) -> RunView:
     # a robot that refuses, or that other programs serve too, is done only when all of it has stopped
-    newest = {robot.name: robot for robot in run.replies}
+    newest_replies = {robot.name: robot for robot in run.replies}
     stopped_names = {
-        robot.name for robot in run.replies if robot.is_confirmed and not newest[robot.name].is_waiting
+        robot.name
+        for robot in run.replies
+        if robot.is_confirmed and not newest_replies[robot.name].is_waiting
     }
     stopped_names -= {robot.name for robot in run.replies if robot.problem}
     waiting = [name for name in run.robots_to_stop if name not in stopped_names]
@@ -339,7 +343,7 @@ def _proven_view(run: RunState, _now: float) -> RunView:
     title, detail = _ended_title(run), _("It stopped at the dashed block") if run.has_stopped_blocks else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
-    elif run.finished:
+    elif run.is_finished:
         detail = _("All scripts finished")
     return RunView(
         "proven",
@@ -354,7 +358,7 @@ def _proven_view(run: RunState, _now: float) -> RunView:
 
 
 def _ended_title(run: RunState, name: str = "") -> str:
-    kind = "problem" if run.errors else "finished" if run.finished else "stopped"
+    kind = "problem" if run.errors else "finished" if run.is_finished else "stopped"
     template = _END_TITLES[kind, bool(name), run.elapsed_s is not None]
     return _(template).format(name=name, time=duration_text(run.elapsed_s or 0.0))
 
@@ -362,16 +366,16 @@ def _ended_title(run: RunState, name: str = "") -> str:
 def _unanswered_view(run: RunState, now: float) -> RunView:
     if run.report is None:
         return _proven_view(run, now)
-    title, detail, compact, confirm = unconfirmed_texts(run.report, run.motion_warnings)
+    title, detail, compact_text, confirm_label = unconfirmed_texts(run.report, run.motion_warnings)
     return RunView(
         "unanswered",
         title,
         detail,
-        compact,
+        compact_text,
         stop_label=STOP_AGAIN,
         result=result_text(run.report),
         result_status=run.report.status,
-        confirm_label=confirm,
+        confirm_label=confirm_label,
     )
 
 
@@ -381,14 +385,14 @@ def duration_text(value: float) -> str:
     return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min {seconds % 60} s"
 
 
-def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
+def connected_text(names: Sequence[str], starting_robots: Sequence[str] = ()) -> str:
     """Return the line below "Ready": the names of connected robots, or else of starting robots.
 
     If there are neither, the line says that no robot is connected.
     """
-    if not names and coming:
-        template = ngettext("{robots} is starting", "{robots} are starting", len(coming))
-        return template.format(robots=format_list(coming))
+    if not names and starting_robots:
+        template = ngettext("{robots} is starting", "{robots} are starting", len(starting_robots))
+        return template.format(robots=format_list(starting_robots))
     if not names:
         return _("No robot is connected")
     template = ngettext("{robots} is connected", "{robots} are connected", len(names))
@@ -400,72 +404,77 @@ def result_text(report: StopReport) -> str:
 
     The icon next to the text depends on `StopReport.status`.
     """
-    names, stopped = report.names, report.stopped_names
-    unsure = [robot.full_name for robot in report.robots if not robot.can_confirm]
+    names, stopped_names = report.names, report.stopped_names
+    unconfirmable_names = [robot.full_name for robot in report.robots if not robot.can_confirm]
     if report.unconfirmed_robots:
-        return _stopped_count_text(len(stopped), len(names))
+        return _stopped_count_text(len(stopped_names), len(names))
     if not names:
         return _("nothing to stop")
-    if not stopped:
-        return _("stop sent; {robots} can't confirm").format(robots=format_list(unsure))
+    if not stopped_names:
+        return _("stop sent; {robots} can't confirm").format(robots=format_list(unconfirmable_names))
     time_ms = max(1, round(report.elapsed_ms))
-    if unsure:
+    if unconfirmable_names:
         template = _("{robots} stopped ({elapsed} ms); {others} can't confirm")
-        return template.format(robots=format_list(stopped), elapsed=time_ms, others=format_list(unsure))
+        return template.format(
+            robots=format_list(stopped_names), elapsed=time_ms, others=format_list(unconfirmable_names)
+        )
     if len(names) == 1:
-        return _("{robot} stopped ({elapsed} ms)").format(robot=stopped[0], elapsed=time_ms)
+        return _("{robot} stopped ({elapsed} ms)").format(robot=stopped_names[0], elapsed=time_ms)
     return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms)
 
 
-def _stopped_count_text(stopped: int, count: int) -> str:
+def _stopped_count_text(stopped_count: int, count: int) -> str:
     if count == 1:
-        return _("1 robot stopped") if stopped else _("Stop not confirmed")
-    return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
+        return _("1 robot stopped") if stopped_count else _("Stop not confirmed")
+    return _("{stopped} of {count} robots stopped").format(stopped=stopped_count, count=count)
 
 
-def unconfirmed_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
+def unconfirmed_texts(report: StopReport, motion_warnings: Sequence[str] = ()) -> tuple[str, str, str, str]:
     """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
     Messages of the robots themselves ("Arm may still move: the brake is stuck") come first, unchanged.
 
     Args:
         report: Result of the Stop.
-        doubts: Reasons why robots may be moving (`RunState`).
+        motion_warnings: Reasons why robots may be moving (`RunState`).
     """
-    stopped = report.stopped_names
+    stopped_names = report.stopped_names
     names = format_list(report.unconfirmed_names)
     listed_names = format_list(report.unconfirmed_names) if len(report.unconfirmed_names) <= 2 else _("them")
     detail = _("Switch {robots} off by hand.").format(robots=listed_names)
-    if doubts:
+    if motion_warnings:
         detail = ngettext(
             "{why}. Switch {robots} off by hand if it is still moving.",
             "{why}. Switch {robots} off by hand if they are still moving.",
             len(report.unconfirmed_names),
-        ).format(why="; ".join(doubts[:MAX_NAMED]), robots=listed_names)
-    if stopped:
-        slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in stopped)
+        ).format(why="; ".join(motion_warnings[:MAX_NAMED]), robots=listed_names)
+    if stopped_names:
+        slowest_ms = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in stopped_names)
         detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
-            robots=format_list(stopped), elapsed=max(1, round(slowest)), next_step=detail
+            robots=format_list(stopped_names), elapsed=max(1, round(slowest_ms)), next_step=detail
         )
     count, title = len(report.unconfirmed_names), _problem_text(report)
-    switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
-    still_words = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
+    compact_template = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
+    confirm_label = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
     if len(names) > MAX_NAMES_LENGTH:  # leave room for the sentence next to the button
-        still_words = ngettext("It isn't moving", "They aren't moving", count)
-    return title, detail, switch.format(wrong=title), still_words
+        confirm_label = ngettext("It isn't moving", "They aren't moving", count)
+    return title, detail, compact_template.format(wrong=title), confirm_label
 
 
 def _problem_text(report: StopReport) -> str:
     # First robots' own reports, then robots to which the Stop could not be sent, then silent robots.
     refusals = [robot.problem for robot in report.unconfirmed_robots if robot.has_failed]
-    untold = [robot.problem for robot in report.unconfirmed_robots if robot.error and not robot.has_failed]
-    silent = [robot.full_name for robot in report.unconfirmed_robots if not robot.error]
-    if len(silent) > MAX_NAMED:
-        silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
-    problems = [*refusals, *untold]
-    if silent:
-        template = ngettext("{robots} didn't reply", "{robots} didn't reply", len(silent))
-        problems.append(template.format(robots=format_list(silent)))
+    unsent = [robot.problem for robot in report.unconfirmed_robots if robot.error and not robot.has_failed]
+    silent_names = [robot.full_name for robot in report.unconfirmed_robots if not robot.error]
+    if len(silent_names) > MAX_NAMED:
+        silent_names = [
+            *silent_names[:MAX_NAMED],
+            _("{count} more").format(count=len(silent_names) - MAX_NAMED),
+        ]
+    problems = [*refusals, *unsent]
+    if silent_names:
+        template = ngettext("{robots} didn't reply", "{robots} didn't reply", len(silent_names))
+        problems.append(template.format(robots=format_list(silent_names)))
     remaining = len(problems) - MAX_NAMED
     if remaining > 0:
         template = ngettext("{count} more may still move", "{count} more may still move", remaining)

@@ -27,7 +27,7 @@ class UnwritableFolderError(AppError):
     def __init__(self, folder: Path, reason: str) -> None:
         self.folder, self.reason = folder, reason
         super().__init__(
-            _("can't write to the folder '{folder}' ({reason}); choose another one").format(
+            _("can't write to the folder '{folder}' ({reason}); choose another folder").format(
                 folder=folder, reason=reason
             )
         )
@@ -70,14 +70,14 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UnwritableFolderError(folder, str(reason).lower()) from error
-    surroundings = TestEnvironment(folder, home, f"127.0.0.1:{_free_port()}")
+    environment = TestEnvironment(folder, home, f"127.0.0.1:{_free_port()}")
     environ["NEP_STUDIO_HOME"] = str(home)
     environ["NEP_STATE_DIR"] = str(home / "state")
     environ["NEP_GATEWAY"] = "0"  # its ports are fixed, and another instance or test may use them
-    environ[MASTER_VARIABLE] = surroundings.master
+    environ[MASTER_VARIABLE] = environment.master
     if is_root and sys.platform.startswith("linux"):
         environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
-    return surroundings
+    return environment
 
 
 def remove_home(environment: TestEnvironment) -> None:

@@ -61,10 +61,10 @@ class StepReport:
 def seconds_since_start() -> float:
     """Return the age of this process in seconds according to the system; 0 if unknown."""
     try:
-        age = time.time() - psutil.Process().create_time()
+        age_s = time.time() - psutil.Process().create_time()
     except psutil.Error:
         return 0.0
-    return age if 0.0 <= age < MAX_AGE_S else 0.0
+    return age_s if 0.0 <= age_s < MAX_AGE_S else 0.0
 
 
 class Report:
@@ -75,7 +75,7 @@ class Report:
         self._lock = threading.RLock()
         self._offset_s = seconds_since_start() - time.monotonic()
         self._steps: list[StepReport] = []
-        self._marks: dict[str, int] = {}
+        self._recorded_times_ms: dict[str, int] = {}
         self._system_info: dict[str, object] = {
             "version": __version__,
             "system": platform.platform(),
@@ -102,8 +102,8 @@ class Report:
     def current_step(self) -> StepReport | None:
         """Step in progress, or None."""
         with self._lock:
-            newest = self._steps[-1] if self._steps else None
-            return newest if newest is not None and newest.end_ms is None else None
+            last_step = self._steps[-1] if self._steps else None
+            return last_step if last_step is not None and last_step.end_ms is None else None
 
     def add_computer_info(self, **info: object) -> None:
         """Add information about this computer."""
@@ -116,18 +116,18 @@ class Report:
         Only the first call for each name has an effect.
         """
         with self._lock:
-            self._marks.setdefault(f"{name}_ms", self.now_ms())
+            self._recorded_times_ms.setdefault(f"{name}_ms", self.now_ms())
 
-    def start_step(self, name: str, description: str, bound_s: float) -> None:
+    def start_step(self, name: str, description: str, timeout_s: float) -> None:
         """Start a step.
 
         Args:
             name: Name of the step.
             description: Expected result, as a sentence for the report.
-            bound_s: Time limit in seconds.
+            timeout_s: Time limit in seconds.
         """
         with self._lock:
-            self._steps.append(StepReport(name, description, bound_s, self.now_ms()))
+            self._steps.append(StepReport(name, description, timeout_s, self.now_ms()))
             self._write()
 
     def record_success(self, details: str = "") -> None:
@@ -170,7 +170,10 @@ class Report:
             "ok": self._is_complete and not self._failure,
             "why": failure,
             **self._system_info,
-            **{name: self._marks.get(name) for name in ("first_paint_ms", "editor_ready_ms", "total_ms")},
+            **{
+                name: self._recorded_times_ms.get(name)
+                for name in ("first_paint_ms", "editor_ready_ms", "total_ms")
+            },
             "steps": [each.to_json() for each in self._steps],
         }
         text = json.dumps(content, indent=1, ensure_ascii=False)

@@ -33,9 +33,9 @@ class SelfTest:
         self.environment = environment
         self.report = Report(environment.path(REPORT), {**info, "bound_s": timeouts.TOTAL_TIMEOUT_S})
         self._changed = threading.Condition()
-        self._all_until = time.monotonic() + timeouts.TOTAL_TIMEOUT_S
-        self._step_until = self._all_until
-        self._awaited = ""
+        self._total_deadline_s = time.monotonic() + timeouts.TOTAL_TIMEOUT_S
+        self._step_deadline_s = self._total_deadline_s
+        self._awaited_result = ""
         self._crash: TextIO = environment.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
         # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
@@ -52,9 +52,9 @@ class SelfTest:
             name: Name of the step, a key of `timeouts.STEP_TIMEOUTS_S`.
             description: Expected result, as a sentence for the report.
         """
-        bound_s = timeouts.STEP_TIMEOUTS_S[name]
-        self.report.start_step(name, description, bound_s)
-        self._wait_until(time.monotonic() + bound_s + timeouts.GRACE_S, description)
+        timeout_s = timeouts.STEP_TIMEOUTS_S[name]
+        self.report.start_step(name, description, timeout_s)
+        self._wait_until(time.monotonic() + timeout_s + timeouts.GRACE_S, description)
 
     def record_success(self, details: str = "") -> None:
         """Record that the current step has succeeded.
@@ -68,17 +68,17 @@ class SelfTest:
         """Record that the test has failed. Only the first reason is stored."""
         self.report.fail(reason)
 
-    def run(self, show: Callable[[], int]) -> int:
+    def run(self, run_steps: Callable[[], int]) -> int:
         """Run the test and clean up; return the exit code.
 
         Args:
-            show: Opens the window and runs the steps until the window is closed; returns its exit code.
+            run_steps: Opens the window and runs the steps until the window is closed; returns its exit code.
 
         Returns:
-            0 on success, 1 on failure. An exception or a non-zero result of ``show`` is a failure.
+            0 on success, 1 on failure. An exception or a non-zero result of ``run_steps`` is a failure.
         """
         try:
-            code = show()
+            code = run_steps()
         except Exception as error:  # noqa: BLE001  written to the report
             traceback.print_exc(file=self._crash)
             self._crash.flush()
@@ -117,18 +117,18 @@ class SelfTest:
             kill_children()
             return
         self.start_step("processes", _("every process of the test exits"))
-        family = [
+        processes = [
             process
             for process in children()
             if not is_web_process(process) and not is_windows_program(process)
         ]
-        masters = [process for process in family if is_master_process(process)]
+        masters = [process for process in processes if is_master_process(process)]
         for process in masters:
             with suppress(psutil.Error):
                 process.terminate()
-        _gone, alive = psutil.wait_procs(family, timeout=timeouts.STEP_TIMEOUTS_S["processes"])
-        if alive:
-            names = format_list([f"{process.pid} ({' '.join(command(process)[:4])})" for process in alive])
+        _exited, running = psutil.wait_procs(processes, timeout=timeouts.STEP_TIMEOUTS_S["processes"])
+        if running:
+            names = format_list([f"{process.pid} ({' '.join(command(process)[:4])})" for process in running])
             self.fail(_("These processes didn't exit: {names}").format(names=names))
             kill_children()
         else:
@@ -136,21 +136,22 @@ class SelfTest:
 
     # -- watchdog -----------------------------------------------------------------------------------------
 
-    def _wait_until(self, until: float, description: str) -> None:
+    def _wait_until(self, deadline_s: float, description: str) -> None:
         with self._changed:
-            self._step_until, self._awaited = until, description
+            self._step_deadline_s, self._awaited_result = deadline_s, description
             self._changed.notify_all()
 
     def _watch(self) -> None:
         with self._changed:
             while (
-                remaining_s := min(self._step_until, self._all_until + timeouts.GRACE_S) - time.monotonic()
+                remaining_s := min(self._step_deadline_s, self._total_deadline_s + timeouts.GRACE_S)
+                - time.monotonic()
             ) > 0:
                 self._changed.wait(remaining_s)
-            awaited = self._awaited
+            awaited_result = self._awaited_result
         self.fail(
             _("Studio didn't respond in time and was stopped. It was waiting for: {what}").format(
-                what=awaited
+                what=awaited_result
             )
         )
         self.report.finish()
@@ -169,7 +170,7 @@ def children() -> list[psutil.Process]:
 
 
 def command(process: psutil.Process) -> list[str]:
-    """Return the command line of a process; empty if the process has exited."""
+    """Return the command line of a process; empty if the process has exited or can't be read."""
     try:
         return process.cmdline()
     except (psutil.Error, OSError):  # see `is_web_process`
@@ -208,8 +209,8 @@ def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYST
 
 def kill_children() -> None:
     """Kill all descendants of this process."""
-    family = children()
-    for process in family:
+    processes = children()
+    for process in processes:
         with suppress(psutil.Error):
             process.kill()
-    psutil.wait_procs(family, timeout=KILL_TIMEOUT_S)
+    psutil.wait_procs(processes, timeout=KILL_TIMEOUT_S)

@@ -26,30 +26,30 @@ class CalculatedSamples:
         self.samples = Samples()
         self._inputs = tuple(inputs)
         self._input_revisions = [each.rewrite_count for each in inputs]
-        self._next = self._inputs[0].evicted_count  # absolute index in the first input
+        self._next_index = self._inputs[0].evicted_count  # absolute index in the first input
 
     def advance(self) -> None:
         """Calculate the samples for which all inputs are available, at most `BATCH_SIZE` per call."""
         base = self._inputs[0]
-        changed = [
+        change_times_s = [
             each.earliest_change_s(revision)
             for each, revision in zip(self._inputs, self._input_revisions, strict=True)
         ]
         self._input_revisions = [each.rewrite_count for each in self._inputs]
-        change_s = min((each for each in changed if each is not None), default=None)
+        change_s = min((each for each in change_times_s if each is not None), default=None)
         if change_s is not None:
             self.samples.truncate(change_s)
-            self._next = min(
-                self._next, base.evicted_count + int(np.searchsorted(base.times, change_s, side="left"))
+            self._next_index = min(
+                self._next_index, base.evicted_count + int(np.searchsorted(base.times, change_s, side="left"))
             )
-        if self._next < base.evicted_count:
+        if self._next_index < base.evicted_count:
             self.samples.break_line()
-        first = max(self._next, base.evicted_count) - base.evicted_count
+        first = max(self._next_index, base.evicted_count) - base.evicted_count
         end = min(self._ready_count(base), first + BATCH_SIZE)
         if end > first:
             with np.errstate(all="ignore"):  # undefined results become gaps
                 self.samples.extend(*self._compute(base, first, end))
-            self._next = base.evicted_count + end
+            self._next_index = base.evicted_count + end
 
     def _ready_count(self, base: Samples) -> int:
         # Number of the first input's samples that need not wait for other inputs.
@@ -71,30 +71,35 @@ class WindowCurve(CalculatedSamples):
         times, gaps = base.times[first:end].copy(), base.gaps[first:end].copy()
         if self._kind == "mean":
             return times, self._means(base, first, end), gaps
-        before = max(0, first - 1)
-        steps_s = np.diff(base.times[before:end], prepend=np.nan if before == first else [])
-        values = base.values[before:end]
-        joined = ~gaps
+        previous_index = max(0, first - 1)
+        steps_s = np.diff(base.times[previous_index:end], prepend=np.nan if previous_index == first else [])
+        values = base.values[previous_index:end]
+        is_connected = ~gaps
         if self._kind == "integral":
             means = 0.5 * (values[1:] + values[:-1])
-            parts = np.concatenate([[0.0], means * np.diff(base.times[before:end])])[-(end - first) :]
-            parts[~joined] = 0.0  # unknown across a gap
-            begin = float(self.samples.values[-1]) if len(self.samples) else 0.0
-            return times, begin + np.cumsum(parts), gaps
-        changes = np.diff(values, prepend=np.nan if before == first else [])
+            areas = np.concatenate([[0.0], means * np.diff(base.times[previous_index:end])])[-(end - first) :]
+            areas[~is_connected] = 0.0  # unknown across a gap
+            start_value = float(self.samples.values[-1]) if len(self.samples) else 0.0
+            return times, start_value + np.cumsum(areas), gaps
+        changes = np.diff(values, prepend=np.nan if previous_index == first else [])
         if self._kind == "derivative":
             changes = changes / steps_s
-        changes[~joined] = np.nan
+        changes[~is_connected] = np.nan
         return times, changes, gaps
 
     def _means(self, base: Samples, first: int, end: int) -> Floats:
         times, values = base.times, base.values
-        begins = np.searchsorted(times, times[first:end] - self._window_s, side="right")
-        low = int(begins[0])
-        scale = max(1.0, float(np.abs(values[low:end]).max()) / 1e290)  # avoids an overflow of the sum
-        sums = np.concatenate([[0.0], np.cumsum(values[low:end] / scale)])
-        counts = np.arange(first, end) + 1 - begins
-        means: Floats = (sums[first + 1 - low : end + 1 - low] - sums[begins - low]) / counts * scale
+        window_starts = np.searchsorted(times, times[first:end] - self._window_s, side="right")
+        lowest_start = int(window_starts[0])
+        # Scaling avoids an overflow of the sum.
+        scale = max(1.0, float(np.abs(values[lowest_start:end]).max()) / 1e290)
+        sums = np.concatenate([[0.0], np.cumsum(values[lowest_start:end] / scale)])
+        counts = np.arange(first, end) + 1 - window_starts
+        means: Floats = (
+            (sums[first + 1 - lowest_start : end + 1 - lowest_start] - sums[window_starts - lowest_start])
+            / counts
+            * scale
+        )
         return means
 
 
@@ -136,11 +141,11 @@ def held_values(samples: Samples, times: Floats) -> Floats:
     clamped = np.maximum(indexes, 0)
     values: Floats = samples.values[clamped].copy()
     age_s = times - samples.times[clamped]
-    after = np.minimum(clamped + 1, len(samples) - 1)
-    in_gap = samples.gaps[after] & (after > clamped) & (age_s > 0)
-    old = np.zeros(len(times), dtype=bool)
+    next_indexes = np.minimum(clamped + 1, len(samples) - 1)
+    is_in_gap = samples.gaps[next_indexes] & (next_indexes > clamped) & (age_s > 0)
+    is_too_old = np.zeros(len(times), dtype=bool)
     if len(samples) > 1:
-        usual_s = float(samples.times[-1] - samples.times[0]) / (len(samples) - 1)
-        old = age_s > max(MIN_HOLD_S, MAX_HELD_INTERVALS * usual_s)
-    values[(indexes < 0) | in_gap | old] = np.nan
+        usual_interval_s = float(samples.times[-1] - samples.times[0]) / (len(samples) - 1)
+        is_too_old = age_s > max(MIN_HOLD_S, MAX_HELD_INTERVALS * usual_interval_s)
+    values[(indexes < 0) | is_in_gap | is_too_old] = np.nan
     return values

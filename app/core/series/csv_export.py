@@ -66,27 +66,27 @@ def csv_chunks(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
         origin_ns: Time 0 of the curves, in ns since 1970.
     """
     yield format_csv([["stamp_ns", "time_utc", *(escape_formula(column.name) for column in columns)]])
-    states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
-    times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
-    for begin in range(0, len(times), ROWS_PER_CHUNK):
-        part = times[begin : begin + ROWS_PER_CHUNK]
+    state_times = [np.array([time_s for time_s, _value in column.states]) for column in columns]
+    times = np.unique(np.concatenate([np.empty(0), *state_times, *(column.times for column in columns)]))
+    for start in range(0, len(times), ROWS_PER_CHUNK):
+        chunk_times = times[start : start + ROWS_PER_CHUNK]
         cells = [
-            _cells_of(column, begins, float(part[0]), float(part[-1]))
-            for column, begins in zip(columns, states, strict=True)
+            _cells_of(column, column_state_times, float(chunk_times[0]), float(chunk_times[-1]))
+            for column, column_state_times in zip(columns, state_times, strict=True)
         ]
         rows = []
-        for time_s in part.tolist():
+        for time_s in chunk_times.tolist():
             stamp_ns = origin_ns + round(time_s * 1e9)
             rows.append([str(stamp_ns), _format_iso(stamp_ns), *(each.get(time_s, "") for each in cells)])
         yield format_csv(rows)
 
 
-def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
+def _cells_of(column: CsvColumn, state_times: Floats, begin_s: float, end_s: float) -> dict[float, str]:
     # Of several values at the same time the newest counts.
     first, last = _index_range(column.times, begin_s, end_s)
     numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}
-    first, last = _index_range(states, begin_s, end_s)
+    first, last = _index_range(state_times, begin_s, end_s)
     return cells | {time_s: escape_formula(text) for time_s, text in column.states[first:last]}
 
 

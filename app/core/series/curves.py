@@ -102,7 +102,7 @@ class Curves:
 
     # -- commands of the user ----------------------------------------------------------------------
 
-    def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
+    def add(self, text: str, extra_topics: Iterable[str] = ()) -> list[Curve]:
         """Add and return the curves for a typed expression, except for curves that are already plotted.
 
         A path with ``[*]`` adds a curve for each array element. A field that does not exist is no
@@ -110,17 +110,17 @@ class Curves:
 
         Args:
             text: Expression that the user typed.
-            also: Names of topics that are valid although they don't exist at the moment.
+            extra_topics: Names of topics that are valid although they don't exist at the moment.
 
         Raises:
             CurveError: The expression is invalid, its array is empty, or there are too many curves.
                 Nothing is added; the message says how to fix it.
         """
-        source = parse(text, [*self._known_topics(), *also])
+        source = parse(text, [*self._known_topics(), *extra_topics])
         sources: Sequence[Source] = [source]
         if isinstance(source, FieldSource) and source.path.has_wildcard:
             payload = self.payload_of(source.topic)
-            sources = [FieldSource(source.topic, path) for path in source.path.expanded(payload)]
+            sources = [FieldSource(source.topic, path) for path in source.path.expand(payload)]
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
@@ -131,7 +131,7 @@ class Curves:
         Raises:
             CurveError: The array of a path with ``[*]`` is empty, or there are too many curves.
         """
-        paths = path.expanded(self.payload_of(topic)) if path.has_wildcard else [path]
+        paths = path.expand(self.payload_of(topic)) if path.has_wildcard else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
     def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
@@ -144,14 +144,14 @@ class Curves:
         Raises:
             CurveError: There are no sources, or too many curves.
         """
-        existing = {each.text for each in self.all}
-        new = [each for each in sources if str(each) not in existing]
+        plotted_texts = {each.text for each in self.all}
+        new_sources = [each for each in sources if str(each) not in plotted_texts]
         if not sources:
             raise CurveError(_("{text} has no elements now").format(text=text))
-        if len(self.all) + len(new) > MAX_CURVES:
+        if len(self.all) + len(new_sources) > MAX_CURVES:
             raise CurveError(_("a plot can have at most {count} curves").format(count=MAX_CURVES))
         curves = []
-        for source in new:
+        for source in new_sources:
             shared = self._acquire(source)
             curves.append(Curve(str(source), source, shared.samples, shared.series))
         self.all += curves
@@ -249,7 +249,7 @@ class Curves:
         return list(dict.fromkeys([*self._topics, *self._existing_topics()]))
 
     def _acquire(self, source: Source) -> _SharedSamples:
-        # Creates it at the first use; counts the users.
+        # Creates the samples at the first use, and counts their users.
         name = str(source)
         shared = self._shared.get(name)
         if shared is None:
@@ -299,6 +299,6 @@ class Curves:
                 self._feed.unregister(topic.topic, topic)
 
     def _distribute_capacity(self) -> None:
-        each = max(MIN_SAMPLES, min(MAX_SAMPLES, MAX_TOTAL_SAMPLES // max(1, len(self._shared))))
+        capacity = max(MIN_SAMPLES, min(MAX_SAMPLES, MAX_TOTAL_SAMPLES // max(1, len(self._shared))))
         for shared in self._shared.values():
-            shared.samples.limit = each
+            shared.samples.limit = capacity

@@ -8,7 +8,7 @@ from typing import Protocol
 from app.core.network.mailbox import Batch
 from app.core.network.watches import WatchHandle
 
-DEEP_CAPACITY = 8192
+LOSSLESS_CAPACITY = 8192
 """Maximum number of messages of a plotted topic between two ticks, enough for 8 s at 1 kHz."""
 
 
@@ -42,68 +42,71 @@ class SeriesFeed:
         self,
         watch: Callable[[str], WatchHandle],
         clock_ns: Callable[[], int],
-        set_room: Callable[[str, int | None], None] = lambda _topic, _messages: None,
+        set_capacity: Callable[[str, int | None], None] = lambda _topic, _messages: None,
     ) -> None:
-        # `watch` opens a watch by topic key; `set_room` sets the number of messages kept between ticks
+        # `watch` opens a watch by topic key; `set_capacity` sets the number of messages kept between ticks
         # (`Mailbox.set_capacity`).
-        self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
-        self._takers: dict[str, list[SeriesReceiver]] = {}
+        self._watch, self._clock_ns, self._set_capacity = watch, clock_ns, set_capacity
+        self._receivers: dict[str, list[SeriesReceiver]] = {}
         self._lossless_receivers: dict[str, list[SeriesReceiver]] = {}
-        self._watching: dict[str, WatchHandle] = {}
+        self._watch_handles: dict[str, WatchHandle] = {}
         self.origin_ns = clock_ns()
 
     @property
     def topics(self) -> tuple[str, ...]:
         """Names of the topics that have a receiver."""
-        return tuple(self._takers)
+        return tuple(self._receivers)
 
     def now_s(self) -> float:
         """Return the current time of this computer in seconds since ``origin_ns``."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
-    def register(self, topic: str, taker: SeriesReceiver, *, is_lossless: bool = True) -> None:
+    def register(self, topic: str, receiver: SeriesReceiver, *, is_lossless: bool = True) -> None:
         """Add a receiver for the messages of a topic.
 
         Args:
             topic: Key of the topic.
-            taker: Receiver.
+            receiver: Receiver.
             is_lossless: True to receive all messages, and the history of a recording. If False, messages may
                 be dropped while the window is busy.
         """
-        self._takers.setdefault(topic, []).append(taker)
+        self._receivers.setdefault(topic, []).append(receiver)
         if is_lossless:
-            deep_ones = self._lossless_receivers.setdefault(topic, [])
-            deep_ones.append(taker)
-            if len(deep_ones) == 1:
-                self._set_room(topic, DEEP_CAPACITY)
-        if topic not in self._watching:
-            self._watching[topic] = self._watch(topic)
+            lossless_receivers = self._lossless_receivers.setdefault(topic, [])
+            lossless_receivers.append(receiver)
+            if len(lossless_receivers) == 1:
+                self._set_capacity(topic, LOSSLESS_CAPACITY)
+        if topic not in self._watch_handles:
+            self._watch_handles[topic] = self._watch(topic)
 
-    def unregister(self, topic: str, taker: SeriesReceiver) -> None:
+    def unregister(self, topic: str, receiver: SeriesReceiver) -> None:
         """Remove a receiver. Idempotent."""
-        takers, lossless = self._takers.get(topic, []), self._lossless_receivers.get(topic, [])
-        if taker in takers:
-            takers.remove(taker)
-        if not takers and topic in self._watching:
-            del self._takers[topic]
-            self._watching.pop(topic).close()
-        if taker in lossless:
-            lossless.remove(taker)
-            if not lossless:
+        receivers, lossless_receivers = (
+            self._receivers.get(topic, []),
+            self._lossless_receivers.get(topic, []),
+        )
+        if receiver in receivers:
+            receivers.remove(receiver)
+        if not receivers and topic in self._watch_handles:
+            del self._receivers[topic]
+            self._watch_handles.pop(topic).close()
+        if receiver in lossless_receivers:
+            lossless_receivers.remove(receiver)
+            if not lossless_receivers:
                 del self._lossless_receivers[topic]
-                self._set_room(topic, None)
+                self._set_capacity(topic, None)
 
     def reset(self, topics: Iterable[str] | None = None) -> None:
         """Reset the receivers of topics (None: all topics). Called when the source seeks to another time."""
-        for topic in list(self._takers) if topics is None else topics:
-            for taker in self._takers.get(topic, ()):
-                taker.reset()
+        for topic in list(self._receivers) if topics is None else topics:
+            for receiver in self._receivers.get(topic, ()):
+                receiver.reset()
 
     def dispatch(self, batches: Mapping[str, Batch]) -> None:
         """Pass the messages received since the last tick to the receivers."""
-        if not self._takers:
+        if not self._receivers:
             return
         now_ns = self._clock_ns()
         for topic, batch in batches.items():
-            for taker in self._takers.get(topic, ()):
-                taker.process(batch, now_ns)
+            for receiver in self._receivers.get(topic, ()):
+                receiver.process(batch, now_ns)

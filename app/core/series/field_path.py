@@ -100,8 +100,8 @@ class FieldPath:
 
     def __str__(self) -> str:
         # Can be parsed again.
-        written = "".join(_format_step(step) for step in self.steps)
-        return written.removeprefix(".")
+        text = "".join(_format_step(step) for step in self.steps)
+        return text.removeprefix(".")
 
     def value_in(self, payload: object) -> object:
         """Return the value at the path in a decoded message; `MISSING` if there is none."""
@@ -111,15 +111,15 @@ class FieldPath:
             if type(value) is dict or isinstance(value, Mapping):
                 value = value.get(step, MISSING)
             elif isinstance(step, int) and is_list(value):
-                few: Sequence[object] = value  # type: ignore[assignment]
-                value = few[step] if -len(few) <= step < len(few) else MISSING
+                items: Sequence[object] = value  # type: ignore[assignment]
+                value = items[step] if -len(items) <= step < len(items) else MISSING
             elif self.steps == (BARE_VALUE_KEY,) and not is_list(value):
                 return value
             else:
                 return MISSING
         return value
 
-    def expanded(self, payload: object) -> list[FieldPath]:
+    def expand(self, payload: object) -> list[FieldPath]:
         """Return the paths in which each `ALL` is replaced with the indices of the array in a message.
 
         A path without `ALL` is returned as the only one. At most 65 paths are returned, one more than
@@ -129,12 +129,12 @@ class FieldPath:
         if not self.has_wildcard:
             return [self]
         index = self.steps.index(ALL)
-        above = FieldPath(self.steps[:index]).value_in(payload) if index else payload
-        count = min(len(above), MAX_EXPANDED_PATHS) if is_list(above) else 0  # type: ignore[arg-type]
+        array = FieldPath(self.steps[:index]).value_in(payload) if index else payload
+        count = min(len(array), MAX_EXPANDED_PATHS) if is_list(array) else 0  # type: ignore[arg-type]
         paths: list[FieldPath] = []
         for number in range(count):
             path = FieldPath((*self.steps[:index], number, *self.steps[index + 1 :]))
-            paths += path.expanded(payload)
+            paths += path.expand(payload)
         return paths[:MAX_EXPANDED_PATHS]
 
 
@@ -191,24 +191,24 @@ def fields_of(payload: object, max_fields: int = MAX_FIELDS) -> Iterator[Plottab
         payload: Decoded message.
         max_fields: Maximum number of values.
     """
-    waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
+    queue: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
-        waiting = [((BARE_VALUE_KEY,), payload)]
-    produced = 0
-    while waiting and produced < max_fields:
-        steps, value = waiting.pop(0)
+        queue = [((BARE_VALUE_KEY,), payload)]
+    yielded_count = 0
+    while queue and yielded_count < max_fields:
+        steps, value = queue.pop(0)
         kind = kind_of_value(value)
         if kind is not None:
-            produced += 1
+            yielded_count += 1
             count = len(value) if kind == "list" else 1  # type: ignore[arg-type]
             yield PlottableField(FieldPath((*steps, ALL) if kind == "list" else steps), kind, value, count)
-        if len(steps) >= MAX_STEPS or len(waiting) > max_fields:
+        if len(steps) >= MAX_STEPS or len(queue) > max_fields:
             continue
         if isinstance(value, Mapping):
-            entries = ((key, below) for key, below in value.items() if isinstance(key, str))
-            waiting += [((*steps, key), below) for key, below in islice(entries, max_fields)]
+            entries = ((key, nested) for key, nested in value.items() if isinstance(key, str))
+            queue += [((*steps, key), nested) for key, nested in islice(entries, max_fields)]
         elif is_list(value):
-            waiting += [((*steps, index), below) for index, below in enumerate(islice(value, 4))]  # type: ignore[call-overload]
+            queue += [((*steps, index), nested) for index, nested in enumerate(islice(value, 4))]  # type: ignore[call-overload]
 
 
 def kind_of_value(value: object) -> FieldKind | None:
@@ -222,9 +222,11 @@ def kind_of_value(value: object) -> FieldKind | None:
     if isinstance(value, (int, float)):
         return "number"
     if is_list(value):
-        few = list(islice(value, 8))  # type: ignore[call-overload]
-        numbers = all(isinstance(each, (int, float)) and not isinstance(each, bool) for each in few)
-        return "list" if few and numbers else None
+        first_items = list(islice(value, 8))  # type: ignore[call-overload]
+        are_numbers = all(
+            isinstance(each, (int, float)) and not isinstance(each, bool) for each in first_items
+        )
+        return "list" if first_items and are_numbers else None
     return None
 
 

@@ -34,14 +34,14 @@ class FieldSeries:
 
     Attributes:
         last: Newest value as received.
-        missing: Number of messages without the field.
+        missing_count: Number of messages without the field.
     """
 
     def __init__(self, topic: str, path: FieldPath) -> None:
         self.topic, self.path = topic, path
         self.numbers, self.states = Samples(), States()
         self.last: object = MISSING
-        self.missing = 0
+        self.missing_count = 0
 
     @property
     def is_state(self) -> bool:
@@ -56,38 +56,38 @@ class FieldSeries:
             payloads: Decoded messages; `UNREADABLE` for a message that can't be decoded.
             gaps: True for each message before which messages are missing.
         """
-        find = self.path.value_in
+        value_in = self.path.value_in
         times: list[float] = []
         values: list[float] = []
-        marks: list[bool] = []
-        number_gap = state_gap = False
+        number_gaps: list[bool] = []
+        has_number_gap = has_state_gap = False
         has_states = len(self.states) > 0
-        for time_s, payload, gap in zip(times_s, payloads, gaps, strict=True):
-            if gap:
-                number_gap = state_gap = True
-            value = MISSING if payload is UNREADABLE else find(payload)
-            kind = type(value)
-            if kind is float or kind is int:
+        for time_s, payload, is_after_gap in zip(times_s, payloads, gaps, strict=True):
+            if is_after_gap:
+                has_number_gap = has_state_gap = True
+            value = MISSING if payload is UNREADABLE else value_in(payload)
+            value_type = type(value)
+            if value_type is float or value_type is int:
                 times.append(time_s)
-                values.append(value if kind is float else to_float(value))  # type: ignore[arg-type]
-                marks.append(number_gap)
-                number_gap = False
+                values.append(value if value_type is float else to_float(value))  # type: ignore[arg-type]
+                number_gaps.append(has_number_gap)
+                has_number_gap = False
                 if has_states:
                     self.states.add(time_s, None)
-            elif kind is str or kind is bool:
-                state = value if kind is str else "true" if value else "false"
-                self.states.add(time_s, str(state), gap=state_gap)
-                number_gap, state_gap, has_states = True, False, True
+            elif value_type is str or value_type is bool:
+                state = value if value_type is str else "true" if value else "false"
+                self.states.add(time_s, str(state), gap=has_state_gap)
+                has_number_gap, has_state_gap, has_states = True, False, True
             else:
-                self.missing += 1
+                self.missing_count += 1
                 if has_states:
                     self.states.add(time_s, None)
-                number_gap = True
+                has_number_gap = True
             if payload is not UNREADABLE:
                 self.last = value
         if times:
-            self.numbers.extend(np.array(times), np.array(values), np.array(marks, dtype=bool))
-        if number_gap:
+            self.numbers.extend(np.array(times), np.array(values), np.array(number_gaps, dtype=bool))
+        if has_number_gap:
             self.numbers.break_line()
 
     def reset(self) -> None:
@@ -95,7 +95,7 @@ class FieldSeries:
         self.numbers.clear()
         self.states.clear()
         self.last = MISSING
-        self.missing = 0
+        self.missing_count = 0
 
 
 def to_float(value: object) -> float:
@@ -122,11 +122,11 @@ class TopicSeries:
         self.fields: list[FieldSeries] = []
         self.received = self.lost = self.unreadable_count = self.invalid_stamp_count = 0
         self.payload: object = MISSING
-        self._gap = False  # messages are missing before the next one
-        self._seqs: dict[int | None, int] = {}
+        self._has_gap = False  # messages are missing before the next one
+        self._last_seqs: dict[int | None, int] = {}
         self._last_s: float | None = None
-        self._usual_s: float | None = None
-        self._silences = 0  # consecutive
+        self._usual_interval_s: float | None = None
+        self._silence_count = 0  # consecutive
 
     def add_field(self, field: FieldSeries) -> None:
         """Add a field. Its values are read from the newest message and from all later messages."""
@@ -138,39 +138,39 @@ class TopicSeries:
         """Add the messages received since the last tick."""
         # publishers, because dropped messages also appear as jumps of their sequence numbers
         seen_publishers: set[int | None] = set()
-        lost = first_jumps = 0
+        lost = missing_before_batch = 0
         times: list[float] = []
         payloads: list[object] = []
         gaps: list[bool] = []
-        pending = self._gap or batch.dropped > 0
+        has_gap = self._has_gap or batch.dropped > 0
         for message in batch.messages:
-            jump, publisher = self._missing_count(message), message.publisher
+            missing, publisher = self._missing_count(message), message.publisher
             if publisher not in seen_publishers:
                 seen_publishers.add(publisher)
-                first_jumps += jump
-            elif jump:
-                lost += jump
+                missing_before_batch += missing
+            elif missing:
+                lost += missing
             time_s = self._time_of(message, now_ns)
-            pending = pending or jump > 0
+            has_gap = has_gap or missing > 0
             if time_s is None:
                 self.invalid_stamp_count += 1
-                pending = True
+                has_gap = True
                 continue
             times.append(time_s)
             payloads.append(self._read(message))
-            gaps.append(pending or self._is_silence(time_s))
+            gaps.append(has_gap or self._is_silence(time_s))
             self._last_s = time_s
-            pending = False
-        self._gap = pending
+            has_gap = False
+        self._has_gap = has_gap
         self.received += len(batch.messages)
-        self.lost += lost + max(batch.dropped, first_jumps)
+        self.lost += lost + max(batch.dropped, missing_before_batch)
         for field in self.fields:
             field.add_values(times, payloads, gaps)
 
     def reset(self) -> None:
         """Remove all values. Called when the source seeks to another time."""
-        self._seqs.clear()
-        self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
+        self._last_seqs.clear()
+        self._has_gap, self._last_s, self._usual_interval_s, self._silence_count = False, None, None, 0
         self.received = self.lost = self.unreadable_count = self.invalid_stamp_count = 0
         self.payload = MISSING
         for field in self.fields:
@@ -181,12 +181,12 @@ class TopicSeries:
         seq, publisher = message.seq, message.publisher
         if seq is None:
             return 0
-        before = self._seqs.get(publisher)
-        if before is None and len(self._seqs) >= MAX_PUBLISHERS:
-            self._seqs.clear()
-        self._seqs[publisher] = seq
+        last_seq = self._last_seqs.get(publisher)
+        if last_seq is None and len(self._last_seqs) >= MAX_PUBLISHERS:
+            self._last_seqs.clear()
+        self._last_seqs[publisher] = seq
         # a latched message is repeated; a restarted publisher has lost nothing
-        return seq - before - 1 if before is not None and seq > before else 0
+        return seq - last_seq - 1 if last_seq is not None and seq > last_seq else 0
 
     def _time_of(self, message: Message, now_ns: int) -> float | None:
         stamp_ns = message.stamp_ns
@@ -211,18 +211,22 @@ class TopicSeries:
     def _is_silence(self, time_s: float) -> bool:
         if self._last_s is None:
             return False
-        pause_s, usual_s = time_s - self._last_s, self._usual_s
-        if usual_s is not None and 0 < pause_s <= MIN_SILENCE_S:  # the usual case
-            self._silences = 0
-            self._usual_s = usual_s + 0.1 * (pause_s - usual_s)
+        pause_s, usual_interval_s = time_s - self._last_s, self._usual_interval_s
+        if usual_interval_s is not None and 0 < pause_s <= MIN_SILENCE_S:  # the usual case
+            self._silence_count = 0
+            self._usual_interval_s = usual_interval_s + 0.1 * (pause_s - usual_interval_s)
             return False
         if pause_s <= 0 or not isfinite(pause_s):
             return False
-        if usual_s is not None and pause_s > max(MIN_SILENCE_S, MIN_SILENCE_INTERVALS * usual_s):
-            self._silences += 1
-            if self._silences < MIN_CONSECUTIVE_SILENCES:
+        if usual_interval_s is not None and pause_s > max(
+            MIN_SILENCE_S, MIN_SILENCE_INTERVALS * usual_interval_s
+        ):
+            self._silence_count += 1
+            if self._silence_count < MIN_CONSECUTIVE_SILENCES:
                 return True
-            usual_s = None
-        self._silences = 0
-        self._usual_s = pause_s if usual_s is None else usual_s + 0.1 * (pause_s - usual_s)
+            usual_interval_s = None
+        self._silence_count = 0
+        self._usual_interval_s = (
+            pause_s if usual_interval_s is None else usual_interval_s + 0.1 * (pause_s - usual_interval_s)
+        )
         return False

@@ -59,8 +59,8 @@ class FieldSource:
     path: FieldPath
 
     def __str__(self) -> str:
-        written = str(self.path)
-        return f"{self.topic}{written}" if written.startswith("[") else f"{self.topic}.{written}"
+        path = str(self.path)
+        return f"{self.topic}{path}" if path.startswith("[") else f"{self.topic}.{path}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,10 +122,10 @@ def parse_field(text: str, topics: Sequence[str]) -> FieldSource | None:
     topic = _topic_at(text, topics)
     if topic is None:
         return None
-    rest = text[len(topic) :]
-    if rest and not _FIELD_PATTERN.fullmatch(rest):
+    remainder = text[len(topic) :]
+    if remainder and not _FIELD_PATTERN.fullmatch(remainder):
         return None
-    return FieldSource(topic, FieldPath.parse(rest.removeprefix(".")))
+    return FieldSource(topic, FieldPath.parse(remainder.removeprefix(".")))
 
 
 def parse(text: str, topics: Sequence[str]) -> Source:
@@ -142,7 +142,7 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     if not text or len(text) > MAX_LENGTH:
         raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
     field_source = parse_field(text, topics)
-    return field_source if field_source is not None else _Parser(text, topics).read()
+    return field_source if field_source is not None else _Parser(text, topics).parse()
 
 
 def _topic_at(text: str, topics: Sequence[str]) -> str | None:
@@ -162,7 +162,7 @@ class _Parser:
         self._text, self._topics = text, topics
         self._fields: list[FieldSource] = []
 
-    def read(self) -> Source:
+    def parse(self) -> Source:
         python = self._to_python()
         try:
             tree = parse_expression(python)
@@ -177,37 +177,40 @@ class _Parser:
 
     def _to_python(self) -> str:
         # As Python source: a name for each field, seconds for each duration.
-        out: list[str] = []
-        position, wants_value = 0, True
+        parts: list[str] = []
+        position, expects_value = 0, True
         while position < len(self._text):
             letter = self._text[position]
-            if wants_value and (letter == "/" or _topic_at(self._text[position:], self._topics)):
+            if expects_value and (letter == "/" or _topic_at(self._text[position:], self._topics)):
                 end = self._parse_field(position)
-                out.append(f"_{len(self._fields) - 1}")
-                position, wants_value = end, False
+                parts.append(f"_{len(self._fields) - 1}")
+                position, expects_value = end, False
                 continue
-            duration = _DURATION_PATTERN.match(self._text, position) if wants_value else None
+            duration = _DURATION_PATTERN.match(self._text, position) if expects_value else None
             if duration is not None:
-                out.append(repr(float(duration[1]) * _UNIT_SECONDS[duration[2]]))
-                position, wants_value = duration.end(), False
+                parts.append(repr(float(duration[1]) * _UNIT_SECONDS[duration[2]]))
+                position, expects_value = duration.end(), False
                 continue
-            before = self._text[position - 1 : position]
-            if letter == "_" and not (before.isalnum() or before in {"_", "."}):  # only fields get such names
+            previous_letter = self._text[position - 1 : position]
+            # Only fields get names that begin with an underscore.
+            if letter == "_" and not (previous_letter.isalnum() or previous_letter in {"_", "."}):
                 raise CurveError(_("'{text}' isn't a valid formula").format(text=self._text[:80]))
-            out.append("**" if letter == "^" else letter)
+            parts.append("**" if letter == "^" else letter)
             if not letter.isspace():
-                wants_value = letter in "(,+-*/%^"
+                expects_value = letter in "(,+-*/%^"
             position += 1
-        return "".join(out)
+        return "".join(parts)
 
     def _parse_field(self, position: int) -> int:
         # Adds the field at this position; returns its end.
-        rest = self._text[position:]
-        topic = _topic_at(rest, self._topics)
+        remainder = self._text[position:]
+        topic = _topic_at(remainder, self._topics)
         if topic is None:
-            unknown = _UNKNOWN_TOPIC_PATTERN.match(rest)
-            raise unknown_topic_error(unknown[0] if unknown is not None else rest[:40], self._topics)
-        path = _FIELD_PATTERN.match(rest, len(topic))
+            unknown_topic = _UNKNOWN_TOPIC_PATTERN.match(remainder)
+            raise unknown_topic_error(
+                unknown_topic[0] if unknown_topic is not None else remainder[:40], self._topics
+            )
+        path = _FIELD_PATTERN.match(remainder, len(topic))
         if path is None:
             raise CurveError(_("the field after {topic} is missing").format(topic=topic))
         field_source = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
@@ -258,9 +261,9 @@ class _Parser:
             constant = np.float64(CONSTANTS[node.id])
             return lambda _arrays: constant  # type: ignore[return-value]
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
-            inner = self._parse_calculation(node.operand, inputs)
+            operand = self._parse_calculation(node.operand, inputs)
             sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
-            return lambda arrays: sign * inner(arrays)
+            return lambda arrays: sign * operand(arrays)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             operator = OPERATORS[type(node.op)]
             left, right = (
@@ -303,8 +306,8 @@ class _Parser:
         return lambda arrays: arrays[index]
 
     def _source_text(self, node: ast.expr) -> str:
-        written = ast.unparse(node).replace("**", "^")
-        return re.sub(r"\b_(\d+)\b", lambda found: str(self._fields[int(found[1])]), written)
+        text = ast.unparse(node).replace("**", "^")
+        return re.sub(r"\b_(\d+)\b", lambda match: str(self._fields[int(match[1])]), text)
 
 
 def _constant(value: object) -> Floats:

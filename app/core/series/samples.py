@@ -65,31 +65,33 @@ class _Level:
     """Minimum, maximum and sum of each complete group of ``1 << shift`` samples."""
 
     def __init__(self, shift: int) -> None:
-        self.shift, self.built = shift, 0
+        self.shift, self.built_count = shift, 0
         self.low, self.high, self.total = np.empty(0), np.empty(0), np.empty(0)
 
     def build(self, values: Floats, count: int) -> None:
         bucket_count = count >> self.shift
-        if bucket_count <= self.built:
+        if bucket_count <= self.built_count:
             return
         if bucket_count > len(self.low):
-            room = max(bucket_count, 2 * len(self.low), 64)
+            capacity = max(bucket_count, 2 * len(self.low), 64)
             self.low, self.high, self.total = (
-                np.concatenate([each, np.empty(room - len(each))])
+                np.concatenate([each, np.empty(capacity - len(each))])
                 for each in (self.low, self.high, self.total)
             )
-        part = values[self.built << self.shift : bucket_count << self.shift].reshape(-1, 1 << self.shift)
-        new = slice(self.built, bucket_count)
-        self.low[new], self.high[new] = part.min(axis=1), part.max(axis=1)
+        groups = values[self.built_count << self.shift : bucket_count << self.shift].reshape(
+            -1, 1 << self.shift
+        )
+        new_range = slice(self.built_count, bucket_count)
+        self.low[new_range], self.high[new_range] = groups.min(axis=1), groups.max(axis=1)
         with np.errstate(over="ignore", invalid="ignore"):
-            self.total[new] = part.sum(axis=1)
-        self.built = bucket_count
+            self.total[new_range] = groups.sum(axis=1)
+        self.built_count = bucket_count
 
     def discard(self, buckets: int) -> None:
-        remaining = max(0, self.built - buckets)
+        remaining = max(0, self.built_count - buckets)
         for array in (self.low, self.high, self.total):
             array[:remaining] = array[buckets : buckets + remaining].copy()
-        self.built = remaining
+        self.built_count = remaining
 
 
 @dataclass(slots=True)
@@ -114,9 +116,9 @@ class _Pixels:
         if end <= first:
             return _Pixels(first, first)
         low, high = np.searchsorted(self.keys, (first, end))
-        both = slice(2 * low, 2 * high)
+        points = slice(2 * low, 2 * high)
         return _Pixels(
-            first, end, self.keys[low:high], self.times[both], self.values[both], self.gaps[low:high]
+            first, end, self.keys[low:high], self.times[points], self.values[points], self.gaps[low:high]
         )
 
     @classmethod
@@ -161,7 +163,7 @@ class Samples:
         self._render_cache = _PixelCache()
         self._rewrites: deque[tuple[int, float]] = deque(maxlen=_MAX_REWRITES)
         self.rewrite_count = 0
-        self._gap_pending = False
+        self._has_pending_gap = False
 
     def __len__(self) -> int:
         return self._count
@@ -201,7 +203,7 @@ class Samples:
 
     def break_line(self) -> None:
         """Insert a gap before the next sample."""
-        self._gap_pending = self._count > 0
+        self._has_pending_gap = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
         """Add samples in order of arrival. Samples that aren't finite become gaps.
@@ -214,16 +216,16 @@ class Samples:
             values: Values.
             gaps: True for each sample that follows a gap.
         """
-        finite = np.isfinite(times) & np.isfinite(values)
-        if not finite.all():
-            gaps = _carry_gaps(gaps, finite)
-            if not finite.any():
-                self._gap_pending = self._gap_pending or self._count > 0
+        is_finite = np.isfinite(times) & np.isfinite(values)
+        if not is_finite.all():
+            gaps = _carry_gaps(gaps, is_finite)
+            if not is_finite.any():
+                self._has_pending_gap = self._has_pending_gap or self._count > 0
                 return
-            trailing = not finite[-1]
-            times, values, gaps = times[finite], values[finite], gaps[finite]
+            has_trailing_gap = not is_finite[-1]
+            times, values, gaps = times[is_finite], values[is_finite], gaps[is_finite]
         else:
-            trailing = False
+            has_trailing_gap = False
         if len(times) == 0:
             return
         last = self.last_s
@@ -232,7 +234,7 @@ class Samples:
         else:
             for time_s, value, gap in zip(times.tolist(), values.tolist(), gaps.tolist(), strict=True):
                 self._add_sample(time_s, value, gap=gap)
-        if trailing:
+        if has_trailing_gap:
             self.break_line()
         self._evict_old()
 
@@ -248,10 +250,10 @@ class Samples:
 
     def _append(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
         self._reserve(len(times))
-        new = slice(self._count, self._count + len(times))
-        self._times[new], self._values[new], self._gaps[new] = times, values, gaps
-        self._gaps[self._count] = self._count > 0 and (bool(gaps[0]) or self._gap_pending)
-        self._gap_pending = False
+        new_range = slice(self._count, self._count + len(times))
+        self._times[new_range], self._values[new_range], self._gaps[new_range] = times, values, gaps
+        self._gaps[self._count] = self._count > 0 and (bool(gaps[0]) or self._has_pending_gap)
+        self._has_pending_gap = False
         self._count += len(times)
 
     def _add_sample(self, time_s: float, value: float, *, gap: bool) -> None:
@@ -287,7 +289,7 @@ class Samples:
             self.removed_count += self._count - index
             self._count = index
             self._record_rewrite(index, time_s)
-        self._gap_pending = self._gap_pending and self._count > 0
+        self._has_pending_gap = self._has_pending_gap and self._count > 0
 
     def clear(self) -> None:
         """Remove all samples."""
@@ -296,7 +298,7 @@ class Samples:
 
     def _record_rewrite(self, index: int, time_s: float) -> None:
         for level in self._levels:
-            level.built = min(level.built, index >> level.shift)
+            level.built_count = min(level.built_count, index >> level.shift)
         self.rewrite_count += 1
         self._rewrites.append((self.rewrite_count, time_s))
 
@@ -314,13 +316,13 @@ class Samples:
             return -np.inf
         return min(time_s for number, time_s in self._rewrites if number > revision)
 
-    def _reserve(self, more: int) -> None:
-        need = self._count + more
-        if need > len(self._times):
-            room = max(need, 2 * len(self._times))
+    def _reserve(self, sample_count: int) -> None:
+        required_count = self._count + sample_count
+        if required_count > len(self._times):
+            capacity = max(required_count, 2 * len(self._times))
             for name in ("_times", "_values", "_gaps"):
                 old = getattr(self, name)
-                new = np.zeros(room, dtype=old.dtype)
+                new = np.zeros(capacity, dtype=old.dtype)
                 new[: self._count] = old[: self._count]
                 setattr(self, name, new)
 
@@ -333,20 +335,21 @@ class Samples:
     def _evict_old(self) -> None:
         if self._count <= self.limit:
             return
-        oldest = self._count - self.limit * 3 // 4
-        drop = min(
-            -(-oldest // _EVICTION_UNIT) * _EVICTION_UNIT, self._count // _EVICTION_UNIT * _EVICTION_UNIT
+        min_evicted_count = self._count - self.limit * 3 // 4
+        evicted_count = min(
+            -(-min_evicted_count // _EVICTION_UNIT) * _EVICTION_UNIT,
+            self._count // _EVICTION_UNIT * _EVICTION_UNIT,
         )
-        if drop <= 0:
+        if evicted_count <= 0:
             return
-        remaining = self._count - drop
+        remaining = self._count - evicted_count
         for level in self._levels:
             level.build(self.values, self._count)
         for array in (self._times, self._values, self._gaps):
-            array[:remaining] = array[drop : self._count].copy()
+            array[:remaining] = array[evicted_count : self._count].copy()
         for level in self._levels:
-            level.discard(drop >> level.shift)
-        self._count, self.evicted_count = remaining, self.evicted_count + drop
+            level.discard(evicted_count >> level.shift)
+        self._count, self.evicted_count = remaining, self.evicted_count + evicted_count
         self._shrink_arrays()
 
     # -- queries -----------------------------------------------------------------------------------
@@ -400,29 +403,31 @@ class Samples:
             columns: Width in pixels.
         """
         first, end = self.index_range(begin_s, end_s)
-        points = end - first
+        sample_count = end - first
         first, end = max(0, first - 1), min(self._count, end + 1)
         columns = max(1, columns)
         if end - first <= MAX_SAMPLES_PER_PIXEL * columns or end_s <= begin_s:
             pixel_s = max(0.0, end_s - begin_s) / columns
-            return Polyline(*self._all_samples(first, end, pixel_s), points, is_complete=True)
+            return Polyline(*self._all_samples(first, end, pixel_s), sample_count, is_complete=True)
         return self._peak_line(begin_s, end_s, columns, (first, end))
 
     def _all_samples(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
         # NaN at gaps; a sample between two gaps is drawn one pixel wide.
         times, values, gaps = self._times[first:end], self._values[first:end], self._gaps[first:end]
-        begins, ends = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
+        is_after_gap, is_before_gap = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
         if first == 0:
-            begins[:1] = True
-        isolated_indexes = np.flatnonzero(begins & ends[: len(begins)])
-        until = np.minimum(times[isolated_indexes] + pixel_s, np.append(times[1:], np.inf)[isolated_indexes])
-        broken = np.flatnonzero(gaps)
-        broken = broken[broken > 0]
-        indexes = np.concatenate([isolated_indexes + 1, broken])
+            is_after_gap[:1] = True
+        isolated_indexes = np.flatnonzero(is_after_gap & is_before_gap[: len(is_after_gap)])
+        end_times = np.minimum(
+            times[isolated_indexes] + pixel_s, np.append(times[1:], np.inf)[isolated_indexes]
+        )
+        gap_indexes = np.flatnonzero(gaps)
+        gap_indexes = gap_indexes[gap_indexes > 0]
+        indexes = np.concatenate([isolated_indexes + 1, gap_indexes])
         return (
-            np.insert(times, indexes, np.concatenate([until, times[broken]])),
+            np.insert(times, indexes, np.concatenate([end_times, times[gap_indexes]])),
             np.insert(
-                values, indexes, np.concatenate([values[isolated_indexes], np.full(len(broken), np.nan)])
+                values, indexes, np.concatenate([values[isolated_indexes], np.full(len(gap_indexes), np.nan)])
             ),
         )
 
@@ -444,26 +449,31 @@ class Samples:
                 width, (first, end), max(0, int(previous_index) - uses_previous_sample), part[1]
             )
             first += uses_previous_sample
-        sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
-        cacheable = pixels.part(first, max(first, min(sure, end - 1)))
+        last_stable_key = (
+            float(np.floor(self._times[self._count - 1] / width)) - 1
+        )  # later pixels may get more samples
+        cacheable = pixels.part(first, max(first, min(last_stable_key, end - 1)))
         self._render_cache = _PixelCache(width, self.rewrite_count, self.evicted_count, cacheable)
         times, values = pixels.times, pixels.values
-        broken = 2 * np.flatnonzero(pixels.gaps)
-        broken = broken[broken > 0]
-        if len(broken):
-            times, values = np.insert(times, broken, times[broken]), np.insert(values, broken, np.nan)
+        gap_indexes = 2 * np.flatnonzero(pixels.gaps)
+        gap_indexes = gap_indexes[gap_indexes > 0]
+        if len(gap_indexes):
+            times, values = (
+                np.insert(times, gap_indexes, times[gap_indexes]),
+                np.insert(values, gap_indexes, np.nan),
+            )
         return Polyline(times, values, part[1] - part[0], is_complete=False)
 
     def _valid_pixels(self, width_s: float) -> _Pixels:
         # The part of the last rendering that is still valid.
-        drawn = self._render_cache
-        if drawn.width_s != width_s:
+        cache = self._render_cache
+        if cache.width_s != width_s:
             return _Pixels()
-        pixels = drawn.pixels
-        changed_s = self.earliest_change_s(drawn.rewrite_count)
+        pixels = cache.pixels
+        changed_s = self.earliest_change_s(cache.rewrite_count)
         if changed_s is not None:
             pixels = pixels.part(-np.inf, float(np.floor(changed_s / width_s)) - 1)
-        if drawn.evicted_count != self.evicted_count:
+        if cache.evicted_count != self.evicted_count:
             pixels = pixels.part(float(np.floor(self._times[0] / width_s)) + 2, np.inf)
         return pixels
 
@@ -504,17 +514,19 @@ class Samples:
         level = levels[-1]
         level.build(self._values, self._count)
         firsts = -(-starts >> level.shift)
-        lasts = np.maximum(firsts, np.minimum(ends >> level.shift, level.built))
+        lasts = np.maximum(firsts, np.minimum(ends >> level.shift, level.built_count))
         has_buckets = lasts > firsts
         head_ends = np.where(has_buckets, firsts << level.shift, ends)
         low, high, total = _reduce(self._values, self._values, self._values, starts, head_ends)
         tails = np.where(has_buckets, lasts << level.shift, ends)
-        more = _reduce(level.low, level.high, level.total, firsts, np.where(has_buckets, lasts, firsts))
-        rest = _reduce(self._values, self._values, self._values, tails, ends)
+        bucket_stats = _reduce(
+            level.low, level.high, level.total, firsts, np.where(has_buckets, lasts, firsts)
+        )
+        tail_stats = _reduce(self._values, self._values, self._values, tails, ends)
         with np.errstate(over="ignore", invalid="ignore"):
-            total = total + more[2] + rest[2]
-        low = np.minimum(np.minimum(low, more[0]), rest[0])
-        return low, np.maximum(np.maximum(high, more[1]), rest[1]), total
+            total = total + bucket_stats[2] + tail_stats[2]
+        low = np.minimum(np.minimum(low, bucket_stats[0]), tail_stats[0])
+        return low, np.maximum(np.maximum(high, bucket_stats[1]), tail_stats[1]), total
 
 
 def _reduce(
@@ -527,24 +539,24 @@ def _reduce(
     if non_empty.any():
         lengths = (ends - starts)[non_empty]
         offsets = np.concatenate([[0], np.cumsum(lengths)])
-        gather = np.arange(offsets[-1]) + np.repeat(starts[non_empty] - offsets[:-1], lengths)
-        low[non_empty] = np.minimum.reduceat(lows[gather], offsets[:-1])
-        high[non_empty] = np.maximum.reduceat(highs[gather], offsets[:-1])
+        gathered_indexes = np.arange(offsets[-1]) + np.repeat(starts[non_empty] - offsets[:-1], lengths)
+        low[non_empty] = np.minimum.reduceat(lows[gathered_indexes], offsets[:-1])
+        high[non_empty] = np.maximum.reduceat(highs[gathered_indexes], offsets[:-1])
         with np.errstate(over="ignore", invalid="ignore"):
-            total[non_empty] = np.add.reduceat(totals[gather], offsets[:-1])
+            total[non_empty] = np.add.reduceat(totals[gathered_indexes], offsets[:-1])
     return low, high, total
 
 
-def _carry_gaps(gaps: NDArray[np.bool_], finite: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _carry_gaps(gaps: NDArray[np.bool_], is_finite: NDArray[np.bool_]) -> NDArray[np.bool_]:
     # Moves the gaps of skipped samples to the next one.
-    bad_before = np.concatenate([[False], ~finite[:-1]])
-    carried = gaps.copy()
-    pending = False
-    for index in np.flatnonzero(~finite | bad_before | gaps).tolist():
-        pending = pending or bool(gaps[index])
-        if not finite[index]:
-            pending = True
+    is_after_invalid = np.concatenate([[False], ~is_finite[:-1]])
+    carried_gaps = gaps.copy()
+    has_pending_gap = False
+    for index in np.flatnonzero(~is_finite | is_after_invalid | gaps).tolist():
+        has_pending_gap = has_pending_gap or bool(gaps[index])
+        if not is_finite[index]:
+            has_pending_gap = True
         else:
-            carried[index] = pending or bool(bad_before[index])
-            pending = False
-    return carried
+            carried_gaps[index] = has_pending_gap or bool(is_after_invalid[index])
+            has_pending_gap = False
+    return carried_gaps

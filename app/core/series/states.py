@@ -31,13 +31,13 @@ class States:
 
     def __init__(self, limit: int = MAX_RUNS) -> None:
         self._limit = limit
-        self._begins: list[float] = []
+        self._start_times_s: list[float] = []
         self._values: list[str | None] = []
         self.last_s: float | None = None
         self.evicted_count = self.removed_count = 0
 
     def __len__(self) -> int:
-        return len(self._begins)
+        return len(self._start_times_s)
 
     def add(self, time_s: float, value: str | None, *, gap: bool = False) -> None:
         """Add a value.
@@ -63,28 +63,33 @@ class States:
         self.last_s = time_s
 
     def _start_run(self, time_s: float, value: str | None) -> None:
-        self._begins.append(time_s)
+        self._start_times_s.append(time_s)
         self._values.append(value)
-        if len(self._begins) > self._limit:
-            drop = len(self._begins) - self._limit * 3 // 4
-            del self._begins[:drop], self._values[:drop]
-            self.evicted_count += drop
+        if len(self._start_times_s) > self._limit:
+            evicted_count = len(self._start_times_s) - self._limit * 3 // 4
+            del self._start_times_s[:evicted_count], self._values[:evicted_count]
+            self.evicted_count += evicted_count
 
     def clear(self) -> None:
         """Remove all runs."""
-        self._begins.clear()
+        self._start_times_s.clear()
         self._values.clear()
         self.last_s = None
         self.evicted_count = self.removed_count = 0
 
     def _truncate(self, time_s: float) -> None:
-        index = bisect_left(self._begins, time_s)
-        self.removed_count += len(self._begins) - index
-        del self._begins[index:], self._values[index:]
-        self.last_s = time_s if self._begins else None
+        index = bisect_left(self._start_times_s, time_s)
+        self.removed_count += len(self._start_times_s) - index
+        del self._start_times_s[index:], self._values[index:]
+        self.last_s = time_s if self._start_times_s else None
 
     def runs(
-        self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
+        self,
+        begin_s: float,
+        end_s: float,
+        *,
+        step_s: float = 0.0,
+        excluded_values: Collection[str] | None = None,
     ) -> Iterator[StateRun]:
         """Yield the runs that overlap a time range, oldest first.
 
@@ -94,17 +99,17 @@ class States:
             begin_s: Start of the range in seconds.
             end_s: End of the range in seconds.
             step_s: Time resolution; one run in each interval of this length is sufficient.
-            without: Values to skip. If given, runs with unknown values are skipped too.
+            excluded_values: Values to skip. If given, runs with unknown values are skipped too.
         """
         index, end = self._index_range(begin_s, end_s)
         while index < end:
-            at_s, value = self._begins[index], self._values[index]
-            if without is not None and (value is None or value in without):
+            at_s, value = self._start_times_s[index], self._values[index]
+            if excluded_values is not None and (value is None or value in excluded_values):
                 index += 1
                 continue
             yield StateRun(at_s, self._end_of(index), value)
             # the last run that begins within the step may extend beyond it
-            index = max(index + 1, bisect_right(self._begins, at_s + step_s) - 1)
+            index = max(index + 1, bisect_right(self._start_times_s, at_s + step_s) - 1)
 
     def values_in(self, begin_s: float, end_s: float) -> set[str]:
         """Return the distinct values in a time range."""
@@ -113,17 +118,17 @@ class States:
 
     def _index_range(self, begin_s: float, end_s: float) -> tuple[int, int]:
         # Index range of the runs in a time range: first, and one behind the last.
-        first = max(0, bisect_right(self._begins, begin_s) - 1)
-        return first, bisect_right(self._begins, end_s)
+        first = max(0, bisect_right(self._start_times_s, begin_s) - 1)
+        return first, bisect_right(self._start_times_s, end_s)
 
     def _end_of(self, index: int) -> float:
-        if index + 1 < len(self._begins):
-            return self._begins[index + 1]
-        return self._begins[index] if self.last_s is None else self.last_s
+        if index + 1 < len(self._start_times_s):
+            return self._start_times_s[index + 1]
+        return self._start_times_s[index] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
         """Return the value at a time; None if the value is unknown."""
-        index = bisect_right(self._begins, time_s) - 1
+        index = bisect_right(self._start_times_s, time_s) - 1
         return self._values[index] if index >= 0 else None
 
     def change_count(self, begin_s: float, end_s: float) -> int:
@@ -135,7 +140,7 @@ class States:
     def duration_s(self, value: str, begin_s: float, end_s: float) -> float:
         """Return how long the field had the value ``value`` in a time range, in seconds."""
         return sum(
-            max(0.0, min(self._end_of(index), end_s) - max(self._begins[index], begin_s))
+            max(0.0, min(self._end_of(index), end_s) - max(self._start_times_s[index], begin_s))
             for index in range(*self._index_range(begin_s, end_s))
             if self._values[index] == value
         )

@@ -22,34 +22,34 @@ from nep.system.replace_file import replace_file
 STALE_PART_AGE_S = 60.0
 MAX_BYTES = 10_000_000
 """Maximum size of a file that is read into memory, in bytes."""
-_PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
+_PRIVATE_FOLDER_MODE, _OTHERS_PERMISSIONS = 0o700, 0o077
 
 
-def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
+def read_regular_file(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
     """Return the content of a regular file.
 
     Never blocks on a pipe, a device, a folder, or a link to one of these.
 
     Args:
         path: Path of the file.
-        most_bytes: Maximum size in bytes.
+        max_bytes: Maximum size in bytes.
 
     Raises:
         OSError: The file can't be read, is not a regular file or is too large; ``strerror`` is the
             reason.
     """
     # Without NONBLOCK, opening a pipe waits for its writer forever.
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     try:
-        about = os.fstat(handle)
-        if not stat.S_ISREG(about.st_mode):
+        file_stat = os.fstat(descriptor)
+        if not stat.S_ISREG(file_stat.st_mode):
             raise OSError(errno.EINVAL, _("not a file, but a folder, a pipe or a device"), str(path))
-        with os.fdopen(handle, "rb", closefd=False) as file:
-            data = file.read(most_bytes + 1) if about.st_size <= most_bytes else b""
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            data = file.read(max_bytes + 1) if file_stat.st_size <= max_bytes else b""
     finally:
-        os.close(handle)
-    if about.st_size > most_bytes or len(data) > most_bytes:
-        size, limit_mb = max(about.st_size, len(data)) / 1e6, most_bytes / 1e6
+        os.close(descriptor)
+    if file_stat.st_size > max_bytes or len(data) > max_bytes:
+        size, limit_mb = max(file_stat.st_size, len(data)) / 1e6, max_bytes / 1e6
         raise OSError(
             errno.EFBIG,
             _("the file is {size} MB; the limit is {most} MB").format(
@@ -82,9 +82,9 @@ def write_atomically(
     if private:
         create_private_folder(path.parent)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with os.fdopen(descriptor, "wb") as file:
             file.writelines((data,) if isinstance(data, bytes) else data)
             file.flush()
             if durable:
@@ -102,10 +102,10 @@ def write_atomically(
 
 def _remove_stale_parts(path: Path) -> None:
     # Removes parts left by killed writers; writes in progress are younger.
-    before = time.time() - STALE_PART_AGE_S
+    max_mtime_s = time.time() - STALE_PART_AGE_S
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         with contextlib.suppress(OSError):  # removed by another process, or not permitted
-            if part.stat().st_mtime < before:
+            if part.stat().st_mtime < max_mtime_s:
                 part.unlink()
 
 
@@ -115,7 +115,7 @@ def create_private_folder(folder: Path) -> None:
     Folders of other users are not changed. On Windows nothing is changed, because user folders are
     already private. Raises OSError if the folder can't be created.
     """
-    folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
+    folder.mkdir(mode=_PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
     _restrict_to_owner(folder)
 
 
@@ -140,8 +140,8 @@ def _restrict_to_owner(path: Path) -> None:
         return
     with contextlib.suppress(OSError):  # another user's, or a file system without modes
         mode = stat.S_IMODE(path.stat().st_mode)
-        if mode & _OTHERS:
-            path.chmod(mode & ~_OTHERS)
+        if mode & _OTHERS_PERMISSIONS:
+            path.chmod(mode & ~_OTHERS_PERMISSIONS)
 
 
 def _copy_mode(old: Path, new: Path) -> None:
@@ -166,8 +166,8 @@ def _default_mode(sibling: Path) -> int:
 def _sync_folder(folder: Path) -> None:
     if os.name != "posix":
         return  # Windows can't open a folder; its rename is journalled by the file system
-    handle = os.open(folder, os.O_RDONLY)
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        os.fsync(descriptor)
     finally:
-        os.close(handle)
+        os.close(descriptor)

@@ -74,13 +74,13 @@ def run_deep(function: Callable[[], T]) -> T:
     except RecursionError:
         pass
     results: list[T] = []
-    failed: list[Exception] = []
+    errors: list[Exception] = []
 
     def run() -> None:
         try:
             results.append(function())
         except (ValueError, RecursionError) as error:
-            failed.append(error)
+            errors.append(error)
 
     # the recursion limit is global, and the stack size applies to the next thread: one at a time
     with _thread_lock:
@@ -94,6 +94,6 @@ def run_deep(function: Callable[[], T]) -> T:
         finally:
             threading.stack_size(size)
             sys.setrecursionlimit(limit)
-    if failed:
-        raise failed[0]
+    if errors:
+        raise errors[0]
     return results[0]

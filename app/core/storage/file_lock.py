@@ -51,14 +51,14 @@ Other error numbers mean that the file system doesn't support locks.
 """
 
 
-def _acquire(file: IO[bytes], until: float) -> bool:
+def _acquire(file: IO[bytes], deadline_s: float) -> bool:
     # Returns whether the lock was acquired. Without lock support False at once.
     pause = threading.Event()
     while True:
         try:
             _lock(file)
         except OSError as error:
-            if error.errno not in HELD_ERRNOS or time.monotonic() >= until:
+            if error.errno not in HELD_ERRNOS or time.monotonic() >= deadline_s:
                 return False
         else:
             return True
@@ -120,7 +120,7 @@ def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
         path: File to lock.
         within_s: Maximum time to wait for another process, in seconds.
     """
-    until = time.monotonic() + within_s
+    deadline_s = time.monotonic() + within_s
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = _open_lock_file(path)
@@ -128,7 +128,7 @@ def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
         yield False
         return
     with file:
-        is_locked = _acquire(file, until)
+        is_locked = _acquire(file, deadline_s)
         try:
             yield is_locked
         finally:

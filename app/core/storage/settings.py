@@ -131,7 +131,7 @@ class Settings:
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         # Reads `settings.json` in `folder` (default: `home`), if it exists.
         self.path = (folder if folder is not None else home()) / "settings.json"
-        self.damaged: Path | None = None
+        self.damaged_path: Path | None = None
         self.notice = ""
         """Message for the user about the file that was found, or ""."""
         self.are_new = False
@@ -192,9 +192,9 @@ class Settings:
         entries: list[object] = self.get("recent", [])
         for entry in entries:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
-                path, when, name = Path(entry["path"]), entry.get("opened_s", 0), entry.get("name")
-                is_time = isinstance(when, int | float) and abs(when) <= _MAX_TIME_S
-                opened_s = float(when) if is_time else 0.0
+                path, opened, name = Path(entry["path"]), entry.get("opened_s", 0), entry.get("name")
+                is_time = isinstance(opened, int | float) and abs(opened) <= _MAX_TIME_S
+                opened_s = float(opened) if is_time else 0.0
                 if not isinstance(name, str) or path.parent != closed_tabs_folder():
                     name = path.stem
                 recent_files.append(RecentFile(path, name, opened_s, _is_file(path)))
@@ -212,8 +212,8 @@ class Settings:
         """
         path = path.resolve()
         self._values = self._merged_values()
-        others = [file for file in self.all_recent_files if file.path != path]
-        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *others])
+        other_files = [file for file in self.all_recent_files if file.path != path]
+        self.set_recent([RecentFile(path, name or path.stem, self._clock()), *other_files])
 
     def rename_recent(self, old: Path, new: Path) -> None:
         """Rename a recent file without changing its position.
@@ -222,8 +222,10 @@ class Settings:
         """
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
-        others = [file for file in self.all_recent_files if file.path != new]
-        renamed = [replace(file, path=new, name=new.stem) if file.path == old else file for file in others]
+        other_files = [file for file in self.all_recent_files if file.path != new]
+        renamed = [
+            replace(file, path=new, name=new.stem) if file.path == old else file for file in other_files
+        ]
         self.set_recent(renamed)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
@@ -263,7 +265,7 @@ class Settings:
         # Used while a newer Studio has its settings in the usual place.
         return self.path.with_name(_OWN_FILE_NAME)
 
-    def _switch_to_own_file(self, newer: dict[str, object]) -> dict[str, object]:
+    def _switch_to_own_file(self, newer_values: dict[str, object]) -> dict[str, object]:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
         newer_name = self.path.name
         self.path = self._own_path()
@@ -272,8 +274,8 @@ class Settings:
         self.notice = _(
             "The settings in “{file}” belong to a newer NEP Studio (format {format}) and are "
             "unchanged. Settings you change here are saved separately."
-        ).format(file=newer_name, format=_format_version(newer))
-        return {name: value for name, value in newer.items() if name != "format"}
+        ).format(file=newer_name, format=_format_version(newer_values))
+        return {name: value for name, value in newer_values.items() if name != "format"}
 
     def _merged_values(self) -> dict[str, object]:
         # Current file content with unwritten values; the known values if it can't be read.
@@ -289,15 +291,15 @@ class Settings:
         return {**values, **self._unwritten}
 
     def _rename_damaged_file(self) -> dict[str, object]:
-        self.damaged = self.path.with_name(f"{self.path.stem}.damaged.json")
+        self.damaged_path = self.path.with_name(f"{self.path.stem}.damaged.json")
         try:
-            replace_file(self.path, self.damaged)
+            replace_file(self.path, self.damaged_path)
         except OSError:
-            self.damaged = None
+            self.damaged_path = None
             return {}
         self.notice = _(
             "The settings couldn't be read, so Studio uses defaults. The old file was kept as “{file}”."
-        ).format(file=self.damaged.name)
+        ).format(file=self.damaged_path.name)
         return {}
 
     def _write(self) -> None:
@@ -309,9 +311,9 @@ class Settings:
         try:
             write_atomically(self.path, data, durable=False, private=True)
         except OSError as error:
-            failed = SettingsError(self.path, error.strerror or str(error))
-            self.write_error = str(failed)
-            raise failed from error
+            settings_error = SettingsError(self.path, error.strerror or str(error))
+            self.write_error = str(settings_error)
+            raise settings_error from error
         self.write_error = None
         self._unwritten.clear()
 

@@ -32,7 +32,7 @@ class StoredFile(Generic[T]):
 
 
 def read_stored(
-    path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
+    path: Path, parse: Callable[[bytes], tuple[T, str]], newer_error: type[NepError], max_bytes: int
 ) -> StoredFile[T]:
     """Read a file with data of the user; a missing or unreadable file has the value None.
 
@@ -43,18 +43,18 @@ def read_stored(
         path: Path of the file.
         parse: Parses the content; returns the value, and a message about a problem or "". Raises
             `NepError` for an unreadable file.
-        newer: Exception that ``parse`` raises for a file of a newer Studio.
-        most_bytes: Maximum size of the file.
+        newer_error: Exception that ``parse`` raises for a file of a newer Studio.
+        max_bytes: Maximum size of the file.
     """
     try:
-        data = read_regular_file(path, most_bytes)
+        data = read_regular_file(path, max_bytes)
     except (FileNotFoundError, NotADirectoryError):
         return StoredFile()
     except OSError as error:
         return StoredFile(None, _save_damaged(path, error.strerror or str(error)))
     try:
         value, problem = parse(data)
-    except newer as error:
+    except newer_error as error:
         template = _("Your changes aren't being saved: {reason}. The file is unchanged.")
         return StoredFile(None, template.format(reason=error), is_newer=True)
     except NepError as error:
@@ -70,4 +70,4 @@ def _save_damaged(path: Path, reason: str, data: bytes | None = None) -> str:
             replace_file(path, backup)
         else:
             write_atomically(backup, data, durable=False, private=True)
-    return _("The file was saved as “{file}”: {reason}.").format(file=backup.name, reason=reason)
+    return _("Reason: {reason}. The file was saved as “{file}”.").format(file=backup.name, reason=reason)

@@ -110,19 +110,19 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
         model: Valid Thing Model (see :func:`validate`); it is not modified.
         name: Name of the robot.
     """
-    described = copy.deepcopy(dict(model))
-    kind = object_member(described, "rb:robot")
+    model_copy = copy.deepcopy(dict(model))
+    kind = object_member(model_copy, "rb:robot")
     topics = default_topics(name, virtual=kind.get("virtual") is True)
     document = {
         key: value
-        for key, value in described.items()
+        for key, value in model_copy.items()
         if key not in {"titles", "actions", "properties", "events"}
     }
     document |= {
         "@type": ["rb:Robot"],
         "title": name,
         "id": f"urn:nep:robot:{_INVALID_TOPIC_CHARACTERS.sub('_', name)}",
-        "version": {"instance": "1.0.0", **object_member(described, "version")},
+        "version": {"instance": "1.0.0", **object_member(model_copy, "version")},
         "securityDefinitions": {"nosec_sc": {"scheme": "nosec"}},
         "security": "nosec_sc",
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
@@ -131,18 +131,18 @@ def thing_description(model: Mapping[str, object], name: str) -> dict[str, objec
     action_form = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.reply}"}
     document["properties"] = {
         leaf: {**as_object(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_object(sensor))]}
-        for leaf, sensor in object_member(described, "properties").items()
+        for leaf, sensor in object_member(model_copy, "properties").items()
     }
     document["actions"] = {
         leaf: {**as_object(action), "forms": [dict(action_form)]}
-        for leaf, action in object_member(described, "actions").items()
+        for leaf, action in object_member(model_copy, "actions").items()
     }
     document["events"] = {
         leaf: {
             **as_object(event),
             "forms": [_form(topic_of(name, leaf), "subscribeevent", "unsubscribeevent")],
         }
-        for leaf, event in object_member(described, "events").items()
+        for leaf, event in object_member(model_copy, "events").items()
     }
     return document
 

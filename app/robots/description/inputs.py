@@ -57,14 +57,14 @@ class Parameter:
         unit: Unit as displayed.
         default: Default value.
         choices: Allowed values of a choice.
-        required: True if the value must be given.
-        advanced: True if forms collapse the parameter.
+        is_required: True if the value must be given.
+        is_advanced: True if forms collapse the parameter.
         options_from: Name of the sensor that lists possible values.
         min_length: Minimum length of a text in characters, or of a list in items.
         max_length: Maximum length of a text in characters, or of a list in items.
         widget: Preferred editor.
         is_bare_base64: True for an image sent as base64 without a ``data:`` prefix.
-        nullable: True if the value may be None.
+        is_nullable: True if the value may be None.
         item: Schema of the items of a list or of the values of an object.
         prefix_items: Schemas of a list's items by position.
         fields: Schemas of an object's named values.
@@ -79,14 +79,14 @@ class Parameter:
     unit: str | None = None
     default: object = None
     choices: tuple[Choice, ...] = ()
-    required: bool = False
-    advanced: bool = False
+    is_required: bool = False
+    is_advanced: bool = False
     options_from: str | None = None
     min_length: int = 0
     max_length: int | None = None
     widget: str | None = None
     is_bare_base64: bool = False
-    nullable: bool = False
+    is_nullable: bool = False
     item: Parameter | None = None
     prefix_items: tuple[Parameter, ...] = ()
     fields: tuple[Parameter, ...] = ()
@@ -109,16 +109,17 @@ def closest_match(name: str, candidates: Iterable[str]) -> str:
     return next(iter(difflib.get_close_matches(name, list(candidates), n=1)), "")
 
 
-def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
+def parameter_of(name: str, data: Mapping[str, object], *, is_required: bool = False) -> Parameter:
     """Convert a data schema to a parameter.
 
     Args:
         name: Name of the parameter.
         data: JSON object with the data schema.
-        required: True if the value must be given.
+        is_required: True if the value must be given.
     """
     is_list = data.get("type") == "array"
-    shortest, longest = (number(data.get(rule)) for rule in (_ITEM_COUNT_KEYS if is_list else _LENGTH_KEYS))
+    length_keys = _ITEM_COUNT_KEYS if is_list else _LENGTH_KEYS
+    min_length, max_length = (number(data.get(key)) for key in length_keys)
     item_schema = data.get("items") if is_list else data.get("additionalProperties")
     prefix_schemas = item_schema if isinstance(item_schema, (list, tuple)) else ()
     return Parameter(
@@ -131,14 +132,14 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
         unit=display_unit(text(data.get("unit"))),
         default=data.get("default"),
         choices=choices_of(data),
-        required=required,
-        advanced=data.get("rb:advanced") is True,
+        is_required=is_required,
+        is_advanced=data.get("rb:advanced") is True,
         options_from=text(data.get("rb:optionsFrom")),
-        min_length=int(shortest or 0),
-        max_length=None if longest is None else int(longest),
+        min_length=int(min_length or 0),
+        max_length=None if max_length is None else int(max_length),
         widget=text(data.get("rb:widget")),
         is_bare_base64=data.get("contentEncoding") == "base64" and "format" not in data,
-        nullable=data.get("rb:nullable") is True,
+        is_nullable=data.get("rb:nullable") is True,
         item=parameter_of("value", item_schema) if isinstance(item_schema, Mapping) and item_schema else None,
         prefix_items=tuple(
             parameter_of(f"value {index}", as_object(each)) for index, each in enumerate(prefix_schemas, 1)
@@ -151,7 +152,7 @@ def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
     """Return a parameter for each named value of an object schema."""
     required = names(data.get("required"))
     return tuple(
-        parameter_of(name, as_object(each), required=name in required)
+        parameter_of(name, as_object(each), is_required=name in required)
         for name, each in object_member(data, "properties").items()
     )
 
@@ -258,26 +259,26 @@ def input_problems(parameters: tuple[Parameter, ...], values: object) -> tuple[I
     if not isinstance(values, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
     parameters_by_name = {parameter.name: parameter for parameter in parameters}
-    unknown = [name for name in values if name not in parameters_by_name]
+    unknown_names = [name for name in values if name not in parameters_by_name]
     problems = []
-    for name in unknown[:_MAX_UNKNOWN_REPORTED]:
+    for name in unknown_names[:_MAX_UNKNOWN_REPORTED]:
         close = closest_match(str(name), parameters_by_name)
         template = (
             _("unknown name “{word}”; did you mean “{close}”?") if close else _("unknown name “{word}”")
         )
         problems.append(InputProblem("", template.format(word=quotable(name), close=close)))
-    if len(unknown) > _MAX_UNKNOWN_REPORTED:
-        count = len(unknown) - _MAX_UNKNOWN_REPORTED
+    if len(unknown_names) > _MAX_UNKNOWN_REPORTED:
+        count = len(unknown_names) - _MAX_UNKNOWN_REPORTED
         template = ngettext("{count} more name is unknown", "{count} more names are unknown", count)
         problems.append(InputProblem("", template.format(count=count)))
     for name, parameter in parameters_by_name.items():
-        if name in values and values[name] is None and parameter.nullable:
+        if name in values and values[name] is None and parameter.is_nullable:
             continue
         if name in values:
             problem = value_problem(parameter, values[name])
             if problem is not None:
                 problems.append(InputProblem(name, problem))
-        elif parameter.required:
+        elif parameter.is_required:
             problems.append(InputProblem(name, _("{place} is missing").format(place=parameter.title)))
     return tuple(problems)
 
@@ -334,10 +335,10 @@ def _list_problem(parameter: Parameter, value: object, label: str) -> str | None
         item_parameter = (
             parameter.prefix_items[index] if index < len(parameter.prefix_items) else parameter.item
         )
-        inner = _("{place} value {number}").format(place=label, number=index + 1)
-        problem = None if item_parameter is None else value_problem(item_parameter, item, inner)
+        item_label = _("{place} value {number}").format(place=label, number=index + 1)
+        problem = None if item_parameter is None else value_problem(item_parameter, item, item_label)
         if item_parameter is None and not _is_json(item):
-            problem = _("{place} can't be an item of a list").format(place=inner)
+            problem = _("{place} can't be an item of a list").format(place=item_label)
         if problem is not None:
             return problem
     return None
@@ -348,23 +349,23 @@ def _object_problem(parameter: Parameter, value: object, label: str) -> str | No
         return _("{place} must be an object with named values").format(place=label)
     fields_by_name = {field.name: field for field in parameter.fields}
     for name, field in fields_by_name.items():
-        if name not in value and not field.required:
+        if name not in value and not field.is_required:
             continue
-        if name in value and value[name] is None and field.nullable:
+        if name in value and value[name] is None and field.is_nullable:
             continue
-        inner = _("{place} {inner}").format(place=label, inner=field.title)
+        field_label = _("{place} {inner}").format(place=label, inner=field.title)
         if name not in value:
-            return _("{place} is missing").format(place=inner)
-        problem = value_problem(field, value[name], inner)
+            return _("{place} is missing").format(place=field_label)
+        problem = value_problem(field, value[name], field_label)
         if problem is not None:
             return problem
-    others = {name: item for name, item in value.items() if name not in fields_by_name}
-    return _other_values_problem(parameter, others, label)
+    other_values = {name: item for name, item in value.items() if name not in fields_by_name}
+    return _other_values_problem(parameter, other_values, label)
 
 
-def _other_values_problem(parameter: Parameter, others: Mapping[str, object], label: str) -> str | None:
+def _other_values_problem(parameter: Parameter, other_values: Mapping[str, object], label: str) -> str | None:
     field_names = [field.name for field in parameter.fields]
-    for name, item in others.items():
+    for name, item in other_values.items():
         if parameter.item is not None:
             problem = value_problem(
                 parameter.item, item, _("{place} “{name}”").format(place=label, name=quotable(name))

@@ -54,7 +54,7 @@ class Action:
     timeout_s: float | None = None
     uses: tuple[str, ...] = ()
     on_busy: str = "queue"
-    synchronous: bool = False
+    is_synchronous: bool = False
     feedback: tuple[DataField, ...] = ()
     output: tuple[DataField, ...] = ()
     repeat_s: float | None = None
@@ -144,17 +144,17 @@ class SafeStop:
         watchdog_s: Time in seconds without a heartbeat of the moving program after which the robot stops by
             itself; None if the robot has no watchdog.
         within_s: Time in seconds within which the robot stops.
-        on_program_end: True if the robot stops when the moving program ends.
-        on_disconnect: True if the robot stops when the moving program is disconnected.
-        confirmed: False for robots that never reply to a stop.
+        stops_on_program_end: True if the robot stops when the moving program ends.
+        stops_on_disconnect: True if the robot stops when the moving program is disconnected.
+        can_confirm: False for robots that never reply to a stop.
     """
 
     action: str
     watchdog_s: float | None
     within_s: float
-    on_program_end: bool
-    on_disconnect: bool
-    confirmed: bool
+    stops_on_program_end: bool
+    stops_on_disconnect: bool
+    can_confirm: bool
 
 
 @dataclass(frozen=True)

@@ -59,9 +59,9 @@ def _safe_stop(stop: Mapping[str, object]) -> SafeStop:
         action=str(stop["action"]),
         watchdog_s=number(stop.get("watchdog")),
         within_s=number(stop.get("within")) or 0.5,
-        on_program_end=stop.get("onProgramEnd") is not False,
-        on_disconnect=stop.get("onDisconnect") is not False,
-        confirmed=stop.get("confirmed") is not False,
+        stops_on_program_end=stop.get("onProgramEnd") is not False,
+        stops_on_disconnect=stop.get("onDisconnect") is not False,
+        can_confirm=stop.get("confirmed") is not False,
     )
 
 
@@ -87,7 +87,7 @@ def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Act
         timeout_s=number(action.get("rb:timeout")),
         uses=names(action.get("rb:uses")),
         on_busy=text(action.get("rb:onBusy")) or "queue",
-        synchronous=action.get("synchronous") is True,
+        is_synchronous=action.get("synchronous") is True,
         feedback=_fields(object_member(action, "rb:feedback")),
         output=_fields(object_member(action, "output")),
         repeat_s=number(action.get("rb:repeat")),
@@ -142,14 +142,14 @@ def _event(name: str, event: Mapping[str, object], home: str) -> Event:
 
 
 def _parameters(data: Mapping[str, object], required: tuple[str, ...]) -> tuple[Parameter, ...]:
-    return tuple(parameter_of(name, as_object(d), required=name in required) for name, d in data.items())
+    return tuple(parameter_of(name, as_object(d), is_required=name in required) for name, d in data.items())
 
 
 def _fields(owner: Mapping[str, object]) -> tuple[DataField, ...]:
-    parts = ((name, as_object(schema)) for name, schema in object_member(owner, "properties").items())
+    schemas = ((name, as_object(schema)) for name, schema in object_member(owner, "properties").items())
     return tuple(
         DataField(name, _title(name, each), kind_of(each), display_unit(text(each.get("unit"))))
-        for name, each in parts
+        for name, each in schemas
     )
 
 
@@ -157,8 +157,8 @@ def _title(name: str, owner: Mapping[str, object]) -> str:
     return display_text(owner) or translate("robot", name.replace("_", " "))
 
 
-def _category(block: Mapping[str, object], otherwise: str) -> str:
-    category = (text(block.get("category")) or otherwise).strip()
+def _category(block: Mapping[str, object], fallback: str) -> str:
+    category = (text(block.get("category")) or fallback).strip()
     return category[:1].upper() + category[1:]
 
 
@@ -173,7 +173,7 @@ def _block_text(block: Mapping[str, object], kind: str) -> str:
 
 
 def _default_text(title: str, parameters: tuple[Parameter, ...]) -> str:
-    visible = [parameter for parameter in parameters if not parameter.advanced]
+    visible = [parameter for parameter in parameters if not parameter.is_advanced]
     values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in visible]
     return " ".join([title, *values])
 
@@ -186,10 +186,10 @@ def _with_robot_placeholder(template: str) -> str:
     return f"%robot {template}"
 
 
-def _topic(owner: Mapping[str, object], otherwise: str, member: str = "href") -> str:
+def _topic(owner: Mapping[str, object], fallback: str, member: str = "href") -> str:
     forms = owner.get("forms")
     for form in forms if isinstance(forms, (list, tuple)) else ():
         href = text(as_object(form).get(member))
         if href is not None and href.startswith(_TOPIC_SCHEME):
             return href.removeprefix(_TOPIC_SCHEME)
-    return otherwise
+    return fallback

@@ -57,23 +57,25 @@ def validate(model: object) -> tuple[str, ...]:
     if not isinstance(model, Mapping):
         return (_("a description must be a JSON object"),)
     model = dict(model)
-    strange = _json_problem(model, count(1))
-    if strange is not None:
-        return (strange,)
+    json_problem = _json_problem(model, count(1))
+    if json_problem is not None:
+        return (json_problem,)
     text, problems = json.dumps(model), []
     if text not in _accepted_descriptions:
         problems = [_error_message(error) for error in islice(_validator().iter_errors(model), _MAX_PROBLEMS)]
         if not problems:
             _accepted_descriptions.append(text)
-    control = first_control(str(model.get("title")))
-    if control:
+    control_character = first_control(str(model.get("title")))
+    if control_character:
         problems.append(
-            _("title: '{control}' can't be used in a name because it is invisible").format(control=control)
+            _("title: '{control}' can't be used in a name because it is invisible").format(
+                control=control_character
+            )
         )
     if not problems:
         problems = list(_contradictions(model))
-    if not problems and (harmless_model := without_control_characters(model)) != model:
-        return validate(harmless_model)  # removing control characters may leave an empty text
+    if not problems and (cleaned_model := without_control_characters(model)) != model:
+        return validate(cleaned_model)  # removing control characters may leave an empty text
     return tuple(dict.fromkeys(problems))[:_MAX_PROBLEMS]
 
 
@@ -113,10 +115,10 @@ def _json_problem(value: object, counter: Iterator[int], path: str = "", depth: 
                 return problem
         return None
     if isinstance(value, list):
-        found_items = (
+        problems = (
             _json_problem(item, counter, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
         )
-        return next((problem for problem in found_items if problem is not None), None)
+        return next((problem for problem in problems if problem is not None), None)
     if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
         return _("{place} isn't a finite number, or is too large").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
@@ -216,15 +218,15 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     for name, sensor in properties.items():
         yield from _data_contradictions(f"properties.{name}", as_object(sensor))
     for name, event in object_member(model, "events").items():
-        happening = as_object(event)
-        data = object_member(object_member(happening, "data"), "properties")
+        event_object = as_object(event)
+        data = object_member(object_member(event_object, "data"), "properties")
         yield from _field_contradictions(f"events.{name}.data", data)
-        for field in names(happening.get("rb:filter")):
+        for field in names(event_object.get("rb:filter")):
             if field not in data:
                 yield _("events.{name}.rb:filter names '{field}', which isn't in its data").format(
                     name=name, field=field
                 )
-        yield from _text_contradictions(f"events.{name}", happening, data)
+        yield from _text_contradictions(f"events.{name}", event_object, data)
 
 
 def _action_contradictions(
@@ -254,7 +256,7 @@ def _action_contradictions(
 def _field_contradictions(location: str, fields: Mapping[str, object]) -> Iterator[str]:
     for name, data in fields.items():
         if name == "robot":
-            yield _("{place}: the name 'robot' is reserved; use another one").format(place=location)
+            yield _("{place}: the name 'robot' is reserved; use another name").format(place=location)
         yield from _data_contradictions(f"{location}.{name}", as_object(data))
 
 

@@ -40,11 +40,11 @@ class MonotonicClock:
         return event.wait(timeout_s)
 
 
-class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer's state
+class Canceled(Exception):  # noqa: N818 - not an error; named like the state in the reply
     """Raised in an action that has been cancelled. Drivers clean up and let the exception propagate."""
 
 
-class Failed(Exception):  # noqa: N818 - the word of the answer's state
+class Failed(Exception):  # noqa: N818 - named like the state in the reply
     """Raised by an action that can't be executed. The message is shown to the user.
 
     Example::
@@ -173,35 +173,35 @@ class Call:
         self.action = action
         self.clock = clock
         self._report = report
-        self._ended = threading.Event()
+        self._canceled = threading.Event()
         self._lock = threading.Lock()
-        self._on_cancel: list[Callable[[], object]] = []
-        self._canceling: threading.Thread | None = None
+        self._cancel_callbacks: list[Callable[[], object]] = []
+        self._cancel_thread: threading.Thread | None = None
 
     @property
     def canceled(self) -> bool:
         """True after `cancel` was called."""
-        return self._ended.is_set()
+        return self._canceled.is_set()
 
     def cancel(self) -> None:
         """Cancel the action: its next wait raises Canceled. Does not block."""
         with self._lock:
-            self._ended.set()
-            callbacks, self._on_cancel = self._on_cancel, []
+            self._canceled.set()
+            callbacks, self._cancel_callbacks = self._cancel_callbacks, []
         if callbacks:
-            self._canceling = threading.Thread(
+            self._cancel_thread = threading.Thread(
                 target=_run_callbacks, args=(callbacks,), name=f"cancel {self.action}", daemon=True
             )
             try:
-                self._canceling.start()
+                self._cancel_thread.start()
             except (RuntimeError, MemoryError):  # out of threads
-                self._canceling = None
+                self._cancel_thread = None
                 _run_callbacks(callbacks)
 
     def close(self) -> None:
         """Wait at most 2 s for callbacks of `on_cancel` that are still running."""
-        if self._canceling is not None:
-            self._canceling.join(_JOIN_TIMEOUT_S)
+        if self._cancel_thread is not None:
+            self._cancel_thread.join(_JOIN_TIMEOUT_S)
 
     def on_cancel(self, callback: Callable[[], object]) -> None:
         """Register a callback for cancellation, such as one that aborts a blocking library call.
@@ -211,8 +211,8 @@ class Call:
                 already cancelled.
         """
         with self._lock:
-            if not self._ended.is_set():
-                self._on_cancel.append(callback)
+            if not self._canceled.is_set():
+                self._cancel_callbacks.append(callback)
                 return
         callback()
 
@@ -228,7 +228,7 @@ class Call:
         """
         if _is_in_event_loop():
             raise RuntimeError("call.wait blocks the event loop; use `await asyncio.sleep` there")
-        if self.clock.wait(self._ended, seconds):
+        if self.clock.wait(self._canceled, seconds):
             raise Canceled
 
     def until(
@@ -247,9 +247,9 @@ class Call:
         Raises:
             Canceled: The action was cancelled.
         """
-        limit = None if for_s is None else self.clock.now() + for_s
+        deadline = None if for_s is None else self.clock.now() + for_s
         while not condition():
-            if limit is not None and self.clock.now() >= limit:
+            if deadline is not None and self.clock.now() >= deadline:
                 return False
             self.wait(every_s)
         return True

@@ -68,9 +68,9 @@ class CommandHandler:
     def stop(self, command: object) -> None:
         """Execute a stop command at once, before queued commands. Thread-safe."""
         message = as_object(command)
-        ended = text(message.get("ends"))
-        if ended is not None:
-            self._ended_programs.append(program_of(ended))
+        ended_key = text(message.get("ends"))
+        if ended_key is not None:
+            self._ended_programs.append(program_of(ended_key))
         command_id, operation = _id_of(message), message.get("op")
         if command_id is None or (operation == "invoke" and command_id in self._open_ids):
             self._tasks.stop(None)
@@ -185,13 +185,13 @@ class CommandHandler:
             epoch: Value of `Tasks.epoch` when the command was received.
         """
         spec = self._specs[action.name]
-        complete = action.complete(values)
+        complete_input = action.complete(values)
         function: Callable[..., object] = getattr(self._body, action.name)
 
         def run(call: Call) -> Mapping[str, object]:
-            returned = self._resolve(function(call, **_typed_arguments(spec, function, complete)), call)
+            result = self._resolve(function(call, **_typed_arguments(spec, function, complete_input)), call)
             try:
-                return spec.returns.to_output(returned)
+                return spec.returns.to_output(result)
             except RobotValueError as error:
                 raise Failed(
                     _("{name} finished, but its result is invalid: {error}").format(
@@ -308,13 +308,13 @@ def _replace_surrogates(error: str | None) -> str | None:
 def _typed_arguments(
     spec: ActionSpec, function: Callable[..., object], inputs: Mapping[str, object]
 ) -> dict[str, object]:
-    typed: dict[str, object] = {}
+    arguments: dict[str, object] = {}
     for name, value in inputs.items():
         try:
-            typed[name] = from_json(spec.inputs[name], value)
+            arguments[name] = from_json(spec.inputs[name], value)
         except ValueError as error:
             raise Failed(f"{name}: {error}") from error
     for name, parameter in inspect.signature(function).parameters.items():
-        if name in spec.inputs and name not in typed and parameter.default is parameter.empty:
-            typed[name] = None  # an omitted Optional
-    return typed
+        if name in spec.inputs and name not in arguments and parameter.default is parameter.empty:
+            arguments[name] = None  # an omitted Optional
+    return arguments

@@ -112,8 +112,8 @@ def position_sensor(rate_hz: float) -> SensorSpec:
 
 def battery_sensor() -> SensorSpec:
     """Return the declaration of a sensor for the battery level in percent."""
-    full = Annotated[int, Range(0, 100, unit="%")]
-    return sensor(full, title="battery", text="battery", icon="battery-medium")
+    level = Annotated[int, Range(0, 100, unit="%")]
+    return sensor(level, title="battery", text="battery", icon="battery-medium")
 
 
 def distance_sensor(most_m: float) -> SensorSpec:

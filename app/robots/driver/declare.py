@@ -117,23 +117,23 @@ class action:  # noqa: N801 - used as a decorator
         return function
 
     def _description(self, function: Callable[..., object], returns: ReturnSpec) -> Schema:
-        part: Schema = {
+        description: Schema = {
             "title": self.title or function.__name__.replace("_", " "),
             "synchronous": not self.cancellable,
             **_without_none({"description": inspect.getdoc(function), "input": input_schema(function)}),
         }
         output = returns.schema()
         if output is not None:
-            part["output"] = output
+            description["output"] = output
         if self.feedback:
-            part["rb:feedback"] = fields_schema(self.feedback)
-        part |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
-        part |= _without_none(
+            description["rb:feedback"] = fields_schema(self.feedback)
+        description |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
+        description |= _without_none(
             {"rb:timeout": self.timeout_s, "rb:risk": self.risk, "rb:repeat": self.repeat_s}
         )
         block: Schema = {"category": self.category, "icon": self.icon, "text": {"en": self.text}}
-        part["rb:block"] = block | ({"says": {"en": self.says}} if self.says else {})
-        return part
+        description["rb:block"] = block | ({"says": {"en": self.says}} if self.says else {})
+        return description
 
 
 @dataclass(frozen=True)
@@ -172,9 +172,9 @@ class ReturnSpec:
         if self.fields:
             if value is None:
                 return {}
-            only = list(self.fields) if len(self.fields) == 1 else []
-            if only and not isinstance(value, Mapping):
-                value = {only[0]: value}
+            only_field = list(self.fields) if len(self.fields) == 1 else []
+            if only_field and not isinstance(value, Mapping):
+                value = {only_field[0]: value}
             return fields_to_json(self.fields, value)
         converted = any_to_json(value) if self.kind is None else to_json(self.kind, value)
         if isinstance(converted, dict):
@@ -427,15 +427,17 @@ class Kind:
         return stops[0]
 
     def _duplicate_problems(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
-        declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
-        twice = [
-            (name, locations) for name, locations in lines.items() if len(locations) > 1 and name in declared
+        declared_names = {*self.actions, *self.sensors, *self.events, self.stop[0]}
+        duplicates = [
+            (name, locations)
+            for name, locations in lines.items()
+            if len(locations) > 1 and name in declared_names
         ]
         return [
             _("{found}: '{name}' is defined twice, first in line {number}").format(
                 found=locations[-1], name=name, number=locations[0].number
             )
-            for name, locations in twice
+            for name, locations in duplicates
         ]
 
     def _members(self) -> list[tuple[str, object]]:
@@ -449,12 +451,12 @@ class Kind:
     def _thing_model(self) -> Schema:
         stop, timing = self.stop
         actions = {name: spec.description for name, spec in self.actions.items()}
-        stopping: Schema = {"category": "Movement", "icon": "octagon-x", "text": {"en": "stop moving"}}
+        stop_block: Schema = {"category": "Movement", "icon": "octagon-x", "text": {"en": "stop moving"}}
         actions[stop] = {"title": "stop", "synchronous": True, "idempotent": True, "rb:cancel": False}
-        actions[stop] |= {"rb:uses": [], "rb:block": stopping | {"says": {"en": "stops"}}}
+        actions[stop] |= {"rb:uses": [], "rb:block": stop_block | {"says": {"en": "stops"}}}
         resources = (name for part in actions.values() for name in _string_list(part.get("rb:uses")))
-        about: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
-        about |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
+        robot_info: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
+        robot_info |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
         return {
             "@context": _JSON_LD_CONTEXT,
             "@type": ["tm:ThingModel", "rb:Robot"],
@@ -462,7 +464,7 @@ class Kind:
             **_without_none({"description": self.description or None}),
             "version": {"model": "1.0.0"},
             "rb:profile": 1,
-            "rb:robot": about,
+            "rb:robot": robot_info,
             "rb:resources": list(dict.fromkeys(resources)),
             "rb:beat": HEARTBEAT_INTERVAL_S,
             "rb:safeStop": {
@@ -545,8 +547,8 @@ def lines_of(body: type) -> dict[str, list[SourceLine]]:
     except (OSError, TypeError, SyntaxError, ValueError):
         return {}
     lines_by_name: dict[str, list[SourceLine]] = {}
-    (declared,) = tree.body
-    for statement in declared.body if isinstance(declared, ast.ClassDef) else ():
+    (class_statement,) = tree.body
+    for statement in class_statement.body if isinstance(class_statement, ast.ClassDef) else ():
         for name in _bound_names(statement):
             lines_by_name.setdefault(name, []).append(SourceLine(file, first + statement.lineno - 1))
     return lines_by_name

@@ -82,7 +82,7 @@ class Dispatcher:
 
     @property
     def is_current(self) -> bool:
-        """True in the thread of this dispatcher."""
+        """True if the calling thread is the thread of this dispatcher."""
         return threading.current_thread() is self._thread
 
     def call(self, function: Callable[[], object]) -> None:

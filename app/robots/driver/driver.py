@@ -74,7 +74,7 @@ class Driver:
         self._body: object = None
         self._tasks: Tasks | None = None
         self._rejected = RejectedMessages(name)
-        self._world: Dispatcher | None = None
+        self._world_dispatcher: Dispatcher | None = None
         self._loop = EventLoop(name)
 
     @property
@@ -119,9 +119,9 @@ class Driver:
         publish_reply = partial(self._publish, self.robot.topics.reply)
 
         def publish_heartbeat(not_ended: tuple[str, ...], error: str | None) -> None:
-            desk.publish_heartbeat(
+            handler.publish_heartbeat(
                 not_ended, error, rejected=self._rejected.count
-            )  # desk is created with the tasks below
+            )  # created with the tasks below
 
         self._tasks = tasks = Tasks(
             self.name,
@@ -129,27 +129,29 @@ class Driver:
             self.clock,
             within_s=timing.within_s,
             watchdog_s=timing.watchdog_s,
-            beat=publish_heartbeat,
+            send_heartbeat=publish_heartbeat,
         )
-        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, publish_reply, self._resolve)
+        handler = CommandHandler(self.robot, body, self.kind.actions, tasks, publish_reply, self._resolve)
         dialect = RizeDialect(
-            self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS)
+            self.robot, self.kind.actions, handler, tasks, partial(self._publish, RIZE_ANSWERS)
         )
         tasks.start()
         topic, stop_words = self.robot.topics.command, ("stop", stop)
-        native = CommandReceiver(topic, tasks, desk, stop_words, self._rejected)
-        rize = CommandReceiver(RIZE_COMMANDS, tasks, dialect, stop_words, self._rejected, queues_stops=True)
-        self._subscribers.append(self._node.new_sub(topic, "robot/command", sink=native.process))
-        self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.process))
+        native_receiver = CommandReceiver(topic, tasks, handler, stop_words, self._rejected)
+        rize_receiver = CommandReceiver(
+            RIZE_COMMANDS, tasks, dialect, stop_words, self._rejected, queues_stops=True
+        )
+        self._subscribers.append(self._node.new_sub(topic, "robot/command", sink=native_receiver.process))
+        self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize_receiver.process))
 
     def close(self) -> None:
         """Stop the robot, reply to pending commands, stop the threads and close the topics. Idempotent."""
         for subscriber in self._subscribers:
             subscriber.close()
         self._subscribers.clear()
-        world, self._world = self._world, None
-        if world is not None:
-            world.close()
+        dispatcher, self._world_dispatcher = self._world_dispatcher, None
+        if dispatcher is not None:
+            dispatcher.close()
         tasks, self._tasks = self._tasks, None
         if tasks is not None:
             tasks.close()
@@ -157,7 +159,7 @@ class Driver:
         if callable(close):
             try:
                 self._resolve(close(), within_s=_CLOSE_TIMEOUT_S)
-            except Exception:  # noqa: BLE001 - the rest must be closed in any case
+            except Exception:  # noqa: BLE001 - everything else must be closed in any case
                 _log.warning("%s: close() raised an exception", self.name, exc_info=True)
         self._loop.close()
         self._loop = EventLoop(self.name)
@@ -215,12 +217,12 @@ class Driver:
 
         Every described field must be present with a valid value; other fields are not allowed.
         """
-        described = self.robot.event(event)
-        if described is None:
+        event_description = self.robot.event(event)
+        if event_description is None:
             return (_("{robot} has no event “{event}”").format(robot=self.name, event=quotable(event)),)
-        missing = [field for field in described.fields if field.name not in data]
+        missing = [field for field in event_description.fields if field.name not in data]
         return (
-            *(problem.message for problem in input_problems(described.fields, data)),
+            *(problem.message for problem in input_problems(event_description.fields, data)),
             *(_("{place} is missing").format(place=field.title) for field in missing),
         )
 
@@ -292,16 +294,16 @@ class Driver:
 
     def _subscribe(self, topic: str, changed: Callable[[Mapping[str, object]], None]) -> None:
         # In a separate thread: handling a message must not delay a stop.
-        if self._world is None:
-            self._world = Dispatcher(f"{self.name} world", self.clock)
-            self._world.start()
-        queue = MessageQueue(topic, self._world.post, self._rejected, MAX_WORLD_BYTES)
+        if self._world_dispatcher is None:
+            self._world_dispatcher = Dispatcher(f"{self.name} world", self.clock)
+            self._world_dispatcher.start()
+        queue = MessageQueue(topic, self._world_dispatcher.post, self._rejected, MAX_WORLD_BYTES)
 
-        def take(messages: Sequence[nep.Message]) -> None:
+        def enqueue(messages: Sequence[nep.Message]) -> None:
             for message in messages:
                 queue.put(message, lambda payload: changed(as_object(payload)))
 
-        self._subscribers.append(self._node.new_sub(topic, "json", sink=take))
+        self._subscribers.append(self._node.new_sub(topic, "json", sink=enqueue))
 
 
 class EventLoop:
@@ -318,7 +320,7 @@ class EventLoop:
         self._lock = threading.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
-        self._closed = False
+        self._is_closed = False
 
     def run(
         self, awaitable: Awaitable[object], call: Call | None = None, *, within_s: float | None = None
@@ -335,21 +337,21 @@ class EventLoop:
             TimeoutError: The timeout has elapsed.
             RuntimeError: The loop is closed, or the caller runs in the loop.
         """
-        loop, waited = self._running_loop(awaitable), _PendingAwaitable(awaitable)
-        self._call_soon(partial(waited.start, loop, f"{self._name}: {call.action if call else 'run'}"))
+        loop, pending = self._running_loop(awaitable), _PendingAwaitable(awaitable)
+        self._call_soon(partial(pending.start, loop, f"{self._name}: {call.action if call else 'run'}"))
         if call is not None:
-            call.on_cancel(partial(self._call_soon, waited.cancel))
-        if not waited.ended.wait(within_s) and within_s is not None:
-            self._call_soon(waited.cancel)
+            call.on_cancel(partial(self._call_soon, pending.cancel))
+        if not pending.ended.wait(within_s) and within_s is not None:
+            self._call_soon(pending.cancel)
             raise TimeoutError(_("timed out after {seconds} s").format(seconds=number(within_s)))
-        if waited.error is not None:
-            raise waited.error
-        return waited.result
+        if pending.error is not None:
+            raise pending.error
+        return pending.result
 
     def close(self) -> None:
         """Cancel running coroutines and stop the thread; a blocked loop is abandoned with a warning."""
         with self._lock:
-            self._closed = True
+            self._is_closed = True
             loop, thread = self._loop, self._thread
         if loop is None or thread is None:
             return
@@ -360,17 +362,17 @@ class EventLoop:
 
     def _running_loop(self, awaitable: Awaitable[object]) -> asyncio.AbstractEventLoop:
         with self._lock:
-            if self._closed or threading.current_thread() is self._thread:
+            if self._is_closed or threading.current_thread() is self._thread:
                 if asyncio.iscoroutine(awaitable):
                     awaitable.close()
-                if self._closed:
+                if self._is_closed:
                     raise RuntimeError(_("can't run the coroutine: the robot's driver is closed"))
                 raise RuntimeError(_("can't block in the event loop; use await"))
             if self._loop is None:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"
                 self._thread = threading.Thread(
-                    target=_run_loop, args=(self._loop, lambda: self._closed), name=name, daemon=True
+                    target=_run_loop, args=(self._loop, lambda: self._is_closed), name=name, daemon=True
                 )
                 self._thread.start()
             return self._loop

@@ -67,14 +67,14 @@ def install_exception_hook() -> None:
 
     Descriptions are generated while Python executes the class, before the driver can catch an exception.
     """
-    before = sys.excepthook
+    previous_hook = sys.excepthook
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if isinstance(error, DescriptionError):
             with Terminal(sys.stderr) as terminal:
                 _print(str(error), terminal)
         else:
-            before(kind, error, trace)
+            previous_hook(kind, error, trace)
 
     sys.excepthook = hook
 

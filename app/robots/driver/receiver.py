@@ -106,12 +106,12 @@ class MessageQueue:
         self._lock = threading.Lock()
         self._count = self._bytes = 0
 
-    def put(self, message: Message, use: Callable[[object], object]) -> bool:
+    def put(self, message: Message, on_payload: Callable[[object], object]) -> bool:
         """Queue a message, or reject it because it is too large or the queue is full.
 
         Args:
             message: Message.
-            use: Called with the payload in the decoding thread.
+            on_payload: Called with the payload in the decoding thread.
 
         Returns:
             False if the message is too large. True also for a message that doesn't fit in the queue.
@@ -126,7 +126,7 @@ class MessageQueue:
                 self._count += 1
                 self._bytes += size
         if has_room:
-            self._post(partial(self._decode, message, use))
+            self._post(partial(self._decode, message, on_payload))
         else:
             self._rejected.add(self._topic, _("messages arrive faster than they are handled"))
         return True
@@ -137,7 +137,7 @@ class MessageQueue:
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
         )
 
-    def _decode(self, message: Message, use: Callable[[object], object]) -> None:
+    def _decode(self, message: Message, on_payload: Callable[[object], object]) -> None:
         with self._lock:
             self._count -= 1
             self._bytes -= message.size_bytes
@@ -146,7 +146,7 @@ class MessageQueue:
         except DecodeError as error:
             self._rejected.add(self._topic, str(error))
         else:
-            use(payload)
+            on_payload(payload)
 
 
 class CommandReceiver:
@@ -179,13 +179,17 @@ class CommandReceiver:
 
     def process(self, messages: Sequence[Message]) -> None:
         """Process received messages. Called in the network's thread; never raises."""
-        stops = [index for index, message in enumerate(messages) if self._is_stop(message)]
+        stop_indexes = [index for index, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch
-        for index in stops:
+        for index in stop_indexes:
             self._stop(messages[index])
-        epoch, last_stop, handled = self._tasks.epoch, max(stops, default=-1), frozenset(stops)
+        epoch, last_stop, handled_indexes = (
+            self._tasks.epoch,
+            max(stop_indexes, default=-1),
+            frozenset(stop_indexes),
+        )
         for index, message in enumerate(messages):
-            if self._queues_stops or index not in handled:
+            if self._queues_stops or index not in handled_indexes:
                 self._enqueue(message, epoch if index >= last_stop else older_epoch)
 
     def _is_stop(self, message: Message) -> bool:
@@ -196,7 +200,7 @@ class CommandReceiver:
             return False
         try:
             return self._dialect.is_stop(message.payload)
-        except Exception:  # noqa: BLE001 - the deciding thread raises and reports it again
+        except Exception:  # noqa: BLE001 - raised and reported again in the thread of the tasks
             return False
 
     def _stop(self, message: Message) -> None:

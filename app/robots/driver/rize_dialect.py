@@ -58,7 +58,7 @@ class RizeDialect:
     ) -> None:
         self._robot, self._commands, self._tasks, self._publish = robot, commands, tasks, publish
         self._specs = {spec.primitive: (name, spec) for name, spec in specs.items() if spec.primitive}
-        self._numbers = itertools.count(1)
+        self._task_numbers = itertools.count(1)
 
     def is_stop(self, message: object) -> bool:
         """Return True if the primitives of a message include the robot's stop. Thread-safe."""
@@ -125,7 +125,7 @@ class RizeDialect:
         self, primitive: Mapping[str, object], on_reply: Callable[[TaskReply], None], epoch: int | None
     ) -> None:
         name, input_text = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
-        task_id = f"{_TASK_ID_PREFIX}{next(self._numbers)}"
+        task_id = f"{_TASK_ID_PREFIX}{next(self._task_numbers)}"
         action_name, spec = self._specs.get(name, (name, None))
         action = self._robot.action(action_name)
         if action is not None and action.name == self._robot.safe_stop.action:

@@ -112,11 +112,11 @@ def schema_of(annotation: object) -> Schema:
 
 def _schema_of(annotation: object, enclosing: tuple[object, ...]) -> Schema:
     annotation, notes = split_annotated(annotation)
-    optional, may_be_none = split_optional(annotation)
+    inner_type, is_optional = split_optional(annotation)
     schema = (
-        _type_schema(annotation, enclosing) if optional is annotation else _schema_of(optional, enclosing)
+        _type_schema(annotation, enclosing) if inner_type is annotation else _schema_of(inner_type, enclosing)
     )
-    if may_be_none:
+    if is_optional:
         schema["rb:nullable"] = True
     for note in notes:
         schema.update(_annotation_schema(note, schema))
@@ -143,9 +143,9 @@ def _type_schema(annotation: object, enclosing: tuple[object, ...]) -> Schema:
             "maxItems": len(element_schemas),
         }
     if origin in {dict, Mapping} and len(arguments) == 2 and arguments[0] is str:
-        free = arguments[1] in (Any, object)
+        is_unrestricted = arguments[1] in (Any, object)
         return {"type": "object"} | (
-            {} if free else {"additionalProperties": _element_schema(arguments[1], enclosing)}
+            {} if is_unrestricted else {"additionalProperties": _element_schema(arguments[1], enclosing)}
         )
     if annotation in enclosing:
         raise TypeError(
@@ -181,8 +181,10 @@ def _choice_schema(annotation: object, choices: tuple[tuple[object, object, str 
                 annotation=format_type(annotation)
             )
         )
-    texts = [isinstance(value, str) for value in values]
-    schema: Schema = {} if any(texts) and not all(texts) else {"type": "string" if all(texts) else "number"}
+    are_texts = [isinstance(value, str) for value in values]
+    schema: Schema = (
+        {} if any(are_texts) and not all(are_texts) else {"type": "string" if all(are_texts) else "number"}
+    )
     if any(title is not None for _, _, title in choices):
         return schema | {"oneOf": [{"const": value, "title": title} for value, _, title in choices]}
     return schema | {"enum": values}
@@ -298,8 +300,8 @@ def return_type(function: Callable[..., object]) -> object:
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]
     bare_type, _ = split_annotated(kind)
-    free = bare_type in (None, type(None), Any, object, dict, Mapping, NoReturn)
-    return None if free or get_args(bare_type)[1:] in ((object,), (Any,)) else kind
+    is_unrestricted = bare_type in (None, type(None), Any, object, dict, Mapping, NoReturn)
+    return None if is_unrestricted or get_args(bare_type)[1:] in ((object,), (Any,)) else kind
 
 
 def input_schema(function: Callable[..., object]) -> Schema | None:

@@ -138,16 +138,18 @@ def from_json(annotation: object, value: object) -> object:
     fields = fields_of(kind)
     if fields is not None and isinstance(value, Mapping):
         arguments_by_name = {
-            name: from_json(each, value[name]) for name, (each, _must) in fields.items() if name in value
+            name: from_json(each, value[name])
+            for name, (each, _is_required) in fields.items()
+            if name in value
         }
         if not dataclasses.is_dataclass(kind):
             return arguments_by_name
-        absent = {
+        omitted = {
             name: None
             for name, (each, is_required) in fields.items()
             if is_required and name not in arguments_by_name
         }
-        return kind(**absent, **arguments_by_name)  # type: ignore[operator]  # a dataclass that fields_of took is a class
+        return kind(**omitted, **arguments_by_name)  # type: ignore[operator]  # fields_of returns fields only for classes
     arguments = get_args(kind)
     if isinstance(value, (list, tuple)) and arguments:
         if get_origin(kind) is tuple and arguments[1:] != (Ellipsis,):
@@ -192,7 +194,7 @@ def to_json(annotation: object, value: object) -> object:
     fields = fields_of(kind)
     if fields is not None:
         return fields_to_json(
-            {name: each for name, (each, _must) in fields.items()}, value, _required_names(fields)
+            {name: each for name, (each, _is_required) in fields.items()}, value, _required_names(fields)
         )
     return _collection_to_json(kind, value)
 

@@ -24,7 +24,7 @@ class StopThread:
     Args:
         name: Name of the robot.
         stop: Stop function of the robot.
-        ended: Called in this thread after each run, with its number and its error message, or None.
+        on_end: Called in this thread after each run, with its number and its error message, or None.
         clock: Clock with which the thread waits.
     """
 
@@ -32,15 +32,15 @@ class StopThread:
         self,
         name: str,
         stop: Callable[[], object],
-        ended: Callable[[int, str | None], object],
+        on_end: Callable[[int, str | None], object],
         clock: Clock,
     ) -> None:
-        self._name, self._stop, self._ended, self._clock = name, stop, ended, clock
+        self._name, self._stop, self._on_end, self._clock = name, stop, on_end, clock
         self._errors = SuppressedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._is_closing = False
-        self._requested = self._finished = 0
+        self._requested_run = self._finished_run = 0
         self._thread = self._new_thread()
 
     def start(self) -> None:
@@ -50,7 +50,7 @@ class StopThread:
     @property
     def requested_run(self) -> int:
         """Number of the newest run that was reserved; 0 before the first."""
-        return self._requested
+        return self._requested_run
 
     def reserve(self) -> int:
         """Reserve a run for a stop requested now and return its number; `wake` starts the run.
@@ -58,9 +58,9 @@ class StopThread:
         If a run is reserved or running, its number is returned.
         """
         with self._lock:
-            if self._requested == self._finished:
-                self._requested += 1
-            return self._requested
+            if self._requested_run == self._finished_run:
+                self._requested_run += 1
+            return self._requested_run
 
     def wake(self) -> None:
         """Start the reserved run immediately, in the stop thread."""
@@ -80,11 +80,11 @@ class StopThread:
         try:
             while not self._is_closing:
                 with self._errors:
-                    if self._requested == self._finished:
+                    if self._requested_run == self._finished_run:
                         self._clock.wait(self._wake, None)
                     self._wake.clear()
-                    if self._requested > self._finished:
-                        self._run(self._requested)
+                    if self._requested_run > self._finished_run:
+                        self._run(self._requested_run)
         finally:
             if not self._is_closing:  # an exception was injected outside of the try block
                 self._thread = self._new_thread()
@@ -97,17 +97,17 @@ class StopThread:
             error = self._call_stop()
         finally:
             with self._lock:
-                self._finished = run
-            self._ended(run, error)
+                self._finished_run = run
+            self._on_end(run, error)
 
     def _call_stop(self) -> str | None:
         try:
             self._stop()
-        except Failed as failed:
-            reason = bounded_str(failed, MAX_ERROR_LENGTH)
-        except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
+        except Failed as error:
+            reason = bounded_str(error, MAX_ERROR_LENGTH)
+        except BaseException as error:  # noqa: BLE001 - also SystemExit: a stop must always get a reply
             _log.warning("%s: stop() raised an exception", self._name, exc_info=True)
-            reason = _("the stop command failed: {error}").format(error=bounded_str(failed, MAX_ERROR_LENGTH))
+            reason = _("the stop command failed: {error}").format(error=bounded_str(error, MAX_ERROR_LENGTH))
         else:
             return None
         return _(MAY_MOVE_MESSAGE).format(robot=self._name, why=reason)

@@ -101,14 +101,14 @@ class Task:
     has_replied: bool = False
     is_stopped: bool = False
 
-    def request_end(self, how: TaskReply) -> None:
+    def request_end(self, final_reply: TaskReply) -> None:
         """Cancel the running function.
 
         Args:
-            how: Final reply, unless an earlier call has set one. It replaces the function's result, but
-                not its error.
+            final_reply: Final reply, unless an earlier call has set one. It replaces the function's result,
+                but not its error.
         """
-        self.final_reply = self.final_reply or how
+        self.final_reply = self.final_reply or final_reply
         if self.call is not None:
             self.call.cancel()
 

@@ -48,11 +48,11 @@ class Watchdog:
     The watchdog has no thread: the caller polls it with `check_expired`.
 
     Args:
-        patience_s: Maximum time between heartbeats in seconds; None disables the watchdog.
+        timeout_s: Maximum time between heartbeats in seconds; None disables the watchdog.
     """
 
-    def __init__(self, patience_s: float | None) -> None:
-        self.patience_s = patience_s
+    def __init__(self, timeout_s: float | None) -> None:
+        self.timeout_s = timeout_s
         self._heartbeat_times_s: dict[ProgramId, float] = {}
         self._programs_in_motion: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
@@ -64,7 +64,7 @@ class Watchdog:
             now: Time on the clock.
             watch: True to monitor the program from now on, because it has requested an action.
         """
-        if self.patience_s is not None and (watch or program in self._heartbeat_times_s):
+        if self.timeout_s is not None and (watch or program in self._heartbeat_times_s):
             self._heartbeat_times_s[program] = now
 
     def record_start(self, task: Task) -> None:
@@ -89,27 +89,32 @@ class Watchdog:
         """Return the times on the clock at which the monitored programs count as silent."""
         return (
             []
-            if self.patience_s is None
-            else [heard_at + self.patience_s for heard_at in self._heartbeat_times_s.values()]
+            if self.timeout_s is None
+            else [heartbeat_s + self.timeout_s for heartbeat_s in self._heartbeat_times_s.values()]
         )
 
-    def check_expired(self, now: float, acting: Collection[ProgramId | None]) -> bool:
+    def check_expired(self, now: float, active_programs: Collection[ProgramId | None]) -> bool:
         """Return True if a silent program has a task or a continuing motion, so that the robot must stop.
 
         All silent programs are removed; those without a task may have ended long ago.
 
         Args:
             now: Time on the clock.
-            acting: Programs of running and queued tasks.
+            active_programs: Programs of running and queued tasks.
         """
-        if self.patience_s is None:
+        if self.timeout_s is None:
             return False
-        silent = [
-            name for name, heard_at in self._heartbeat_times_s.items() if now - heard_at >= self.patience_s
+        silent_programs = [
+            program
+            for program, heartbeat_s in self._heartbeat_times_s.items()
+            if now - heartbeat_s >= self.timeout_s
         ]
-        for name in silent:
-            del self._heartbeat_times_s[name]
-        return any(name in acting or name in self._programs_in_motion.values() for name in silent)
+        for program in silent_programs:
+            del self._heartbeat_times_s[program]
+        return any(
+            program in active_programs or program in self._programs_in_motion.values()
+            for program in silent_programs
+        )
 
 
 class _PendingStop(NamedTuple):
@@ -117,7 +122,7 @@ class _PendingStop(NamedTuple):
 
     run: int
     """Number of the run of the stop function that serves this stop."""
-    limit_s: float
+    deadline_s: float
     reply: Callable[[TaskReply], None]
 
 
@@ -130,10 +135,10 @@ class Tasks:
         clock: Clock.
         within_s: Time in seconds within which the robot stops.
         watchdog_s: Maximum time between heartbeats of a program in seconds; None disables the watchdog.
-        beat: Sends a heartbeat. Called every `HEARTBEAT_INTERVAL_S` while a task is running or queued or a
-            stop has not succeeded. Arguments: names of cancelled actions whose functions are still running,
-            and a message about them or about a failed stop of the watchdog, to which there is no other reply.
-            Called once more when the last of these functions has ended.
+        send_heartbeat: Sends a heartbeat. Called every `HEARTBEAT_INTERVAL_S` while a task is running or
+            queued or a stop has not succeeded. Arguments: names of cancelled actions whose functions are
+            still running, and a message about them or about a failed stop of the watchdog, to which there is
+            no other reply. Called once more when the last of these functions has ended.
     """
 
     def __init__(
@@ -144,16 +149,16 @@ class Tasks:
         *,
         within_s: float,
         watchdog_s: float | None,
-        beat: Callable[[tuple[str, ...], str | None], None] | None = None,
+        send_heartbeat: Callable[[tuple[str, ...], str | None], None] | None = None,
     ) -> None:
-        self._name, self._clock, self._beat = name, clock, beat
-        self._next_beat_s = 0.0
+        self._name, self._clock, self._publish_heartbeat = name, clock, send_heartbeat
+        self._next_heartbeat_s = 0.0
         self._reported_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
-        self._stop_is_late = False
+        self._is_stop_late = False
         self._unrequested_stop_error: str | None = (
             None  # error of the last failed stop that was not requested
         )
-        self._patience_s = max(STOP_REPLY_TIMEOUT_S, within_s)
+        self._stop_reply_timeout_s = max(STOP_REPLY_TIMEOUT_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._dispatcher = Dispatcher(
             f"{name} commands",
@@ -226,12 +231,12 @@ class Tasks:
         """Stop the robot, end all tasks and join the threads; a function that doesn't end is abandoned."""
         stopped = threading.Event()
 
-        def take(reply: TaskReply) -> None:
+        def finish_stop(reply: TaskReply) -> None:
             self._record_unrequested_stop(reply)
             stopped.set()
 
-        self.stop(take, _("the driver is shutting down"))
-        stopped.wait(self._patience_s + _GRACE_S)
+        self.stop(finish_stop, _("the driver is shutting down"))
+        stopped.wait(self._stop_reply_timeout_s + _GRACE_S)
         self._stop_thread.close()
         self._dispatcher.close()
 
@@ -247,33 +252,33 @@ class Tasks:
         if task.epoch is not None and task.epoch < self._epoch:
             self._send_reply(task.finish, _stopped_reply())
             return
-        refused = self._rejection_reason()
-        if refused is not None:
-            self._send_reply(task.finish, TaskReply("failed", error=f"{task.action}: {refused}"))
+        rejection = self._rejection_reason()
+        if rejection is not None:
+            self._send_reply(task.finish, TaskReply("failed", error=f"{task.action}: {rejection}"))
             return
-        clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
-        if clashing and task.on_busy == "reject":
-            busy = _("{action}: {robot} is busy with {other}").format(
-                action=task.action, robot=self._name, other=clashing[0].title or clashing[0].action
+        conflicting = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
+        if conflicting and task.on_busy == "reject":
+            error = _("{action}: {robot} is busy with {other}").format(
+                action=task.action, robot=self._name, other=conflicting[0].title or conflicting[0].action
             )
-            self._send_reply(task.finish, TaskReply("failed", error=busy))
+            self._send_reply(task.finish, TaskReply("failed", error=error))
             return
         if len(self._running) >= _MAX_RUNNING:
-            full = _("{action}: {count} other actions are already running").format(
+            error = _("{action}: {count} other actions are already running").format(
                 action=task.action, count=_MAX_RUNNING
             )
-            self._send_reply(task.finish, TaskReply("failed", error=full))
+            self._send_reply(task.finish, TaskReply("failed", error=error))
             return
         if len(self._queue) >= _MAX_QUEUED:
-            full = _("{action}: {count} other actions are already waiting").format(
+            error = _("{action}: {count} other actions are already waiting").format(
                 action=task.action, count=_MAX_QUEUED
             )
-            self._send_reply(task.finish, TaskReply("failed", error=full))
+            self._send_reply(task.finish, TaskReply("failed", error=error))
             return
         to_replace = []
         if task.on_busy == "replace":
-            to_replace = [other for other in clashing if other.cancellable or other in self._queue]
-        waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in to_replace))
+            to_replace = [other for other in conflicting if other.cancellable or other in self._queue]
+        waits_for = tuple(dict.fromkeys(other.action for other in conflicting if other not in to_replace))
         replaces = tuple(dict.fromkeys(other.action for other in to_replace))
         self._send_reply(task.reply, TaskReply("accepted", waits_for=waits_for, replaces=replaces))
         replaced = TaskReply(
@@ -296,9 +301,9 @@ class Tasks:
         matching = [task for task in (*self._running, *self._queue) if is_selected(task)]
         if not matching:
             return NO_SUCH_TASK_MESSAGE
-        stubborn = [task for task in matching if task in self._running and not task.cancellable]
-        if stubborn:
-            return _("{action} can't be cancelled; it ends on its own").format(action=stubborn[0].action)
+        uncancellable = [task for task in matching if task in self._running and not task.cancellable]
+        if uncancellable:
+            return _("{action} can't be cancelled; it ends on its own").format(action=uncancellable[0].action)
         self._drop_queued([task for task in matching if task in self._queue], TaskReply("canceled"))
         for task in matching:
             self._end_task(task, TaskReply("canceled"))
@@ -313,21 +318,21 @@ class Tasks:
         """
         self._watchdog.record_heartbeat(program, self._clock.now(), watch=watch)
 
-    # ---- the deciding thread ----------------------------------------------------------------------
+    # ---- thread of the tasks ------------------------------------------------------------------------
 
     def _start_stop(self, run: int, on_reply: Callable[[TaskReply], None] | None, reason: str) -> None:
-        limit = self._clock.now() + self._patience_s
+        deadline_s = self._clock.now() + self._stop_reply_timeout_s
         if on_reply is not None:
-            self._pending_stops.append(_PendingStop(run, limit, on_reply))
+            self._pending_stops.append(_PendingStop(run, deadline_s, on_reply))
         self._watchdog.reset()
         ended = TaskReply("canceled", error=reason)
         self._drop_queued(list(self._queue), ended)
         for task in self._running:
             if task.final_reply is None:
                 task.request_end(ended)
-                task.deadline_s = limit
+                task.deadline_s = deadline_s
             elif task.deadline_s is not None:
-                task.deadline_s = min(task.deadline_s, limit)
+                task.deadline_s = min(task.deadline_s, deadline_s)
             task.is_stopped = True
         if run <= self._ended_run:  # a concurrent stop's run has already ended
             self._handle_stop_end(self._ended_run, self._ended_error)
@@ -339,12 +344,12 @@ class Tasks:
         self._dispatcher.call(partial(on_reply, reply))
 
     def _next_due(self) -> float | None:
-        due = [task.deadline_s for task in self._running if task.deadline_s is not None]
-        due += [pending.limit_s for pending in self._pending_stops]
-        due += self._watchdog.deadlines()
-        if self._beat is not None and self._needs_heartbeat:
-            due.append(self._next_beat_s)
-        return max(0.0, min(due) - self._clock.now()) if due else None
+        deadlines_s = [task.deadline_s for task in self._running if task.deadline_s is not None]
+        deadlines_s += [pending.deadline_s for pending in self._pending_stops]
+        deadlines_s += self._watchdog.deadlines()
+        if self._publish_heartbeat is not None and self._needs_heartbeat:
+            deadlines_s.append(self._next_heartbeat_s)
+        return max(0.0, min(deadlines_s) - self._clock.now()) if deadlines_s else None
 
     @property
     def _is_busy(self) -> bool:
@@ -359,14 +364,16 @@ class Tasks:
         return self._is_busy or self._unrequested_stop_error is not None
 
     def _rejection_reason(self) -> str | None:
-        stopped = [task for task in self._running if task.is_stopped]
-        if self._stop_is_late or any(task.has_replied for task in stopped):
+        stopped_tasks = [task for task in self._running if task.is_stopped]
+        if self._is_stop_late or any(task.has_replied for task in stopped_tasks):
             return still_moving_message(self._name, self._unfinished_actions())
-        return _("{robot} is stopping").format(robot=self._name) if self._is_stopping or stopped else None
+        return (
+            _("{robot} is stopping").format(robot=self._name) if self._is_stopping or stopped_tasks else None
+        )
 
     def _unfinished_actions(self) -> tuple[str, ...]:
         names = [task.action for task in self._running if task.has_replied]
-        return tuple(names + [STOP_LABEL] * self._stop_is_late)
+        return tuple(names + [STOP_LABEL] * self._is_stop_late)
 
     def _unfinished_report(self) -> tuple[tuple[str, ...], str | None]:
         not_ended = self._unfinished_actions()
@@ -377,13 +384,13 @@ class Tasks:
         ), self._unrequested_stop_error
 
     def _send_heartbeat(self) -> None:
-        if self._beat is None:
+        if self._publish_heartbeat is None:
             return
         now = self._clock.now()
         report = self._unfinished_report()
-        if (self._needs_heartbeat and now >= self._next_beat_s) or report != self._reported_not_ended:
-            self._next_beat_s, self._reported_not_ended = now + HEARTBEAT_INTERVAL_S, report
-            self._beat(*report)
+        if (self._needs_heartbeat and now >= self._next_heartbeat_s) or report != self._reported_not_ended:
+            self._next_heartbeat_s, self._reported_not_ended = now + HEARTBEAT_INTERVAL_S, report
+            self._publish_heartbeat(*report)
 
     def _tick(self) -> None:
         for step in (
@@ -402,23 +409,23 @@ class Tasks:
 
     def _reply_to_late_stops(self) -> None:
         now = self._clock.now()
-        late = [pending for pending in self._pending_stops if now >= pending.limit_s]
-        self._pending_stops = [pending for pending in self._pending_stops if now < pending.limit_s]
-        if any(pending.run > self._ended_run for pending in late):
-            self._stop_is_late = True
-        for pending in late:
+        late_stops = [pending for pending in self._pending_stops if now >= pending.deadline_s]
+        self._pending_stops = [pending for pending in self._pending_stops if now < pending.deadline_s]
+        if any(pending.run > self._ended_run for pending in late_stops):
+            self._is_stop_late = True
+        for pending in late_stops:
             self._send_reply(
                 pending.reply,
                 TaskReply("failed", error=still_moving_message(self._name, self._unfinished_actions())),
             )
 
     def _watch_programs(self) -> None:
-        acting = [task.program for task in (*self._running, *self._queue)]
-        if self._watchdog.check_expired(self._clock.now(), acting):
+        active_programs = [task.program for task in (*self._running, *self._queue)]
+        if self._watchdog.check_expired(self._clock.now(), active_programs):
             self.stop(
                 self._record_unrequested_stop,
                 _("its program hasn't responded for {seconds} s").format(
-                    seconds=number(self._watchdog.patience_s or 0.0)
+                    seconds=number(self._watchdog.timeout_s or 0.0)
                 ),
             )
 
@@ -428,10 +435,10 @@ class Tasks:
                 _log.error("%s", reply.error)
             self._unrequested_stop_error = reply.error
 
-    def _end_task(self, task: Task, how: TaskReply) -> None:
+    def _end_task(self, task: Task, final_reply: TaskReply) -> None:
         # A function that keeps running is reported after `_GRACE_S`.
         if task.final_reply is None:
-            task.request_end(how)
+            task.request_end(final_reply)
             task.deadline_s = self._clock.now() + _GRACE_S
 
     def _handle_timeout(self, task: Task) -> None:
@@ -448,13 +455,13 @@ class Tasks:
             return
         task.deadline_s = None
         details = "" if task.is_stopped or task.final_reply.error is None else f" ({task.final_reply.error})"
-        goes_on = still_moving_message(self._name, [task.action])
-        self._send_reply(task.finish, TaskReply("failed", error=f"{goes_on}{details}"))
+        still_moving = still_moving_message(self._name, [task.action])
+        self._send_reply(task.finish, TaskReply("failed", error=f"{still_moving}{details}"))
 
-    def _drop_queued(self, tasks: list[Task], how: TaskReply) -> None:
+    def _drop_queued(self, tasks: list[Task], reply: TaskReply) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
         for task in tasks:
-            self._send_reply(task.finish, how)
+            self._send_reply(task.finish, reply)
 
     def _start_ready(self) -> None:
         busy_resources = {resource for task in self._running for resource in task.uses}
@@ -509,7 +516,7 @@ class Tasks:
             return TaskReply("canceled")
         except Failed as failed:
             return TaskReply("failed", error=bounded_str(failed, MAX_ERROR_LENGTH))
-        except BaseException as error:  # noqa: BLE001 - also SystemExit: a task must always be answered
+        except BaseException as error:  # noqa: BLE001 - also SystemExit: a task must always get a reply
             _log.warning("%s: %s raised an exception", self._name, task.action, exc_info=True)
             return TaskReply("failed", error=self._failure_message(task, error))
         return TaskReply("succeeded", output=output if isinstance(output, Mapping) else {})
@@ -528,7 +535,7 @@ class Tasks:
             self._watchdog.record_success(task)
         if task.is_stopped and not self._is_stopping:
             # It may have moved the robot after the stop, so the robot is stopped again.
-            self._stop_is_late = task.has_replied
+            self._is_stop_late = task.has_replied
             run = self._stop_thread.reserve()
             self._stop_thread.wake()
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
@@ -545,30 +552,28 @@ class Tasks:
 
     def _handle_stop_end(self, run: int, error: str | None) -> None:
         self._ended_run, self._ended_error = run, error
-        self._stop_is_late = False
+        self._is_stop_late = False
         if error is None:
             self._unrequested_stop_error = None
             self._complete_stops()
             return
         failed = TaskReply("failed", error=error)
-        waiting = [pending for pending in self._pending_stops if pending.run <= run]
+        answered = [pending for pending in self._pending_stops if pending.run <= run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
-        if not waiting:
-            self._record_unrequested_stop(
-                failed
-            )  # the requester already got the answer that it had not ended
+        if not answered:
+            self._record_unrequested_stop(failed)  # the requesters have already received a failure reply
         elif self._unrequested_stop_error is not None:
             self._unrequested_stop_error = error
-        for pending in waiting:
+        for pending in answered:
             self._send_reply(pending.reply, failed)
 
     def _complete_stops(self) -> None:
-        # Answers the stops whose run of the stop function has ended, once no task runs.
+        # Replies to the stops whose run of the stop function has ended, once no task runs.
         if self._running:
             return
-        stopped = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
+        completed = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > self._ended_run]
-        for pending in stopped:
+        for pending in completed:
             self._send_reply(pending.reply, TaskReply("succeeded"))
 
 

@@ -11,9 +11,9 @@ from app.robots.virtual.room import Room
 from app.robots.virtual.sounds import Notes, Sound
 
 RADIUS, HEIGHT = 0.27, 1.2
-EYE_HEIGHT = 1.12
+EYE_HEIGHT_M = 1.12
 START_POSE = (-0.5, 0.0, 0.0)
-START_PITCH = 8.0
+START_PITCH_DEG = 8.0
 DEFAULT_EYE_COLOUR = "#35b0fa"
 DEFAULT_SHOULDER_COLOUR = "#3ab5ff"
 MAX_DISTANCE_M = 5.0
@@ -33,11 +33,11 @@ class BodyEvent:
     """Event to publish.
 
     Attributes:
-        event: Name of the event in the robot's description.
+        name: Name of the event in the robot's description.
         data: Fields of the event.
     """
 
-    event: str
+    name: str
     data: dict[str, object]
 
 
@@ -84,7 +84,9 @@ class Body:
     y: float = START_POSE[1]
     theta_deg: float = START_POSE[2]
     head_yaw: Joint = field(default_factory=lambda: Joint(120.0, -119.0, 119.0))
-    head_pitch: Joint = field(default_factory=lambda: Joint(90.0, -40.0, 36.0, START_PITCH, START_PITCH))
+    head_pitch: Joint = field(
+        default_factory=lambda: Joint(90.0, -40.0, 36.0, START_PITCH_DEG, START_PITCH_DEG)
+    )
     arms: dict[str, Joint] = field(
         default_factory=lambda: {side: Joint(200.0, 0.0, 180.0) for side in ("left", "right")}
     )
@@ -95,7 +97,7 @@ class Body:
     shoulders: str = DEFAULT_SHOULDER_COLOUR
     emotion: str = "neutral"
     battery: float = 84.4
-    touched: dict[str, float] = field(default_factory=dict)
+    touch_durations_s: dict[str, float] = field(default_factory=dict)
     """Durations of the current touches in seconds, by touched part such as "head"."""
     last_word: str = ""
     since_last_word_s: float = HEARD_DISPLAY_S
@@ -123,7 +125,7 @@ class Body:
             distance: Distance in m; negative to drive backwards.
             speed: Maximum speed in m/s.
         """
-        return self._start(Motion.walk(distance, speed), turning=False)
+        return self._start(Motion.walk(distance, speed), is_turning=False)
 
     def turn(self, angle_deg: float, speed_deg: float) -> Motion:
         """Start turning on the spot; a current movement of the base ends as blocked.
@@ -132,12 +134,12 @@ class Body:
             angle_deg: Angle in degrees, positive to the left.
             speed_deg: Maximum turning speed in °/s.
         """
-        return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
+        return self._start(Motion.turn(angle_deg, speed_deg), is_turning=True)
 
-    def _start(self, motion: Motion, *, turning: bool) -> Motion:
+    def _start(self, motion: Motion, *, is_turning: bool) -> Motion:
         if self._base_motion is not None:
             self._base_motion.block()
-        self._base_motion, self._is_turning = motion, turning
+        self._base_motion, self._is_turning = motion, is_turning
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
@@ -186,7 +188,7 @@ class Body:
         """Lower the arms and turn the head to its start position."""
         for joint in (*self.arms.values(), *self.elbows.values(), self.head_yaw):
             joint.set_target(0.0)
-        self.head_pitch.set_target(START_PITCH)
+        self.head_pitch.set_target(START_PITCH_DEG)
 
     def halt(self) -> None:
         """Stop everything: the base brakes in the next steps, all other movements end immediately.
@@ -216,8 +218,8 @@ class Body:
         self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
         self.theta_deg = START_POSE[2]
         self.eyes, self.shoulders = DEFAULT_EYE_COLOUR, DEFAULT_SHOULDER_COLOUR
-        self.touched = dict.fromkeys(self.touched, MIN_TOUCH_S)
-        for part in sorted(self.touched):
+        self.touch_durations_s = dict.fromkeys(self.touch_durations_s, MIN_TOUCH_S)
+        for part in sorted(self.touch_durations_s):
             self.touch(part, down=False)
         self.stand()
 
@@ -263,19 +265,19 @@ class Body:
         """
         if down:
             self._ending_touches.discard(part)
-            if part not in self.touched:
-                self.touched[part] = 0.0
+            if part not in self.touch_durations_s:
+                self.touch_durations_s[part] = 0.0
                 self.events.append(BodyEvent("touched", {"place": part}))
-        elif part in self.touched:
+        elif part in self.touch_durations_s:
             self._ending_touches.add(part)
             self._end_touches()
 
     def _end_touches(self) -> None:
         # Ends touches that have lasted long enough.
         for part in sorted(self._ending_touches):
-            if self.touched[part] >= MIN_TOUCH_S:
+            if self.touch_durations_s[part] >= MIN_TOUCH_S:
                 self._ending_touches.discard(part)
-                del self.touched[part]
+                del self.touch_durations_s[part]
                 self.events.append(BodyEvent("released", {"place": part}))
 
     def set_lifted(self, *, is_lifted: bool) -> None:
@@ -329,7 +331,9 @@ class Body:
         self._waves = [wave for wave in self._waves if not wave.done]
         for joint in self._joints():
             joint.step(dt)
-        self.touched = {part: for_s + dt for part, for_s in self.touched.items()}
+        self.touch_durations_s = {
+            part: duration_s + dt for part, duration_s in self.touch_durations_s.items()
+        }
         self._end_touches()
         if self._speech is not None:
             self._speech.spoken_s += dt

@@ -10,21 +10,21 @@ import cv2
 import numpy as np
 
 from app.robots.virtual import scenery
-from app.robots.virtual.body import EYE_HEIGHT, Body
+from app.robots.virtual.body import EYE_HEIGHT_M, Body
 from app.robots.virtual.canvas import Canvas, Picture
 from app.robots.virtual.lens import Lens, Matrix
 from app.robots.virtual.room import WALLS, Ball, Box, Marker, OtherRobot, Person, Room
 
-EYE_FORWARD = 0.09
+EYE_FORWARD_M = 0.09
 _BOOK_COLOURS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
 
 
 def lens_of(body: Body) -> Lens:
     """Return the current camera model of the virtual Pepper, whose camera is in its head."""
     yaw = body.theta_deg + body.head_yaw.angle
-    x = body.x + EYE_FORWARD * math.cos(math.radians(yaw))
-    y = body.y + EYE_FORWARD * math.sin(math.radians(yaw))
-    return Lens((x, y, EYE_HEIGHT), yaw, body.head_pitch.angle)
+    x = body.x + EYE_FORWARD_M * math.cos(math.radians(yaw))
+    y = body.y + EYE_FORWARD_M * math.sin(math.radians(yaw))
+    return Lens((x, y, EYE_HEIGHT_M), yaw, body.head_pitch.angle)
 
 
 class Camera:
@@ -115,7 +115,7 @@ class Camera:
             picture, width = self._person, figure.height * scenery.FIGURE_ASPECT_RATIO
         else:
             picture, width = (
-                self._robot(figure.figure == "turtle", faces=_is_facing_camera(figure, canvas.lens)),
+                self._robot(figure.figure == "turtle", is_front=_is_facing_camera(figure, canvas.lens)),
                 figure.radius * 2.6,
             )
         corner = np.array([figure.x, figure.y, figure.height]) - right * width / 2
@@ -123,10 +123,10 @@ class Camera:
 
     def _paint_ball(self, canvas: Canvas, ball: Ball) -> None:
         middle = np.array([ball.x, ball.y, ball.z])
-        sight = middle - np.asarray(canvas.lens.position)
-        sight /= np.linalg.norm(sight)
+        view_direction = middle - np.asarray(canvas.lens.position)
+        view_direction /= np.linalg.norm(view_direction)
         right = right_vector(canvas.lens, ball.x, ball.y)
-        down = np.cross(sight, right)
+        down = np.cross(view_direction, right)
         corner = middle - (right + down) * ball.radius
         canvas.draw_texture(
             self._ball(ball.colour),
@@ -153,9 +153,11 @@ def _is_facing_camera(other: OtherRobot, lens: Lens) -> bool:
 def _is_ahead(drawable: _Drawable, lens: Lens) -> bool:
     half = math.hypot(drawable.width, drawable.depth) / 2 if isinstance(drawable, Box) else 0.5
     forward = lens.rotation[2]
-    flat = math.hypot(float(forward[0]), float(forward[1]))
-    along = (drawable.x - lens.position[0]) * forward[0] + (drawable.y - lens.position[1]) * forward[1]
-    return bool(along > -half * flat - abs(float(forward[2])) * 2.0)
+    horizontal_length = math.hypot(float(forward[0]), float(forward[1]))
+    forward_distance = (drawable.x - lens.position[0]) * forward[0] + (
+        drawable.y - lens.position[1]
+    ) * forward[1]
+    return bool(forward_distance > -half * horizontal_length - abs(float(forward[2])) * 2.0)
 
 
 def _distance(drawable: _Drawable, lens: Lens) -> float:
@@ -188,16 +190,18 @@ def _paint_table(canvas: Canvas, box: Box) -> None:
     _paint_block(canvas, (box.x, box.y, box.height - 0.06), (box.width, box.depth, 0.06), "#8a6244")
     _paint_block(canvas, (box.x, box.y + 0.2, box.height), (0.16, 0.16, 0.18), "#3f8a75")
     for index in range(7):
-        lean = math.radians(index * 360 / 7)
-        _paint_leaf(canvas, (box.x, box.y + 0.2, box.height + 0.18), lean, 0.13, 0.3)
+        direction = math.radians(index * 360 / 7)
+        _paint_leaf(canvas, (box.x, box.y + 0.2, box.height + 0.18), direction, 0.13, 0.3)
 
 
-def _paint_leaf(canvas: Canvas, base: tuple[float, float, float], lean: float, out: float, up: float) -> None:
+def _paint_leaf(
+    canvas: Canvas, base: tuple[float, float, float], direction: float, out: float, up: float
+) -> None:
     start = np.array(base)
-    tip = np.array([base[0] + out * math.cos(lean), base[1] + out * math.sin(lean), base[2] + up])
+    tip = np.array([base[0] + out * math.cos(direction), base[1] + out * math.sin(direction), base[2] + up])
     middle = (start + tip) / 2
     side = right_vector(canvas.lens, base[0], base[1]) * 0.045
-    shade = "#4f9a5f" if math.sin(lean) > 0 else "#5fae6e"
+    shade = "#4f9a5f" if math.sin(direction) > 0 else "#5fae6e"
     canvas.fill(np.array([start, middle + side, tip, middle - side]), scenery.to_bgr(shade))
 
 
@@ -206,28 +210,28 @@ def _paint_shelf(canvas: Canvas, box: Box) -> None:
     front = box.y + box.depth / 2 + 0.004
     if canvas.lens.position[1] <= front:
         return
-    levels = 3
-    for level in range(levels):
-        low = 0.08 + level * (box.height - 0.12) / levels
-        high = low + (box.height - 0.12) / levels - 0.06
+    level_count = 3
+    for level in range(level_count):
+        low = 0.08 + level * (box.height - 0.12) / level_count
+        high = low + (box.height - 0.12) / level_count - 0.06
         left, right = box.x - box.width / 2 + 0.05, box.x + box.width / 2 - 0.05
-        _paint_upright(canvas, front, (left, right), (low, high), "#6f563d")
+        _paint_vertical_rect(canvas, front, (left, right), (low, high), "#6f563d")
         for index in range(11):
-            book = left + 0.02 + index * (right - left - 0.04) / 11
-            tall = high - 0.03 - 0.035 * ((index * 7 + level * 3) % 4)
-            _paint_upright(
+            book_left = left + 0.02 + index * (right - left - 0.04) / 11
+            top = high - 0.03 - 0.035 * ((index * 7 + level * 3) % 4)
+            _paint_vertical_rect(
                 canvas,
                 front + 0.002,
-                (book, book + 0.07),
-                (low, tall),
+                (book_left, book_left + 0.07),
+                (low, top),
                 _BOOK_COLOURS[(index * 5 + level) % len(_BOOK_COLOURS)],
             )
 
 
-def _paint_upright(
-    canvas: Canvas, y: float, x_range: tuple[float, float], up: tuple[float, float], colour: str
+def _paint_vertical_rect(
+    canvas: Canvas, y: float, x_range: tuple[float, float], z_range: tuple[float, float], colour: str
 ) -> None:
-    (left, right), (low, high) = x_range, up
+    (left, right), (low, high) = x_range, z_range
     corners = [(left, y, low), (right, y, low), (right, y, high), (left, y, high)]
     canvas.fill(np.array(corners), scenery.to_bgr(colour))
 

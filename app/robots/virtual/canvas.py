@@ -32,13 +32,13 @@ class Texture:
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
             self.levels.append(picture)
 
-    def level_for(self, shrink: float) -> Picture:
+    def level_for(self, texels_per_pixel: float) -> Picture:
         """Return the mipmap level for a scale.
 
         Args:
-            shrink: Number of texels of the full image per screen pixel.
+            texels_per_pixel: Number of texels of the full image per screen pixel.
         """
-        level = round(np.log2(max(1.0, shrink)))
+        level = round(np.log2(max(1.0, texels_per_pixel)))
         return self.levels[min(int(level), len(self.levels) - 1)]
 
 
@@ -71,7 +71,7 @@ class Canvas:
             cv2.fillConvexPoly(self.picture, _to_fixed_point(outline), colour, cv2.LINE_AA, _SHIFT)
 
     def draw_texture(
-        self, texture: Texture, corner: Sequence[float], top_edge: Sequence[float], along: Sequence[float]
+        self, texture: Texture, corner: Sequence[float], top_edge: Sequence[float], left_edge: Sequence[float]
     ) -> None:
         """Draw a texture on a parallelogram.
 
@@ -79,17 +79,19 @@ class Canvas:
             texture: Texture.
             corner: Upper left corner in room coordinates.
             top_edge: Vector of the upper side in m.
-            along: Vector of the left side in m.
+            left_edge: Vector of the left side in m.
         """
-        start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, top_edge, along))
+        start, right, down = (
+            np.asarray(vector, dtype=np.float64) for vector in (corner, top_edge, left_edge)
+        )
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
         box = self._clipped_bounds(outline)
         if box is None:
             return
         x0, y0, x1, y1 = box
         area = max(1.0, abs(float(cv2.contourArea(outline.astype(np.float32)))))
-        full = texture.levels[0].shape
-        level = texture.level_for(float(np.sqrt(full[0] * full[1] / area)))
+        full_shape = texture.levels[0].shape
+        level = texture.level_for(float(np.sqrt(full_shape[0] * full_shape[1] / area)))
         matrix = self.lens.texture_to_pixels(start, right, down, (level.shape[1], level.shape[0]))
         matrix = np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]], dtype=np.float64) @ matrix
         if abs(np.linalg.det(matrix)) < 1e-9:
@@ -116,9 +118,9 @@ class Canvas:
 
 
 def _blend(target: Picture, overlay: Picture) -> None:
-    through = cv2.merge([255 - overlay[:, :, 3]] * 3)
-    under = cv2.multiply(target, through, scale=1 / 255)
-    cv2.add(under, overlay[:, :, :3], dst=target)
+    transparency = cv2.merge([255 - overlay[:, :, 3]] * 3)
+    background = cv2.multiply(target, transparency, scale=1 / 255)
+    cv2.add(background, overlay[:, :, :3], dst=target)
 
 
 def _to_fixed_point(outline: Matrix) -> NDArray[np.int32]:

@@ -72,20 +72,22 @@ class Lens:
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
 
     def texture_to_pixels(
-        self, corner: Matrix, top_edge: Matrix, along: Matrix, size: tuple[int, int]
+        self, corner: Matrix, top_edge: Matrix, left_edge: Matrix, size: tuple[int, int]
     ) -> Matrix:
         """Return the homography from the pixels of a texture on a parallelogram in the room to image pixels.
 
         Args:
             corner: Upper left corner in room coordinates.
             top_edge: Vector of the upper side in m.
-            along: Vector of the left side in m.
+            left_edge: Vector of the left side in m.
             size: Width and height of the texture in pixels.
         """
-        columns = [top_edge / size[0], along / size[1], corner - np.asarray(self.position)]
+        columns = [top_edge / size[0], left_edge / size[1], corner - np.asarray(self.position)]
         camera_columns = self.rotation @ np.stack(columns, axis=1)
-        half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
-        homography: Matrix = half @ camera_columns
+        intrinsic_matrix = np.array(
+            [[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]]
+        )
+        homography: Matrix = intrinsic_matrix @ camera_columns
         return homography
 
 
@@ -99,6 +101,6 @@ def _clip_to_near_plane(points: Matrix) -> Matrix:
         if start[2] >= NEAR_PLANE_M:
             clipped.append(start)
         if (start[2] >= NEAR_PLANE_M) != (end[2] >= NEAR_PLANE_M):
-            part = (NEAR_PLANE_M - start[2]) / (end[2] - start[2])
-            clipped.append(start + part * (end - start))
+            fraction = (NEAR_PLANE_M - start[2]) / (end[2] - start[2])
+            clipped.append(start + fraction * (end - start))
     return np.array(clipped)

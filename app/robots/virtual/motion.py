@@ -91,8 +91,8 @@ class Motion:
             self._velocity = max(0.0, self._velocity - self.braking * dt)
             self.done = self._velocity == 0.0
         else:
-            fast_enough_to_end = math.sqrt(2 * self.acceleration * abs(self.remaining))
-            self._velocity = min(self.speed, self._velocity + self.acceleration * dt, fast_enough_to_end)
+            stoppable_speed = math.sqrt(2 * self.acceleration * abs(self.remaining))
+            self._velocity = min(self.speed, self._velocity + self.acceleration * dt, stoppable_speed)
         delta = math.copysign(min(self._velocity * dt, abs(self.remaining)), self.remaining)
         # Snap to the target: the speed approaches 0 with the remaining distance.
         if abs(self.remaining - delta) < 0.002 * max(1.0, abs(self.acceleration)):

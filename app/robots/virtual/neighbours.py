@@ -30,7 +30,7 @@ class Neighbours:
         self.began_ns = time.time_ns() if began_ns is None else began_ns
         self._other_robots: dict[str, tuple[OtherRobot, float, int]] = {}
         self._published_state: OtherRobot | None = None
-        self._published_s = -math.inf
+        self._last_publish_s = -math.inf
 
     def receive(self, message: Mapping[str, object]) -> None:
         """Process a position message.
@@ -51,8 +51,10 @@ class Neighbours:
 
     def present_robots(self) -> tuple[OtherRobot, ...]:
         """Return the other robots that are currently in the room."""
-        since = self._clock.now() - PRESENCE_TIMEOUT_S
-        self._other_robots = {name: entry for name, entry in self._other_robots.items() if entry[1] >= since}
+        oldest_s = self._clock.now() - PRESENCE_TIMEOUT_S
+        self._other_robots = {
+            name: entry for name, entry in self._other_robots.items() if entry[1] >= oldest_s
+        }
         return tuple(other for other, _at, _began in self._other_robots.values())
 
     def must_give_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
@@ -81,8 +83,8 @@ class Neighbours:
             publish: Publishes a message.
         """
         now = self._clock.now()
-        if me != self._published_state or now - self._published_s >= IDLE_PUBLISH_INTERVAL_S:
-            self._published_state, self._published_s = me, now
+        if me != self._published_state or now - self._last_publish_s >= IDLE_PUBLISH_INTERVAL_S:
+            self._published_state, self._last_publish_s = me, now
             publish(
                 {
                     "robot": me.name,
@@ -97,7 +99,7 @@ def _parse_position(message: Mapping[str, object]) -> OtherRobot | None:
     numbers = [message.get(key) for key in ("x", "y", "theta_deg", "radius", "height")]
     if not isinstance(name, str) or not 0 < len(name) < 200 or not isinstance(figure, str):
         return None
-    if not all(isinstance(n, (int, float)) and abs(n) < 1000 for n in numbers):  # neither has NaN
+    if not all(isinstance(n, (int, float)) and abs(n) < 1000 for n in numbers):  # also false for NaN
         return None
     x, y, theta, radius, height = (float(n) for n in numbers)  # type: ignore[arg-type]
     is_valid = 0.0 < radius < 1.0 and 0.0 < height < 3.0

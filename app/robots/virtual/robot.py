@@ -9,7 +9,7 @@ from app.robots.driver.call import Call, Canceled, Failed, Link, MonotonicClock
 from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
 from app.robots.driver.declare import EventSpec, detections, event, picture, sensor
 from app.robots.driver.schema import Suggested
-from app.robots.virtual.body import START_PITCH, Body
+from app.robots.virtual.body import START_PITCH_DEG, Body
 from app.robots.virtual.camera import lens_of
 from app.robots.virtual.motion import Motion
 from app.robots.virtual.room import Room
@@ -17,7 +17,11 @@ from app.robots.virtual.simulation import Simulation
 from app.robots.virtual.vision import angles_to
 from nep.i18n import _
 
-_HEAD_ANGLES = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
+_HEAD_ANGLES = {
+    "ahead": (0.0, START_PITCH_DEG),
+    "left": (50.0, START_PITCH_DEG),
+    "right": (-50.0, START_PITCH_DEG),
+}
 _HEAD_ANGLES |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
 FEEDBACK_INTERVAL_S = 0.2
 """Interval in seconds between two feedback messages of an action."""
@@ -128,7 +132,7 @@ class SimulatedRobot(SensorDeclarations):
     def _head_angles_to(self, target: str) -> tuple[float, float]:
         if target in _HEAD_ANGLES:
             return _HEAD_ANGLES[target]
-        visible_objects = self._simulation.seen.get("faces" if target == "face" else "balls", [])
+        visible_objects = self._simulation.latest_detections.get("faces" if target == "face" else "balls", [])
         if not visible_objects:
             raise Failed(
                 _("look at: no face in the picture")

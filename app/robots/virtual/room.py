@@ -195,7 +195,7 @@ class Room:
         }
         return exact_match or next(iter(kinds.get(name, ())), None)
 
-    def is_free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
+    def is_free(self, x: float, y: float, radius: float, previous: tuple[float, float] | None = None) -> bool:
         """Return True if a disc is inside the room and overlaps no obstacle.
 
         Balls don't count because they are pushed away.
@@ -204,7 +204,7 @@ class Room:
             x: Centre of the disc.
             y: Centre of the disc.
             radius: Radius of the disc.
-            before: Previous position. If it overlaps an obstacle, positions farther from the obstacle are
+            previous: Previous position. If it overlaps an obstacle, positions farther from the obstacle are
                 free.
         """
         if not (
@@ -212,16 +212,16 @@ class Room:
             and self.y_min + radius <= y <= self.y_max - radius
         ):
             return False
-        rounds: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
-        for obstacle in rounds:
-            gap = math.hypot(x - obstacle.x, y - obstacle.y)
-            if gap < radius + obstacle.radius and (
-                before is None or gap <= math.hypot(before[0] - obstacle.x, before[1] - obstacle.y)
+        round_obstacles: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
+        for obstacle in round_obstacles:
+            distance = math.hypot(x - obstacle.x, y - obstacle.y)
+            if distance < radius + obstacle.radius and (
+                previous is None or distance <= math.hypot(previous[0] - obstacle.x, previous[1] - obstacle.y)
             ):
                 return False
         return all(
             box.distance_to(x, y) >= radius
-            or (before is not None and box.distance_to(x, y) > box.distance_to(*before))
+            or (previous is not None and box.distance_to(x, y) > box.distance_to(*previous))
             for box in self.boxes
         )
 
@@ -244,10 +244,10 @@ class Room:
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
         """Return the distance from a point to the nearest wall, person, robot or furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
-        rounds: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
+        round_obstacles: tuple[_RoundObject, ...] = (*self.people, *self.other_robots)
         hits = [
             self._distance_to_walls(x, y, dx, dy),
-            *(_distance_to_circle(x, y, dx, dy, each) for each in rounds),
+            *(_distance_to_circle(x, y, dx, dy, each) for each in round_obstacles),
         ]
         hits += [_distance_to_box(x, y, dx, dy, box) for box in self.boxes]
         return min(hits)
@@ -283,16 +283,16 @@ class Room:
         match thing:
             case Ball():
                 position = self.clamped_position(x, y, thing.radius)
-                moved = replace(thing, x=position[0], y=position[1])
-                return replace(self, balls=_with_replaced(self.balls, thing, moved))
+                moved_ball = replace(thing, x=position[0], y=position[1])
+                return replace(self, balls=_with_replaced(self.balls, thing, moved_ball))
             case Person():
                 position = self.clamped_position(x, y, thing.radius)
                 moved_person = replace(thing, x=position[0], y=position[1])
                 return replace(self, people=_with_replaced(self.people, thing, moved_person))
             case Box():
                 position = self.clamped_position(x, y, thing.width / 2, thing.depth / 2)
-                put = replace(thing, x=position[0], y=position[1])
-                return replace(self, boxes=_with_replaced(self.boxes, thing, put))
+                moved_box = replace(thing, x=position[0], y=position[1])
+                return replace(self, boxes=_with_replaced(self.boxes, thing, moved_box))
             case Marker():
                 return replace(
                     self, markers=_with_replaced(self.markers, thing, self._attached_to_wall(thing, x, y))
@@ -304,13 +304,15 @@ class Room:
         room = self
         for ball in self.balls:
             away_x, away_y = ball.x - x, ball.y - y
-            gap = math.hypot(away_x, away_y)
-            min_gap = radius + ball.radius
-            if gap >= min_gap:
+            distance = math.hypot(away_x, away_y)
+            min_distance = radius + ball.radius
+            if distance >= min_distance:
                 continue
-            if gap < 1e-6:
-                away_x, away_y, gap = 1.0, 0.0, 1.0
-            room = room.with_moved(ball.name, x + away_x / gap * min_gap, y + away_y / gap * min_gap)
+            if distance < 1e-6:
+                away_x, away_y, distance = 1.0, 0.0, 1.0
+            room = room.with_moved(
+                ball.name, x + away_x / distance * min_distance, y + away_y / distance * min_distance
+            )
         return room
 
     def _attached_to_wall(self, card: Marker, x: float, y: float) -> Marker:
@@ -342,25 +344,25 @@ class Room:
             current: Current position of the robot.
         """
         target = self.clamped_position(x, y, radius)
-        for to in (target, (target[0], current[1]), (current[0], target[1])):
-            if self.is_free(*to, radius, current):
-                return to
+        for position in (target, (target[0], current[1]), (current[0], target[1])):
+            if self.is_free(*position, radius, current):
+                return position
         return None
 
     def clamped_position(
-        self, x: float, y: float, half: float, half_depth: float | None = None
+        self, x: float, y: float, half_width: float, half_depth: float | None = None
     ) -> tuple[float, float]:
         """Return the nearest position at which an object is completely within the walls.
 
         Args:
             x: Centre of the object.
             y: Centre of the object.
-            half: Half of the size along x.
-            half_depth: Half of the size along y (default: `half`).
+            half_width: Half of the size along x.
+            half_depth: Half of the size along y (default: `half_width`).
         """
-        half_depth = half if half_depth is None else half_depth
+        half_depth = half_width if half_depth is None else half_depth
         return (
-            min(max(x, self.x_min + half), self.x_max - half),
+            min(max(x, self.x_min + half_width), self.x_max - half_width),
             min(max(y, self.y_min + half_depth), self.y_max - half_depth),
         )
 
@@ -377,12 +379,12 @@ def _with_replaced(things: tuple[T, ...], old: T, new: T) -> tuple[T, ...]:
     return tuple(new if thing is old else thing for thing in things)
 
 
-def _distance_to_circle(x: float, y: float, dx: float, dy: float, round_one: _RoundObject) -> float:
-    along = (round_one.x - x) * dx + (round_one.y - y) * dy
-    aside = abs((round_one.x - x) * dy - (round_one.y - y) * dx)
-    if along <= 0 or aside > round_one.radius:
+def _distance_to_circle(x: float, y: float, dx: float, dy: float, obstacle: _RoundObject) -> float:
+    along = (obstacle.x - x) * dx + (obstacle.y - y) * dy
+    aside = abs((obstacle.x - x) * dy - (obstacle.y - y) * dx)
+    if along <= 0 or aside > obstacle.radius:
         return math.inf
-    return max(0.0, along - math.sqrt(round_one.radius**2 - aside**2))
+    return max(0.0, along - math.sqrt(obstacle.radius**2 - aside**2))
 
 
 def _distance_to_box(x: float, y: float, dx: float, dy: float, box: Box) -> float:

@@ -87,18 +87,18 @@ class RoomMap:
 
     def move(self, name: str, x: float, y: float) -> bool:
         """Move an object, limited to the room; return True if its position has changed."""
-        moved = self.room().with_moved(name, x, y)
-        return self.update_positions(moved)
+        moved_room = self.room().with_moved(name, x, y)
+        return self.update_positions(moved_room)
 
     def update_positions(self, room: Room) -> bool:
         """Update the positions of all objects from a room; return True if any position has changed."""
-        changed = False
+        has_changed = False
         for thing in room.things:
             entry = self._entries.get(thing.name)
             if entry is not None and not entry.gone and (entry.x, entry.y) != (thing.x, thing.y):
                 self._set_entry(replace(entry, x=thing.x, y=thing.y))
-                changed = True
-        return changed
+                has_changed = True
+        return has_changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
         """Add an object at a position in m, limited to the room, and return its name.
@@ -106,12 +106,12 @@ class RoomMap:
         Returns None if the kind is unknown or if there are too many objects of this kind.
         """
         existing = {each.name for each in self._entries.values() if not each.gone}
-        free = [name for name in _names(kind) if name not in existing]
-        if not free:
+        free_names = [name for name in _names(kind) if name not in existing]
+        if not free_names:
             return None
-        self._set_entry(MapEntry(free[0], kind, x, y))
-        self.move(free[0], x, y)
-        return free[0]
+        self._set_entry(MapEntry(free_names[0], kind, x, y))
+        self.move(free_names[0], x, y)
+        return free_names[0]
 
     def remove(self, name: str) -> bool:
         """Remove an object; return False if it doesn't exist."""
@@ -122,19 +122,19 @@ class RoomMap:
         return True
 
     def reset(self) -> None:
-        """Restore the room at the start; added objects are removed."""
-        first = {thing.name: thing for thing in self.start.things}
+        """Restore the initial room; added objects are removed."""
+        start_things = {thing.name: thing for thing in self.start.things}
         for entry in list(self._entries.values()):
-            thing = first.get(entry.name)
+            thing = start_things.get(entry.name)
             if thing is None:
                 self._set_entry(replace(entry, gone=True))
             else:
                 self._set_entry(replace(entry, x=thing.x, y=thing.y, gone=False))
 
     def _set_entry(self, entry: MapEntry) -> None:
-        before = self._entries.get(entry.name)
-        newest = before.changed_ns + 1 if before is not None else 1
-        self._entries[entry.name] = replace(entry, changed_ns=max(self._clock_ns(), newest))
+        previous = self._entries.get(entry.name)
+        min_changed_ns = previous.changed_ns + 1 if previous is not None else 1
+        self._entries[entry.name] = replace(entry, changed_ns=max(self._clock_ns(), min_changed_ns))
         self.revision += 1
 
     # -- replication ------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ class RoomMap:
                 of an object, and new objects beyond `MAX_OBJECTS` are ignored.
         """
         raw_entries = message.get("things")
-        changed = False
+        has_changed = False
         for entry in _parse_entries(
             raw_entries if isinstance(raw_entries, Sequence) and not isinstance(raw_entries, str) else ()
         ):
@@ -156,9 +156,9 @@ class RoomMap:
                 continue
             if existing is None or (entry.kind == existing.kind and entry.merge_key > existing.merge_key):
                 self._entries[entry.name] = entry
-                changed = True
-        self.revision += changed
-        return changed
+                has_changed = True
+        self.revision += has_changed
+        return has_changed
 
     def message(self) -> dict[str, object]:
         """Return the whole map as a payload for publishing and saving."""
@@ -169,30 +169,30 @@ class RoomMap:
     def room(self) -> Room:
         """Return the room with all objects at their current positions."""
         balls, people, markers, boxes = [], [], [], []
-        for created in filter(None, map(self._create_thing, self._entries.values())):
-            match created:
+        for thing in filter(None, map(self._create_thing, self._entries.values())):
+            match thing:
                 case Ball():
-                    balls.append(created)
+                    balls.append(thing)
                 case Person():
-                    people.append(created)
+                    people.append(thing)
                 case Marker():
-                    markers.append(created)
+                    markers.append(thing)
                 case Box():
-                    boxes.append(created)
-        empty = replace(
+                    boxes.append(thing)
+        room = replace(
             self.start, balls=tuple(balls), people=tuple(people), markers=tuple(markers), boxes=tuple(boxes)
         )
-        for name in [thing.name for thing in empty.things]:
+        for name in [thing.name for thing in room.things]:
             entry = self._entries[name]
-            empty = empty.with_moved(name, entry.x, entry.y)
-        return empty
+            room = room.with_moved(name, entry.x, entry.y)
+        return room
 
     def _create_thing(self, entry: MapEntry) -> Thing | None:
         if entry.gone:
             return None
-        like = self.start.thing(entry.name)
-        if like is not None and like.name == entry.name:
-            return replace(like, x=entry.x, y=entry.y)
+        original = self.start.thing(entry.name)
+        if original is not None and original.name == entry.name:
+            return replace(original, x=entry.x, y=entry.y)
         return _create_added_thing(entry)
 
 
@@ -214,8 +214,8 @@ def _create_added_thing(entry: MapEntry) -> Thing | None:
 
 
 def _number_in_name(name: str) -> int:
-    last = name.rpartition(" ")[2]
-    return int(last) if last.isdecimal() and len(last) < 4 else 1
+    suffix = name.rpartition(" ")[2]
+    return int(suffix) if suffix.isdecimal() and len(suffix) < 4 else 1
 
 
 def _names(kind: str) -> Sequence[str]:

@@ -14,10 +14,10 @@ from app.robots.virtual.room import Opening, Room, Wall
 PIXELS_PER_M = 110  # pixels of a wall's picture per metre
 Colour = tuple[int, int, int]
 
-_SUPERSAMPLING = 2  # supersampling factor
+_SUPERSAMPLING = 2
 FIGURE_SIZE_PX = (340, 720)  # width, height of the person's image; the head touches its upper edge
-FACE_ROWS = (0.0, 0.21)  # face from hair to chin, as parts of the figure's height
-FIGURE_ASPECT_RATIO = FIGURE_SIZE_PX[0] / FIGURE_SIZE_PX[1]  # of its height
+FACE_ROWS = (0.0, 0.21)  # face from hair to chin, as fractions of the figure's height
+FIGURE_ASPECT_RATIO = FIGURE_SIZE_PX[0] / FIGURE_SIZE_PX[1]  # width / height
 
 
 def to_bgr(colour: str) -> Colour:
@@ -27,8 +27,8 @@ def to_bgr(colour: str) -> Colour:
 
 def gradient(height: int, width: int, top: str, bottom: str) -> Picture:
     """Return an image with a vertical gradient between two colours ("#rrggbb")."""
-    part = np.linspace(0.0, 1.0, height)[:, None, None]
-    rows = np.array(to_bgr(top)) * (1 - part) + np.array(to_bgr(bottom)) * part
+    fraction = np.linspace(0.0, 1.0, height)[:, None, None]
+    rows = np.array(to_bgr(top)) * (1 - fraction) + np.array(to_bgr(bottom)) * fraction
     return np.repeat(rows, width, axis=1).astype(np.uint8)
 
 
@@ -140,17 +140,17 @@ def floor(room: Room) -> Texture:
         round((room.x_max - room.x_min) * PIXELS_PER_M),
         round((room.y_max - room.y_min) * PIXELS_PER_M),
     )
-    shades = np.random.default_rng(5)  # the same boards at every start
+    generator = np.random.default_rng(5)  # the same boards at every start
     picture = np.zeros((depth, width, 3), dtype=np.uint8)
-    board = round(0.16 * PIXELS_PER_M)
-    for row in range(0, depth, board):
-        start = -int(shades.integers(0, 200))
+    board_width = round(0.16 * PIXELS_PER_M)
+    for row in range(0, depth, board_width):
+        start = -int(generator.integers(0, 200))
         while start < width:
-            length = int(shades.integers(170, 300))
-            shade = float(shades.uniform(0.95, 1.04))
+            length = int(generator.integers(170, 300))
+            shade = float(generator.uniform(0.95, 1.04))
             colour = tuple(min(255.0, part * shade) for part in to_bgr("#a68763"))
-            cv2.rectangle(picture, (start, row), (start + length, row + board - 1), colour, cv2.FILLED)
-            cv2.line(picture, (start, row), (start, row + board - 1), to_bgr("#957757"), 1)
+            cv2.rectangle(picture, (start, row), (start + length, row + board_width - 1), colour, cv2.FILLED)
+            cv2.line(picture, (start, row), (start, row + board_width - 1), to_bgr("#957757"), 1)
             start += length
         cv2.line(picture, (0, row), (width, row), to_bgr("#8f7152"), 2)
     x = np.minimum(np.arange(width), np.arange(width)[::-1])[None, :] / PIXELS_PER_M
@@ -184,8 +184,8 @@ def marker(number: int) -> Texture:
         cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), number, 6 * 24
     )
     square = np.maximum(square, 26)  # printed black is not quite black
-    rimmed = cv2.copyMakeBorder(square, 24, 24, 24, 24, cv2.BORDER_CONSTANT, value=(250,))
-    return Texture(np.asarray(cv2.cvtColor(rimmed, cv2.COLOR_GRAY2BGR), dtype=np.uint8))
+    bordered = cv2.copyMakeBorder(square, 24, 24, 24, 24, cv2.BORDER_CONSTANT, value=(250,))
+    return Texture(np.asarray(cv2.cvtColor(bordered, cv2.COLOR_GRAY2BGR), dtype=np.uint8))
 
 
 MARKER_CARD_SCALE = 8 / 6  # the card is this much wider than its printed square
@@ -207,25 +207,25 @@ class _Painter:
         middle: tuple[float, float],
         size: tuple[float, float],
         colour: str,
-        part: tuple[int, int] = (0, 360),
+        arc_deg: tuple[int, int] = (0, 360),
     ) -> None:
         radii = (round(size[0] * self.width), round(size[1] * self.height))
         for target, value in ((self.colour, to_bgr(colour)), (self.alpha, (255,))):
-            cv2.ellipse(target, self._point(*middle), radii, 0, *part, value, cv2.FILLED, cv2.LINE_AA)
+            cv2.ellipse(target, self._point(*middle), radii, 0, *arc_deg, value, cv2.FILLED, cv2.LINE_AA)
 
     def paint_arc(
-        self, middle: tuple[float, float], radii: tuple[float, float], colour: str, part: tuple[int, int]
+        self, middle: tuple[float, float], radii: tuple[float, float], colour: str, arc_deg: tuple[int, int]
     ) -> None:
-        thick = round(0.014 * self.width)
+        thickness = round(0.014 * self.width)
         radius_x, radius_y = round(radii[0] * self.width), round(radii[1] * self.height)
         cv2.ellipse(
             self.colour,
             self._point(*middle),
             (radius_x, radius_y),
             0,
-            *part,
+            *arc_deg,
             to_bgr(colour),
-            thick,
+            thickness,
             cv2.LINE_AA,
         )
 
@@ -235,99 +235,99 @@ class _Painter:
             cv2.fillPoly(target, [corners], value, cv2.LINE_AA)
 
     def render(self) -> Picture:
-        both = np.dstack([self.colour, self.alpha])
+        bgra = np.dstack([self.colour, self.alpha])
         size = (self.width // _SUPERSAMPLING, self.height // _SUPERSAMPLING)
-        return np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        return np.asarray(cv2.resize(bgra, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def person() -> Texture:
     """Return the texture of a person from head to feet."""
-    paint = _Painter(*FIGURE_SIZE_PX)
+    painter = _Painter(*FIGURE_SIZE_PX)
     for x in (0.40, 0.60):  # legs and shoes
-        paint.paint_polygon(
+        painter.paint_polygon(
             [(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658"
         )
-        paint.paint_oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
+        painter.paint_oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
     for side in (-1, 1):  # arms and hands behind the body
         shoulder, hand = 0.5 + side * 0.27, 0.5 + side * 0.36
-        paint.paint_polygon(
+        painter.paint_polygon(
             [(shoulder - 0.07, 0.322), (shoulder + 0.05, 0.322), (hand + 0.06, 0.55), (hand - 0.06, 0.55)],
             "#3972a8",
         )
-        paint.paint_oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
-        paint.paint_oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
-    paint.paint_oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
-    paint.paint_polygon([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
-    paint.paint_polygon([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
-    paint.paint_oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
-    _paint_head(paint)
-    return Texture(paint.render())
+        painter.paint_oval((shoulder + 0.008 * side, 0.322), (0.06, 0.03), "#3972a8")
+        painter.paint_oval((hand, 0.565), (0.055, 0.03), "#e0ab85")
+    painter.paint_oval((0.5, 0.33), (0.325, 0.09), "#3f7db8")
+    painter.paint_polygon([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
+    painter.paint_polygon([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
+    painter.paint_oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
+    _paint_head(painter)
+    return Texture(painter.render())
 
 
-def _paint_head(paint: _Painter) -> None:
+def _paint_head(painter: _Painter) -> None:
     for x in (0.315, 0.685):
-        paint.paint_oval((x, 0.125), (0.035, 0.022), "#dca27b")
-    paint.paint_oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
-    paint.paint_oval((0.5, 0.118), (0.185, 0.092), "#e9b690")
-    paint.paint_oval((0.5, 0.075), (0.2, 0.07), "#4b2f24", (180, 360))
-    paint.paint_polygon([(0.302, 0.074), (0.31, 0.118), (0.335, 0.085), (0.42, 0.07)], "#4b2f24")
-    paint.paint_polygon([(0.698, 0.074), (0.69, 0.118), (0.665, 0.085), (0.58, 0.07)], "#4b2f24")
+        painter.paint_oval((x, 0.125), (0.035, 0.022), "#dca27b")
+    painter.paint_oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
+    painter.paint_oval((0.5, 0.118), (0.185, 0.092), "#e9b690")
+    painter.paint_oval((0.5, 0.075), (0.2, 0.07), "#4b2f24", (180, 360))
+    painter.paint_polygon([(0.302, 0.074), (0.31, 0.118), (0.335, 0.085), (0.42, 0.07)], "#4b2f24")
+    painter.paint_polygon([(0.698, 0.074), (0.69, 0.118), (0.665, 0.085), (0.58, 0.07)], "#4b2f24")
     for x in (0.425, 0.575):
-        paint.paint_oval((x, 0.116), (0.03, 0.0095), "#fdfbf8")
-        paint.paint_oval((x, 0.1165), (0.019, 0.0095), "#33241d")
-        paint.paint_oval((x + 0.006, 0.1135), (0.006, 0.003), "#ffffff")
-        paint.paint_arc((x, 0.106), (0.042, 0.012), "#4b2f24", (205, 335))
-    paint.paint_arc((0.5, 0.139), (0.022, 0.009), "#c98c67", (20, 160))
+        painter.paint_oval((x, 0.116), (0.03, 0.0095), "#fdfbf8")
+        painter.paint_oval((x, 0.1165), (0.019, 0.0095), "#33241d")
+        painter.paint_oval((x + 0.006, 0.1135), (0.006, 0.003), "#ffffff")
+        painter.paint_arc((x, 0.106), (0.042, 0.012), "#4b2f24", (205, 335))
+    painter.paint_arc((0.5, 0.139), (0.022, 0.009), "#c98c67", (20, 160))
     for x in (0.37, 0.63):
-        paint.paint_oval((x, 0.15), (0.036, 0.013), "#e6a688")
-    paint.paint_arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
+        painter.paint_oval((x, 0.15), (0.036, 0.013), "#e6a688")
+    painter.paint_arc((0.5, 0.154), (0.085, 0.024), "#a8493f", (18, 162))
 
 
-def robot(small: bool, *, faces: bool) -> Texture:
+def robot(is_small: bool, *, is_front: bool) -> Texture:
     """Return the texture of another robot.
 
     Args:
-        small: True for the small green robot, False for the large white one.
-        faces: True for the view from the front, False from behind.
+        is_small: True for the small green robot, False for the large white one.
+        is_front: True for the view from the front, False from behind.
     """
-    paint = _Painter(*(FIGURE_SIZE_PX if not small else (400, 300)))
-    (_paint_small_robot if small else _paint_large_robot)(paint, faces=faces)
-    return Texture(paint.render())
+    painter = _Painter(*(FIGURE_SIZE_PX if not is_small else (400, 300)))
+    (_paint_small_robot if is_small else _paint_large_robot)(painter, is_front=is_front)
+    return Texture(painter.render())
 
 
-def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
-    paint.paint_polygon([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
-    paint.paint_oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
+def _paint_large_robot(painter: _Painter, *, is_front: bool) -> None:
+    painter.paint_polygon([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
+    painter.paint_oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
     for side in (-1, 1):
         shoulder, hand = 0.5 + side * 0.33, 0.5 + side * 0.4
-        paint.paint_polygon(
+        painter.paint_polygon(
             [(shoulder - 0.06, 0.33), (shoulder + 0.06, 0.33), (hand + 0.05, 0.6), (hand - 0.05, 0.6)],
             "#dfe4ee",
         )
-        paint.paint_oval((hand, 0.61), (0.065, 0.032), "#f3f5fa")
-    paint.paint_oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
-    paint.paint_oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
-    if not faces:
-        paint.paint_polygon([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
+        painter.paint_oval((hand, 0.61), (0.065, 0.032), "#f3f5fa")
+    painter.paint_oval((0.5, 0.43), (0.31, 0.15), "#f7f8fb")
+    painter.paint_oval((0.5, 0.155), (0.36, 0.155), "#f4f6fa")
+    if not is_front:
+        painter.paint_polygon([(0.36, 0.36), (0.64, 0.36), (0.64, 0.5), (0.36, 0.5)], "#d9dee8")
         return
-    paint.paint_polygon([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
+    painter.paint_polygon([(0.33, 0.36), (0.67, 0.36), (0.67, 0.48), (0.33, 0.48)], "#20232e")
     for x in (0.37, 0.63):
-        paint.paint_oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
-        paint.paint_oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
-        paint.paint_oval((x, 0.16), (0.035, 0.016), "#1b1e2a")
-    paint.paint_arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
+        painter.paint_oval((x, 0.16), (0.1, 0.045), "#1b1e2a")
+        painter.paint_oval((x, 0.16), (0.07, 0.032), "#8fc3e6")
+        painter.paint_oval((x, 0.16), (0.035, 0.016), "#1b1e2a")
+    painter.paint_arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
 
 
-def _paint_small_robot(paint: _Painter, *, faces: bool) -> None:
+def _paint_small_robot(painter: _Painter, *, is_front: bool) -> None:
     for x in (0.1, 0.9):
-        paint.paint_oval((x, 0.78), (0.07, 0.2), "#2b2d33")
-    paint.paint_polygon([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
-    paint.paint_oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
-    paint.paint_oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
-    paint.paint_polygon([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
-    paint.paint_polygon([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
-    if faces:
-        paint.paint_oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
+        painter.paint_oval((x, 0.78), (0.07, 0.2), "#2b2d33")
+    painter.paint_polygon([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")
+    painter.paint_oval((0.5, 0.88), (0.4, 0.1), "#5a7f76")
+    painter.paint_oval((0.5, 0.5), (0.4, 0.13), "#7d9f95")
+    painter.paint_polygon([(0.46, 0.2), (0.54, 0.2), (0.54, 0.5), (0.46, 0.5)], "#c8ccd8")
+    painter.paint_polygon([(0.34, 0.06), (0.66, 0.06), (0.66, 0.28), (0.34, 0.28)], "#e9edf4")
+    if is_front:
+        painter.paint_oval((0.5, 0.17), (0.08, 0.09), "#1b1e2a")
 
 
 def ball(colour: str) -> Texture:
@@ -342,7 +342,7 @@ def ball(colour: str) -> Texture:
     light = np.clip(1.18 - 0.4 * np.hypot(x + 0.35, y + 0.42), 0.5, 1.15)
     shine = np.exp(-((x + 0.36) ** 2 + (y + 0.44) ** 2) / 0.035) * 130
     picture = np.zeros((side, side, 4), dtype=np.uint8)
-    shaded = np.array(to_bgr(colour))[None, None, :] * light[:, :, None] + shine[:, :, None]
-    picture[:, :, :3] = np.clip(shaded, 0, 255).astype(np.uint8)
+    shaded_colour = np.array(to_bgr(colour))[None, None, :] * light[:, :, None] + shine[:, :, None]
+    picture[:, :, :3] = np.clip(shaded_colour, 0, 255).astype(np.uint8)
     picture[:, :, 3] = np.clip((1.0 - radius) * side / 2, 0, 1) * 255
     return Texture(picture)

@@ -13,7 +13,7 @@ from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap
 
 ARRIVAL_PERIOD_S = 3.0
-"""Time in seconds after the start in which a robot moves away from a position that another robot occupies."""
+"""Time in seconds after the start during which a robot moves away from an occupied position."""
 
 
 class RoomBody(Protocol):
@@ -43,18 +43,28 @@ class SharedRoom:
         clock: Monotonic clock.
         body: Body of this robot.
         lock: Lock that guards the body.
-        like: Size and appearance of this robot, as seen by other robots.
+        appearance: Size and appearance of this robot, as seen by other robots.
     """
 
     def __init__(
-        self, link: Link, clock: Clock, body: RoomBody, lock: AbstractContextManager[object], like: OtherRobot
+        self,
+        link: Link,
+        clock: Clock,
+        body: RoomBody,
+        lock: AbstractContextManager[object],
+        appearance: OtherRobot,
     ) -> None:
-        self._body, self._lock, self._like, self._clock = body, lock, replace(like, name=link.name), clock
+        self._body, self._lock, self._appearance, self._clock = (
+            body,
+            lock,
+            replace(appearance, name=link.name),
+            clock,
+        )
         self._map = RoomMap(body.room)
         self._neighbours = Neighbours(link.name, clock)
         self._revision = self._map.revision
         self._has_unpublished_changes = body.room != Room()
-        self._arrives_until_s = clock.now() + ARRIVAL_PERIOD_S
+        self._arrival_end_s = clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
         self._returning_names: frozenset[str] = frozenset()
         self._publish_room = link.open_shared_topic(TOPIC, self._receive_room, latched=True)
@@ -75,14 +85,14 @@ class SharedRoom:
 
         A robot that was just started moves away from a position that another robot occupies.
         """
-        body, others = self._body, self._neighbours.present_robots()
+        body, other_robots = self._body, self._neighbours.present_robots()
         if self._map.revision != self._revision:
             self._revision = self._map.revision
-            body.room = replace(self._map.room(), other_robots=others)
-        elif others != body.room.other_robots:
-            body.room = replace(body.room, other_robots=others)
-        if self._clock.now() < self._arrives_until_s and body.is_still:
-            radius = self._like.radius
+            body.room = replace(self._map.room(), other_robots=other_robots)
+        elif other_robots != body.room.other_robots:
+            body.room = replace(body.room, other_robots=other_robots)
+        if self._clock.now() < self._arrival_end_s and body.is_still:
+            radius = self._appearance.radius
             if self._neighbours.must_give_way(body.x, body.y, radius, self._returning_names):
                 body.set_position(*body.room.nearest_free(body.x, body.y, radius))
                 self._start = body.x, body.y
@@ -100,22 +110,23 @@ class SharedRoom:
         self._has_unpublished_changes = self._map.move(name, x, y) or self._has_unpublished_changes
         self.update_body()
 
-    def return_to_start(self, together: object) -> None:
+    def return_to_start(self, returning_names: object) -> None:
         """Move the body to its start position; the objects in the room are not moved.
 
         If another robot is there, the nearest free position is used. Call this with the lock held.
 
         Args:
-            together: Names of the robots that return at the same time, whose current positions become free.
+            returning_names: Names of the robots that return at the same time, whose current positions become
+                free.
         """
         self.update_body()
-        names = together if isinstance(together, list) else []
+        names = returning_names if isinstance(returning_names, list) else []
         body, leaving = self._body, frozenset(name for name in names if isinstance(name, str))
         self._returning_names = leaving  # their reported positions may still be the old ones
         body.reset(body.room)
         staying = tuple(other for other in body.room.other_robots if other.name not in leaving)
         room = replace(body.room, other_robots=staying)
-        body.set_position(*room.nearest_free(*self._start, self._like.radius))
+        body.set_position(*room.nearest_free(*self._start, self._appearance.radius))
 
     def reset(self) -> Room:
         """Reset the room to its initial state and return it. Call this with the lock held."""
@@ -134,7 +145,7 @@ class SharedRoom:
         with self._lock:
             body = self._body
             me = replace(
-                self._like,
+                self._appearance,
                 x=round(body.x, 3),
                 y=round(body.y, 3),
                 theta_deg=round(body.theta_deg, 1),

@@ -23,7 +23,7 @@ from nep.text import bounded_str, quotable
 
 BODY_HZ = 30.0
 CAMERA_HZ = 15.0
-_DETECTION_PERIOD_IMAGES = 3  # images; people and balls don't change faster
+_DETECTION_PERIOD_IMAGES = 3  # images; people and balls move slowly
 _SLOW_PERIOD_STEPS = 3  # steps between two values of pose and distance
 _SLOW_SENSOR_PERIOD_STEPS = 30  # steps between two values of slowly changing sensors
 _MAX_STEP_S = 0.25  # after a suspend the simulation continues from where it was
@@ -52,7 +52,7 @@ class Simulation:
     Attributes:
         body: Body, guarded by `changed`.
         changed: Condition that is notified after each step.
-        seen: Newest detections by name of the sensor.
+        latest_detections: Newest detections by name of the sensor.
 
     Args:
         body: Body in its room.
@@ -63,14 +63,14 @@ class Simulation:
     def __init__(self, body: Body, link: Link, clock: Clock) -> None:
         self.body = body
         self.changed = threading.Condition()  # guards the body; notified after each step
-        self.seen: Mapping[str, list[Detection]] = {}
+        self.latest_detections: Mapping[str, list[Detection]] = {}
         self._link, self._clock = link, clock
-        self._camera, self._eyes = Camera(body.room), ObjectDetector()
-        like = OtherRobot(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
-        self._shared = SharedRoom(link, clock, body, self.changed, like)
+        self._camera, self._detector = Camera(body.room), ObjectDetector()
+        appearance = OtherRobot(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
+        self._shared = SharedRoom(link, clock, body, self.changed, appearance)
         self._view: _View | None = None
         self._ended = threading.Event()
-        self._stepped_s = clock.now()
+        self._last_step_s = clock.now()
         self._face: str | None = None
         self._face_seen_s = 0.0
         self._threads = [
@@ -80,7 +80,7 @@ class Simulation:
 
     def start(self) -> None:
         """Start both threads."""
-        cv2.setNumThreads(1)  # more threads don't pay for small images
+        cv2.setNumThreads(1)  # more threads don't pay off for small images
         for thread in self._threads:
             thread.start()
 
@@ -90,18 +90,18 @@ class Simulation:
         for thread in self._threads:
             thread.join(_JOIN_TIMEOUT_S)
 
-    def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until a condition on the body is true; return False on timeout.
 
         Args:
-            true: Condition, called with the lock held.
+            condition: Condition, called with the lock held.
             timeout_s: Timeout in seconds.
         """
-        limit = self._clock.now() + timeout_s
+        deadline = self._clock.now() + timeout_s
         with self.changed:
-            while self._clock.now() < limit:
+            while self._clock.now() < deadline:
                 self._advance_locked()
-                if true():
+                if condition():
                     return True
                 self.changed.wait(_SMALL_STEP_S)
         return False
@@ -110,36 +110,36 @@ class Simulation:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.update_body()
-        self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
+        self.body.step(min(max(0.0, now - self._last_step_s), _MAX_STEP_S))
         self._shared.update_map()
-        self._stepped_s = now
+        self._last_step_s = now
 
     # ---- body thread --------------------------------------------------------------------------------
 
     def _run_body(self) -> None:
         with self.changed:
-            self._stepped_s = self._clock.now()
+            self._last_step_s = self._clock.now()
         for step, _ in enumerate(self._ticker(BODY_HZ)):
             with self.changed:
                 self._advance_locked()
-                happenings = list(self.body.events)
+                events = list(self.body.events)
                 self.body.events.clear()
                 self.changed.notify_all()
-            self.publish_step(happenings, step)
+            self.publish_step(events, step)
             self._shared.publish_changes()
 
-    def publish_step(self, happenings: list[BodyEvent], step: int) -> None:
+    def publish_step(self, events: list[BodyEvent], step: int) -> None:
         """Publish events, the state, and the values of the sensors that are due at a step.
 
         Args:
-            happenings: Events since the last step.
+            events: Events since the last step.
             step: Number of the step.
         """
-        for happening in happenings:
-            self._link.happen(happening.event, **happening.data)
-            if happening.event in {"touched", "released"}:
-                self._link.sense("head_touched", "head" in self.body.touched)
-            elif happening.event == "heard":
+        for event in events:
+            self._link.happen(event.name, **event.data)
+            if event.name in {"touched", "released"}:
+                self._link.sense("head_touched", "head" in self.body.touch_durations_s)
+            elif event.name == "heard":
                 self._link.sense("heard_word", self.body.last_word)
         with self.changed:
             state, distance = drawing_state(self.body), self.body.distance
@@ -150,7 +150,7 @@ class Simulation:
             self._link.sense("distance", round(distance, 2))
         if step % _SLOW_SENSOR_PERIOD_STEPS == 0:
             self._link.sense("battery", int(self.body.battery))
-            self._link.sense("head_touched", "head" in self.body.touched)
+            self._link.sense("head_touched", "head" in self.body.touch_durations_s)
             self._link.sense("heard_word", self.body.last_word)
 
     # ---- camera thread --------------------------------------------------------------------------------
@@ -158,9 +158,9 @@ class Simulation:
     def _run_camera(self) -> None:
         for count, _ in enumerate(self._ticker(CAMERA_HZ)):
             is_watched = self._link.subscriber_count("camera") > 0
-            is_turn = count % _DETECTION_PERIOD_IMAGES == 0
+            is_detection_due = count % _DETECTION_PERIOD_IMAGES == 0
             # subscribers get boxes that belong to the same image
-            if is_watched or is_turn:
+            if is_watched or is_detection_due:
                 self.capture(publish=is_watched)
 
     def capture(self, *, publish: bool) -> None:
@@ -179,7 +179,7 @@ class Simulation:
         if publish:
             self._link.sense("camera", picture)
         with self.changed:
-            self.seen = detections_by_sensor
+            self.latest_detections = detections_by_sensor
         for sensor, detections in detections_by_sensor.items():
             self._link.sense(sensor, message(detections, lens))
         self._link.sense("sees_face", bool(detections_by_sensor["faces"]))
@@ -190,9 +190,9 @@ class Simulation:
         picture = self._camera.picture(room, lens)
         picture.flags.writeable = False  # reused until something moves
         detections = {
-            "faces": self._eyes.faces(room, lens),
-            "balls": self._eyes.balls(picture),
-            "markers": self._eyes.markers(picture),
+            "faces": self._detector.faces(room, lens),
+            "balls": self._detector.balls(picture),
+            "markers": self._detector.markers(picture),
         }
         return _View(room, lens, picture, detections)
 
@@ -220,18 +220,18 @@ class Simulation:
             change: Payload of a message on ``/<name>/world``: touch, move, say, hold, reset, start, or a
                 simulated event.
         """
-        part, moved, word = change.get("touch"), change.get("move"), change.get("say")
+        part, moved_name, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite_float(change.get("x")), finite_float(change.get("y"))
         with self.changed:
             if part in TOUCHABLE_PARTS:
                 self.body.touch(str(part), down=change.get("down") is not False)
             if isinstance(change.get("hold"), bool):
                 self.body.set_lifted(is_lifted=change["hold"] is True)
-            if isinstance(moved, str) and x is not None and y is not None:
-                if moved == ROBOT_ITSELF:
+            if isinstance(moved_name, str) and x is not None and y is not None:
+                if moved_name == ROBOT_ITSELF:
                     self.body.carry(x, y)
                 else:
-                    self._shared.move(moved, x, y)
+                    self._shared.move(moved_name, x, y)
             if isinstance(word, str) and word.strip():
                 self.body.hear(word.strip())
             if change.get("reset") is True:
@@ -274,16 +274,16 @@ class Ticker:
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
-        self._next = clock.now()
+        self._next_tick_s = clock.now()
 
     def __iter__(self) -> Ticker:
         return self
 
     def __next__(self) -> float:
-        if self._clock.wait(self._ended, max(0.0, self._next - self._clock.now())):
+        if self._clock.wait(self._ended, max(0.0, self._next_tick_s - self._clock.now())):
             raise StopIteration
         now = self._clock.now()
-        self._next = max(self._next + self._period_s, now)
+        self._next_tick_s = max(self._next_tick_s + self._period_s, now)
         return now
 
 
@@ -300,7 +300,9 @@ def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
     """Return True if a simulated event matches the description; otherwise log the problems."""
     problems = link.event_problems(event, data)
     if problems:
-        _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(problems))
+        _log.warning(
+            "%s: the event '%s' can't be simulated: %s", link.name, quotable(event), "; ".join(problems)
+        )
     return not problems
 
 
@@ -327,7 +329,7 @@ def drawing_state(body: Body) -> dict[str, object]:
         **{f"arm_{side}_deg": round(joint.angle, 1) for side, joint in body.arms.items()},
         **{f"elbow_{side}_deg": round(joint.angle, 1) for side, joint in body.elbows.items()},
         "moving": not body.is_still,
-        "touched": sorted(body.touched),
+        "touched": sorted(body.touch_durations_s),
         "held": body.is_lifted,
         **room_state(body.room),
     }

@@ -20,9 +20,9 @@ from app.robots.virtual.room import Person, Room
 
 _MIN_BALL_AREA_PX = 24  # pixels of area
 _MIN_FACE_WIDTH_PX = 8  # pixels across
-_MIN_VISIBLE_FACE = 0.6
+_MIN_VISIBLE_FACE_FRACTION = 0.6
 
-MIN_AREA = 0.004
+MIN_AREA_FRACTION = 0.004
 _HUE_RANGES: dict[str, tuple[tuple[int, int], ...]] = {
     "red": ((0, 8), (172, 180)),
     "green": ((45, 85),),
@@ -99,7 +99,7 @@ class ObjectDetector:
     def markers(self, picture: Picture) -> list[Detection]:
         """Detect ArUco cards (dictionary 4x4, 50) in an image."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
-        # OpenCV returns None for no markers, unlike its annotations say.
+        # OpenCV returns None for no markers, contrary to its annotations.
         numbers = [int(marker_id) for marker_id in np.asarray(ids).ravel()] if len(corners) else []
         return [
             Detection(f"marker {number}", 1.0, _box_of(outline[0]))
@@ -130,11 +130,11 @@ def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
     inside_high = np.minimum(high, (lens.width, lens.height))
     if (inside_high <= inside_low).any() or high[0] - low[0] < _MIN_FACE_WIDTH_PX:
         return None
-    part = float(np.prod(inside_high - inside_low) / np.prod(high - low))
-    if part < _MIN_VISIBLE_FACE:
+    visible_fraction = float(np.prod(inside_high - inside_low) / np.prod(high - low))
+    if visible_fraction < _MIN_VISIBLE_FACE_FRACTION:
         return None
-    sure = part * min(1.0, 0.7 + 0.009 * float(high[0] - low[0]))
-    return Detection(person.name, min(0.99, sure), _box_of(np.stack([inside_low, inside_high])))
+    confidence = visible_fraction * min(1.0, 0.7 + 0.009 * float(high[0] - low[0]))
+    return Detection(person.name, min(0.99, confidence), _box_of(np.stack([inside_low, inside_high])))
 
 
 def _box_of(points: ArrayLike) -> tuple[int, int, int, int]:
@@ -178,12 +178,12 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
             cv2.bitwise_or(
                 mask, cv2.inRange(hsv, lower_bound, np.array([high, 255, 255], np.uint8)), dst=mask
             )
-        count, _, parts, middles = cv2.connectedComponentsWithStats(mask)
+        count, _, stats, centroids = cv2.connectedComponentsWithStats(mask)
         if count < 2:
             continue
-        largest = 1 + int(np.argmax(parts[1:, cv2.CC_STAT_AREA]))
-        area = float(parts[largest, cv2.CC_STAT_AREA]) / (width * height)
-        if area >= MIN_AREA:
-            x = float(middles[largest][0]) / width * 2 - 1
+        largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+        area = float(stats[largest, cv2.CC_STAT_AREA]) / (width * height)
+        if area >= MIN_AREA_FRACTION:
+            x = float(centroids[largest][0]) / width * 2 - 1
             patches[name] = ColourPatch(name, round(x, 3), round(area, 4))
     return patches

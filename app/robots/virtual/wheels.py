@@ -36,12 +36,12 @@ class WheelBody:
     battery: float = 91.3
     pressed_bumper: str = ""
     events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
-    _target: tuple[float, float] = (0.0, 0.0)
+    _target_speeds: tuple[float, float] = (0.0, 0.0)
     is_lifted: bool = False
     """True while the user has lifted the robot, so that it doesn't move."""
     driven_m: float = 0.0
     """Total distance rolled in m, forwards and backwards."""
-    _pressed_s: float = 0.0
+    _press_remaining_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
         """Set the target speeds.
@@ -50,12 +50,12 @@ class WheelBody:
             speed: Speed in m/s, positive forwards.
             turn_speed: Turning speed in °/s, positive to the left. If both speeds are 0, the robot brakes.
         """
-        self._target = (speed, turn_speed)
+        self._target_speeds = (speed, turn_speed)
 
     @property
     def is_still(self) -> bool:
         """True if the robot doesn't move and the target speeds are 0."""
-        return self._target == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
+        return self._target_speeds == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
     @property
     def distance(self) -> float:
@@ -69,13 +69,13 @@ class WheelBody:
         Args:
             side: "left", "right", "front" or "back".
         """
-        self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
-        self.pressed_bumper, self._pressed_s = side, PRESS_DURATION_S
+        self.speed, self.turn_speed, self._target_speeds = 0.0, 0.0, (0.0, 0.0)
+        self.pressed_bumper, self._press_remaining_s = side, PRESS_DURATION_S
         self.events.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
         """Stop, enter a room, and return to the start position or the nearest free one."""
-        self.room, self._target, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
+        self.room, self._target_speeds, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
         self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
         self.theta_deg, self.light, self.pressed_bumper, self.is_lifted = (
             START_POSE[2],
@@ -115,12 +115,12 @@ class WheelBody:
             self._step(dt)
 
     def _step(self, dt: float) -> None:
-        speed, turn_speed = (0.0, 0.0) if self.is_lifted else self._target
+        speed, turn_speed = (0.0, 0.0) if self.is_lifted else self._target_speeds
         self.speed = _approach(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
         self.turn_speed = _approach(self.turn_speed, turn_speed, TURN_ACCELERATION * dt, TURN_BRAKING * dt)
-        if self._pressed_s > 0.0:
-            self._pressed_s -= dt
-            self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""
+        if self._press_remaining_s > 0.0:
+            self._press_remaining_s -= dt
+            self.pressed_bumper = self.pressed_bumper if self._press_remaining_s > 0.0 else ""
         self.theta_deg = (self.theta_deg + self.turn_speed * dt + 180.0) % 360.0 - 180.0
         if self.speed:
             self._advance(self.speed * dt)
@@ -133,10 +133,10 @@ class WheelBody:
         if self.room.is_free(x, y, RADIUS, (self.x, self.y)):
             self.x, self.y = x, y
             self.driven_m += abs(distance_m)
-            self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""
+            self.pressed_bumper = self.pressed_bumper if self._press_remaining_s > 0.0 else ""
             self.room = self.room.with_pushed_ball(x, y, RADIUS)
             return
-        self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
+        self.speed, self.turn_speed, self._target_speeds = 0.0, 0.0, (0.0, 0.0)
         side = self._touching_side(distance_m)
         if side != self.pressed_bumper:
             self.pressed_bumper = side
@@ -145,13 +145,13 @@ class WheelBody:
     def _touching_side(self, distance_m: float) -> str:
         if distance_m < 0:
             return "back"
-        touches = {
-            side: not self._is_free_towards(self.theta_deg + aside)
-            for side, aside in (("left", _BUMPER_ANGLE_DEG), ("right", -_BUMPER_ANGLE_DEG))
+        is_touching = {
+            side: not self._is_free_towards(self.theta_deg + offset_deg)
+            for side, offset_deg in (("left", _BUMPER_ANGLE_DEG), ("right", -_BUMPER_ANGLE_DEG))
         }
-        if touches["left"] == touches["right"]:
+        if is_touching["left"] == is_touching["right"]:
             return "front"
-        return "left" if touches["left"] else "right"
+        return "left" if is_touching["left"] else "right"
 
     def _is_free_towards(self, direction_deg: float) -> bool:
         x = self.x + 0.03 * math.cos(math.radians(direction_deg))
@@ -159,9 +159,9 @@ class WheelBody:
         return self.room.is_free(x, y, RADIUS)
 
 
-def _approach(now: float, target: float, faster: float, slower: float) -> float:
+def _approach(current: float, target: float, max_increase: float, max_decrease: float) -> float:
     # Braking (also to reverse) uses the larger rate.
-    brakes = abs(target) < abs(now) or now * target < 0
-    change = slower if brakes else faster
-    goal = 0.0 if now * target < 0 else target
-    return goal if abs(goal - now) <= change else now + math.copysign(change, goal - now)
+    is_braking = abs(target) < abs(current) or current * target < 0
+    max_change = max_decrease if is_braking else max_increase
+    goal = 0.0 if current * target < 0 else target
+    return goal if abs(goal - current) <= max_change else current + math.copysign(max_change, goal - current)

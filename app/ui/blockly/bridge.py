@@ -43,7 +43,7 @@ class BlocklyBridge(QObject):
         str
     )  # name of the pressed button of the empty canvas: "robot" or "examples"
     flyout_pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
-    removed = Signal(int)  # number of blocks that the user deleted at once
+    blocks_deleted = Signal(int)  # number of blocks that the user deleted at once
     # True with x, y while blocks of this tab are dragged outside the page; False when they return
     blocks_dragged_outside = Signal(int, int, bool, str)
     # picture of the dragged blocks: a PNG as `data:` URL, and its device pixels per page pixel
@@ -107,12 +107,12 @@ class BlocklyBridge(QObject):
         self.visible_sensors_changed.emit(sensors)
 
     @Slot(bool)
-    def pin(self, keeps: bool) -> None:
-        self.flyout_pinned.emit(keeps)
+    def pin(self, is_pinned: bool) -> None:
+        self.flyout_pinned.emit(is_pinned)
 
     @Slot(int)
     def deleted(self, count: int) -> None:
-        self.removed.emit(count)
+        self.blocks_deleted.emit(count)
 
     @Slot(int, int, bool, str)
     def drag_outside(self, x: int, y: int, is_outside: bool, tab: str) -> None:
@@ -131,8 +131,8 @@ class BlocklyBridge(QObject):
         self.blocks_transferred.emit(count, mode, source_tab)
 
     @Slot(str)
-    def backpack(self, what: str) -> None:
-        self.backpack_requested.emit(what)
+    def backpack(self, operation: str) -> None:
+        self.backpack_requested.emit(operation)
 
     @Slot(str)
     def copy(self, blocks: str) -> None:
@@ -158,9 +158,9 @@ class BlocklyBridge(QObject):
         self.watched_variables_changed.emit(variables)
 
     @Slot(str)
-    def press_canvas_button(self, what: str) -> None:
-        self.canvas_button_pressed.emit(what)
+    def press_canvas_button(self, button: str) -> None:
+        self.canvas_button_pressed.emit(button)
 
     @Slot(str)
-    def failed(self, sentence: str) -> None:
-        self.error_reported.emit(sentence)
+    def failed(self, message: str) -> None:
+        self.error_reported.emit(message)

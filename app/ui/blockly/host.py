@@ -55,8 +55,8 @@ class BlocklyPage(QWebEnginePage):
         line: int,
         source: str,
     ) -> None:
-        serious = level == QWebEnginePage.JavaScriptConsoleMessageLevel.ErrorMessageLevel
-        _log.log(logging.ERROR if serious else logging.DEBUG, "%s (%s:%d)", message, source, line)
+        is_error = level == QWebEnginePage.JavaScriptConsoleMessageLevel.ErrorMessageLevel
+        _log.log(logging.ERROR if is_error else logging.DEBUG, "%s (%s:%d)", message, source, line)
 
 
 class BlocklyWeb:
@@ -74,9 +74,9 @@ class BlocklyWeb:
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)
         profile = QWebEngineProfile(None)
         self._profile = profile
-        self.fence = RequestBlocker(profile)
+        self.request_blocker = RequestBlocker(profile)
         self._handler = SchemeHandler(profile)
-        profile.setUrlRequestInterceptor(self.fence)
+        profile.setUrlRequestInterceptor(self.request_blocker)
         profile.installUrlSchemeHandler(SCHEME, self._handler)
         self.page = BlocklyPage(profile, self.view)
         self.page.setBackgroundColor(background)
@@ -114,53 +114,53 @@ class BlocklyHost(QWidget):
         super().__init__(parent)
         self._language = language
         self._web: BlocklyWeb | None = None
-        self._up = False
+        self._is_page_ready = False
         self._theme: Json = {}
-        self._reduced_motion = False
-        self._pinned: bool | None = None
-        self._deaths = 0
-        self._had_died = False
-        self._up_since = 0.0
+        self._is_motion_reduced = False
+        self._is_pinned: bool | None = None
+        self._termination_count = 0
+        self._has_terminated = False
+        self._ready_since_s = 0.0
         self._bridge = BlocklyBridge(self._initial_settings, self)
         self._bridge.page_ready.connect(self._on_page_ready)
         self._keys = KeyBuffer(lambda: self._web.keyboard_target() if self._web is not None else None)
         self._requested_field = ""  # requested field: "find" or "search"; "" when it has the focus
         self._bridge.field_opened.connect(self._on_field_opened)
-        self._on_block = False
+        self._is_block_focused = False
         self._bridge.block_focused.connect(self._on_block_focused)
-        self._bridge.error_reported.connect(lambda sentence: _log.error("block editor: %s", sentence))
+        self._bridge.error_reported.connect(lambda message: _log.error("block editor: %s", message))
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
 
     @property
     def is_ready(self) -> bool:
         """True if the page is loaded."""
-        return self._up
+        return self._is_page_ready
 
     @property
     def web(self) -> BlocklyWeb | None:
         """Web view, or None before the first show. Used by tools and tests."""
         return self._web
 
-    def set_theme(self, tokens: Mapping[str, object], dark: bool) -> None:
+    def set_theme(self, tokens: Mapping[str, object], is_dark: bool) -> None:
         """Set the colours and sizes of the page; program and undo stack are preserved.
 
         Args:
             tokens: Design tokens: the parsed token file, or `Theme.blockly_tokens()`.
-            dark: True for the dark theme.
+            is_dark: True for the dark theme.
         """
-        self._theme = {"tokens": dict(tokens), "dark": dark}
+        self._theme = {"tokens": dict(tokens), "dark": is_dark}
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
         if self._web is not None:
             self._apply_theme(self._web)
         self._send_command("theme", self._theme)
 
-    def set_reduced_motion(self, reduced: bool) -> None:
-        """Select a steady glow for running blocks if ``reduced`` is True, else an animated one."""
-        if reduced != self._reduced_motion:
-            self._reduced_motion = reduced
-            self._send_command("motion", {"reduced": reduced})
+    def set_reduced_motion(self, is_reduced: bool) -> None:
+        """Select a steady glow for running blocks if ``is_reduced`` is True, else an animated one."""
+        if is_reduced != self._is_motion_reduced:
+            self._is_motion_reduced = is_reduced
+            self._send_command("motion", {"reduced": is_reduced})
 
     # -- for the view -----------------------------------------------------------------------------
 
@@ -174,7 +174,7 @@ class BlocklyHost(QWidget):
 
     def _send_command(self, command: str, payload: object) -> None:
         # Commands without a page are dropped; `_on_page_loaded` sends the complete state to a later page.
-        if self._up:
+        if self._is_page_ready:
             self._bridge.send_command(command, payload)
 
     def _request_field(self, field: str) -> None:
@@ -200,15 +200,15 @@ class BlocklyHost(QWidget):
             return True
         if event.type() == QEvent.Type.FocusIn and is_keyboard_navigation():
             self._send_command("keyboard", None)
-        overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
-        if overrides and _is_help_key(cast("QKeyEvent", event)):
+        is_override = event.type() == QEvent.Type.ShortcutOverride and self._is_block_focused
+        if is_override and _is_help_key(cast("QKeyEvent", event)):
             event.accept()  # on a block, F1 shows the block's help instead of the window's
             return True
         if event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event)
             # A shortcut of the window is handled before the key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
-                if self._on_block and _is_help_key(key):
+                if self._is_block_focused and _is_help_key(key):
                     self._send_command("help", None)
                 else:
                     self.key_pressed.emit(QKeySequence(key.key()).toString())
@@ -231,7 +231,7 @@ class BlocklyHost(QWidget):
 
     def _close_page(self) -> None:
         # Deletes the page before its profile, whatever order the interpreter uses at exit.
-        web, self._web, self._up = self._web, None, False
+        web, self._web, self._is_page_ready = self._web, None, False
         if web is not None:
             web.close()
 
@@ -244,16 +244,16 @@ class BlocklyHost(QWidget):
 
     def _install_key_filter(self) -> None:
         # The web engine creates the widget that receives keys, and a new one for each process.
-        keyboard = self._web.keyboard_target() if self._web is not None else None
+        key_target = self._web.keyboard_target() if self._web is not None else None
         if self._web is not None:
             self._web.view.setAcceptDrops(False)
-        if keyboard is not None:
-            if isinstance(keyboard, QWidget):
-                keyboard.setAcceptDrops(False)  # the window handles dropped files
-            keyboard.removeEventFilter(self)
-            keyboard.installEventFilter(self)
-            if isinstance(keyboard, QWidget):
-                keyboard.setAcceptDrops(False)  # the window handles dropped files
+        if key_target is not None:
+            if isinstance(key_target, QWidget):
+                key_target.setAcceptDrops(False)  # the window handles dropped files
+            key_target.removeEventFilter(self)
+            key_target.installEventFilter(self)
+            if isinstance(key_target, QWidget):
+                key_target.setAcceptDrops(False)  # the window handles dropped files
 
     def _initial_settings(self) -> Json:
         if not self._theme:
@@ -262,8 +262,8 @@ class BlocklyHost(QWidget):
         return {
             "language": self._language,
             "words": dict(i18n.editor_translations()),
-            "reduced": self._reduced_motion,
-            "pinned": self._pinned,
+            "reduced": self._is_motion_reduced,
+            "pinned": self._is_pinned,
             "theme": self._theme,
         }
 
@@ -278,41 +278,41 @@ class BlocklyHost(QWidget):
         self._keys.release()
 
     def _on_block_focused(self, is_focused: bool) -> None:
-        self._on_block = is_focused
+        self._is_block_focused = is_focused
 
     def _on_page_ready(self) -> None:
-        self._up = True
-        self._up_since = time.monotonic()
+        self._is_page_ready = True
+        self._ready_since_s = time.monotonic()
         self._install_key_filter()
         self._on_page_loaded()
         if self._requested_field:
             self._send_command(self._requested_field, None)
         self.ready.emit()
-        if self._had_died:
-            self._had_died = False
+        if self._has_terminated:
+            self._has_terminated = False
             self.recovered.emit()
 
     def _on_process_terminated(
         self, status: QWebEnginePage.RenderProcessTerminationStatus, code: int
     ) -> None:
         is_crash = status != QWebEnginePage.RenderProcessTerminationStatus.NormalTerminationStatus
-        how = f"the web process of the block editor ended (code {code}, {status.name})"
+        description = f"the web process of the block editor ended (code {code}, {status.name})"
         _log.warning(
             "the web process of the block editor ended (code %d); restarting it",
             code,
-            extra=crash_extra("editor", how) if is_crash else None,
+            extra=crash_extra("editor", description) if is_crash else None,
         )
-        self._up = self._on_block = False
-        self._had_died = True
+        self._is_page_ready = self._is_block_focused = False
+        self._has_terminated = True
         self._requested_field = ""
         self._keys.discard_all()
         self._on_page_lost()
-        if time.monotonic() - self._up_since > _STABLE_AFTER_S:
-            self._deaths = 0
-        delay = _RESTART_DELAYS_MS[min(self._deaths, len(_RESTART_DELAYS_MS) - 1)]
-        self._deaths += 1
+        if time.monotonic() - self._ready_since_s > _STABLE_AFTER_S:
+            self._termination_count = 0
+        delay_ms = _RESTART_DELAYS_MS[min(self._termination_count, len(_RESTART_DELAYS_MS) - 1)]
+        self._termination_count += 1
         if self._web is not None:
-            QTimer.singleShot(delay, self._web.page, self._web.start)
+            QTimer.singleShot(delay_ms, self._web.page, self._web.start)
 
 
 def _is_help_key(key: QKeyEvent) -> bool:

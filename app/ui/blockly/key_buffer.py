@@ -17,9 +17,9 @@ class KeyBuffer:
     after *Find a block* would arrive while the page is still busy, and go to its canvas.
     """
 
-    def __init__(self, keyboard: Callable[[], QObject | None]) -> None:
-        # `keyboard` returns the widget that currently receives the page's keys.
-        self._keyboard = keyboard
+    def __init__(self, key_target: Callable[[], QObject | None]) -> None:
+        # `key_target` returns the widget that currently receives the page's keys.
+        self._get_key_target = key_target
         self._buffered_events: list[QEvent] | None = None
 
     def start(self) -> None:
@@ -45,9 +45,9 @@ class KeyBuffer:
         """Stop buffering and send the buffered keys to the page, in the order in which they were pressed."""
         buffered, self._buffered_events = self._buffered_events or [], None
         for event in buffered:
-            keyboard = self._keyboard()
-            if keyboard is not None:
-                QCoreApplication.sendEvent(keyboard, event)
+            key_target = self._get_key_target()
+            if key_target is not None:
+                QCoreApplication.sendEvent(key_target, event)
 
     def discard_all(self) -> None:
         """Stop buffering and discard the buffered keys, after the page for which they were typed was lost."""

@@ -112,17 +112,17 @@ class RequestBlocker(QWebEngineUrlRequestInterceptor):
     """Request interceptor that blocks everything except local content.
 
     Attributes:
-        blocked: URLs of the first 100 blocked requests, for tests.
+        blocked_urls: URLs of the first 100 blocked requests, for tests.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.blocked: list[str] = []
+        self.blocked_urls: list[str] = []
 
     def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
         info.block(True)  # blocked first, so that an exception below can't let the request through
         if info.requestUrl().scheme() in ALLOWED_SCHEMES:
             info.block(False)
             return
-        if len(self.blocked) < 100:
-            self.blocked.append(info.requestUrl().toString())
+        if len(self.blocked_urls) < 100:
+            self.blocked_urls.append(info.requestUrl().toString())

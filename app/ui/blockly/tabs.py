@@ -32,13 +32,13 @@ class Tabs:
     The first tab has the key "" and is an empty placeholder until a behaviour is opened.
 
     Attributes:
-        shown: Tab that is shown.
+        shown_tab: Tab that is shown.
     """
 
     def __init__(self) -> None:
         self._generations = 0
         self._tabs: dict[str, Tab] = {}
-        self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
+        self.shown_tab = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
 
     def __getitem__(self, key: str) -> Tab | None:
         return self._tabs.get(key)
@@ -53,9 +53,9 @@ class Tabs:
         Returns:
             The key of the placeholder if it was removed, else None.
         """
-        before = self.shown
-        self.shown = self._tabs.get(key) or self._create_tab(key, program)
-        if before.key or before is self.shown:
+        previous = self.shown_tab
+        self.shown_tab = self._tabs.get(key) or self._create_tab(key, program)
+        if previous.key or previous is self.shown_tab:
             return None
         del self._tabs[""]
         return ""
@@ -63,16 +63,16 @@ class Tabs:
     def close(self, key: str) -> bool:
         """Remove a tab; return False if it doesn't exist. The placeholder replaces the shown tab."""
         tab = self._tabs.pop(key, None)
-        if tab is not None and tab is self.shown:
-            self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
+        if tab is not None and tab is self.shown_tab:
+            self.shown_tab = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
         return tab is not None
 
     def replace(self, program: WorkspaceJson) -> None:
         """Replace the program of the shown tab; `tab_for_edit` rejects later edits of the old program."""
         self._generations += 1
-        self.shown.generation = self._generations
-        self.shown.workspace = program
-        self.shown.states.clear()
+        self.shown_tab.generation = self._generations
+        self.shown_tab.workspace = program
+        self.shown_tab.states.clear()
 
     def tab_for_edit(self, key: str, generation: int) -> Tab | None:
         """Return the tab to which an edit belongs; None if the tab was closed or its program was replaced.

@@ -65,15 +65,15 @@ class BlocklyView(BlocklyHost):
         super().__init__(parent, language or i18n.language())
         self._tabs = Tabs()
         self._definitions: Json = {"blocks": [], "toolbox": {"kind": "categoryToolbox", "contents": []}}
-        self._live: Json = {"values": {}, "old": []}
+        self._live_values: Json = {"values": {}, "old": []}
         self._alarms: Json = {}
-        self._values: Json = {}
-        self._first_step: Json | None = None
+        self._variable_values: Json = {}
+        self._canvas_hint: Json | None = None
         self._backpack: list[Json] = []
-        self._pointed: Json | None = None  # pending highlight for a page that is not loaded yet
-        self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
-        self._pictures: dict[int, Callable[[bytes], None]] = {}
-        self._tokens = 0
+        self._pending_hint: Json | None = None  # pending highlight for a page that is not loaded yet
+        self._flush_callbacks: dict[int, Callable[[WorkspaceJson], None]] = {}
+        self._picture_callbacks: dict[int, Callable[[bytes], None]] = {}
+        self._last_token = 0
         self._bridge.edited.connect(self._on_edited)
         self._bridge.undo_changed.connect(self.history_changed)
         self._bridge.block_selected.connect(self.block_selected)
@@ -86,10 +86,10 @@ class BlocklyView(BlocklyHost):
         self._bridge.canvas_button_pressed.connect(self.canvas_button_pressed)
         self._bridge.try_requested.connect(self.try_requested)
         self._bridge.flyout_pinned.connect(self._on_flyout_pinned)
-        self._bridge.removed.connect(self.blocks_deleted)
+        self._bridge.blocks_deleted.connect(self.blocks_deleted)
         self._bridge.blocks_dragged_outside.connect(
-            lambda x, y, out, home: self.blocks_dragged_outside.emit(
-                self._to_screen(x, y) if out else None, home
+            lambda x, y, is_outside, tab: self.blocks_dragged_outside.emit(
+                self._to_screen(x, y) if is_outside else None, tab
             )
         )
         self._bridge.drag_picture_rendered.connect(
@@ -112,7 +112,7 @@ class BlocklyView(BlocklyHost):
 
         Edits of the last 150 ms may be missing; see `flush`.
         """
-        return self._tabs.shown.workspace.blocks
+        return self._tabs.shown_tab.workspace.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
         """Return the latest program of a tab, or None if there is no such tab."""
@@ -133,7 +133,7 @@ class BlocklyView(BlocklyHost):
 
     def close_tab(self, key: str) -> None:
         """Close a tab and discard its undo stack. An empty behaviour replaces the shown tab."""
-        was_shown = key == self._tabs.shown.key
+        was_shown = key == self._tabs.shown_tab.key
         if self._tabs.close(key):
             if was_shown:
                 self._send_tab()
@@ -145,12 +145,12 @@ class BlocklyView(BlocklyHost):
         Clears the undo stack and discards pending edits of the old program.
         """
         self._tabs.replace(WorkspaceJson.from_blocks(workspace))
-        self._tabs.shown.is_loaded = False
+        self._tabs.shown_tab.is_loaded = False
         self._send_tab()
 
     def apply_edit(self, workspace: Mapping[str, object]) -> None:
         """Change the program of the shown tab as one undoable edit; `changed` is not emitted."""
-        self._tabs.shown.workspace = WorkspaceJson.from_blocks(workspace)
+        self._tabs.shown_tab.workspace = WorkspaceJson.from_blocks(workspace)
         self._send_command("change", workspace)
 
     def flush(self, callback: Callable[[WorkspaceJson], None]) -> None:
@@ -159,12 +159,12 @@ class BlocklyView(BlocklyHost):
         `callback` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
         edits: they were flushed when another tab was shown.
         """
-        if not self._up:
-            callback(self._tabs.shown.workspace)
+        if not self._is_page_ready:
+            callback(self._tabs.shown_tab.workspace)
             return
-        self._tokens += 1
-        self._waiting[self._tokens] = callback
-        self._bridge.send_command("flush", self._tokens)
+        self._last_token += 1
+        self._flush_callbacks[self._last_token] = callback
+        self._bridge.send_command("flush", self._last_token)
 
     def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
         """Render all blocks of the shown tab as an image.
@@ -175,12 +175,12 @@ class BlocklyView(BlocklyHost):
             callback: Called exactly once with the image; with b"" if there are no blocks, or if the editor's
                 page isn't loaded.
         """
-        if not self._up:
+        if not self._is_page_ready:
             callback(b"")
             return
-        self._tokens += 1
-        self._pictures[self._tokens] = callback
-        self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
+        self._last_token += 1
+        self._picture_callbacks[self._last_token] = callback
+        self._bridge.send_command("picture", {"token": self._last_token, "kind": kind, "white": white})
 
     def render_pdf(
         self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
@@ -194,42 +194,42 @@ class BlocklyView(BlocklyHost):
             callback: Called exactly once with the PDF; with b"" if there are no blocks, or if the editor's
                 page isn't loaded.
         """
-        if not self._up:
+        if not self._is_page_ready:
             callback(b"")
             return
-        self._tokens += 1
-        token = self._tokens
+        self._last_token += 1
+        token = self._last_token
 
         def on_pdf_rendered(data: QByteArray) -> None:
             self._send_command("printed", None)
-            waiting = self._pictures.pop(token, None)
-            if waiting is not None:
-                waiting(bytes(data.data()))
+            pdf_callback = self._picture_callbacks.pop(token, None)
+            if pdf_callback is not None:
+                pdf_callback(bytes(data.data()))
 
         def on_pages_laid_out(count: bytes) -> None:
             if not count or self.web is None:
                 callback(b"")
                 return
-            self._pictures[token] = callback  # kept until the PDF is created, as the page may die meanwhile
+            # kept until the PDF is created, as the page may die meanwhile
+            self._picture_callbacks[token] = callback
             layout_without_margins = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
             self.web.page.printToPdf(on_pdf_rendered, layout_without_margins)
 
         paper = layout.fullRect(QPageLayout.Unit.Inch)
-        edge = max(_MIN_MARGIN_INCH, *_margins(layout))
-        pixels = {"width": paper.width(), "height": paper.height(), "edge": edge}
-        self._pictures[token] = on_pages_laid_out
-        settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
+        margin = max(_MIN_MARGIN_INCH, *_margins(layout))
+        lengths_inch = {"width": paper.width(), "height": paper.height(), "edge": margin}
+        self._picture_callbacks[token] = on_pages_laid_out
+        settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in lengths_inch.items()}
         self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
 
-    def set_toolbox_pinned(self, pinned: bool | None) -> None:
-        """Set when the flyout is open.
+    def set_toolbox_pinned(self, is_pinned: bool | None) -> None:
+        """Set whether the flyout stays open after a block was dragged out of it.
 
         Args:
-            pinned: True to keep the flyout open after use, False to close it, None to decide by the available
-                space.
+            is_pinned: True to keep the flyout open, False to close it, None to decide by the available space.
         """
-        self._pinned = pinned
-        self._send_command("pin", pinned)
+        self._is_pinned = is_pinned
+        self._send_command("pin", is_pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
         """Set the block definitions (see `editor_definitions`). Equal definitions are ignored.
@@ -273,23 +273,23 @@ class BlocklyView(BlocklyHost):
         """Dim the blocks with these ids, because their robot is not connected."""
         self._set_state("absent", list(ids))
 
-    def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
+    def set_live_values(self, values: Mapping[str, str], stale_keys: Collection[str] = ()) -> None:
         """Set the displayed values of sensor blocks. This is not an edit of the program.
 
         Args:
             values: Formatted values by block id or by ``<robot>/<property>[/<field>]``.
-            old: Keys of stale values, which are dimmed.
+            stale_keys: Keys of stale values, which are dimmed.
         """
-        live: Json = {"values": dict(values), "old": sorted(old)}
-        if live != self._live:
-            self._live = live
-            self._send_command("live", self._live)
+        live_values: Json = {"values": dict(values), "old": sorted(stale_keys)}
+        if live_values != self._live_values:
+            self._live_values = live_values
+            self._send_command("live", self._live_values)
 
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
         """Set the displayed values of variables, as results of `VariableValue.to_json` by id."""
-        if values != self._values:
-            self._values = dict(values)
-            self._send_command("values", self._values)
+        if values != self._variable_values:
+            self._variable_values = dict(values)
+            self._send_command("values", self._variable_values)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
         """Edit a variable, or change its display.
@@ -330,8 +330,8 @@ class BlocklyView(BlocklyHost):
             has_robot: True if a robot is connected.
         """
         state: Json = {"first": label, "robot": has_robot}
-        if state != self._first_step:
-            self._first_step = state
+        if state != self._canvas_hint:
+            self._canvas_hint = state
             self._send_command("begin", state)
 
     def point_at(self, block: str, name: str = "", placement_hint: str = "") -> None:
@@ -343,7 +343,7 @@ class BlocklyView(BlocklyHost):
             placement_hint: Hint where to put the block.
         """
         target: Json | None = {"block": block, "name": name, "then": placement_hint} if block else None
-        self._pointed = None if self._up else target
+        self._pending_hint = None if self._is_page_ready else target
         self._send_command("point", target)
 
     # -- commands ---------------------------------------------------------------------------------
@@ -390,8 +390,8 @@ class BlocklyView(BlocklyHost):
             return
         page = self.web.page
 
-        def apply_edit(types: object) -> None:
-            if types:
+        def apply_edit(is_text_field: object) -> None:
+            if is_text_field:
                 page.triggerAction(page.WebAction[PAGE_EDIT_ACTIONS[command]])
             else:
                 self.setFocus()
@@ -433,9 +433,9 @@ class BlocklyView(BlocklyHost):
 
     # -- page -------------------------------------------------------------------------------------
 
-    def _on_flyout_pinned(self, keeps: bool) -> None:
-        self._pinned = keeps
-        self.toolbox_pinned.emit(keeps)
+    def _on_flyout_pinned(self, is_pinned: bool) -> None:
+        self._is_pinned = is_pinned
+        self.toolbox_pinned.emit(is_pinned)
 
     def _to_screen(self, x: int, y: int) -> QPoint:
         # The position may be outside the page.
@@ -446,30 +446,30 @@ class BlocklyView(BlocklyHost):
     def _on_page_loaded(self) -> None:
         self._send_command("definitions", self._definitions)
         self._send_command("alarms", self._alarms)
-        self._send_command("begin", self._first_step)
+        self._send_command("begin", self._canvas_hint)
         self._send_command("backpack", self._backpack)
         self._tabs.mark_unloaded()
         self._send_tab()
-        pointed, self._pointed = self._pointed, None
-        if pointed is not None:
-            self._send_command("point", pointed)
+        hint, self._pending_hint = self._pending_hint, None
+        if hint is not None:
+            self._send_command("point", hint)
 
     def _on_page_lost(self) -> None:
-        pictures, self._pictures = self._pictures, {}
-        for without in pictures.values():
-            without(b"")
-        waiting, self._waiting = self._waiting, {}
-        for callback in waiting.values():
-            callback(self._tabs.shown.workspace)
+        picture_callbacks, self._picture_callbacks = self._picture_callbacks, {}
+        for picture_callback in picture_callbacks.values():
+            picture_callback(b"")
+        flush_callbacks, self._flush_callbacks = self._flush_callbacks, {}
+        for flush_callback in flush_callbacks.values():
+            flush_callback(self._tabs.shown_tab.workspace)
         self.history_changed.emit(False, False)
         self.visible_sensors_changed.emit(())
         self.watched_variables_changed.emit(())
 
     def _send_tab(self) -> None:
         # Sends the program if the page doesn't have it, and the state of its blocks.
-        if not self._up:
+        if not self._is_page_ready:
             return
-        tab = self._tabs.shown
+        tab = self._tabs.shown_tab
         payload: Json = {"key": tab.key}
         if not tab.is_loaded:
             payload |= {"generation": tab.generation, "workspace": tab.workspace.blocks}
@@ -477,11 +477,11 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("tab", payload)
         for name, value in tab.states.items():
             self._bridge.send_command(name, value)
-        self._bridge.send_command("live", self._live)
-        self._bridge.send_command("values", self._values)
+        self._bridge.send_command("live", self._live_values)
+        self._bridge.send_command("values", self._variable_values)
 
     def _set_state(self, name: str, value: object) -> None:
-        states = self._tabs.shown.states
+        states = self._tabs.shown_tab.states
         if states.get(name) != value:
             states[name] = value
             self._send_command(name, value)
@@ -493,12 +493,12 @@ class BlocklyView(BlocklyHost):
             self.changed.emit(key, tab.workspace)
 
     def _on_picture_rendered(self, token: int, data: str) -> None:
-        callback = self._pictures.pop(token, None)
+        callback = self._picture_callbacks.pop(token, None)
         if callback is not None:
             callback(decode_data_url(data) if data.startswith("data:") else data.encode())
 
     def _on_workspace_flushed(self, token: int, workspace: str) -> None:
-        callback = self._waiting.pop(token, None)
+        callback = self._flush_callbacks.pop(token, None)
         if callback is not None:
             callback(WorkspaceJson(workspace))
 

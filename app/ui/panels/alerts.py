@@ -23,7 +23,7 @@ class AlertsPanel(PanelWidget):
         super().__init__(context, _("Alerts"))
         self._last_revision = -1
         self.rows: list[AlertRow] = []
-        self.shown: list[ActiveAlert] = []  # parallel to `rows`
+        self.shown_alerts: list[ActiveAlert] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.empty = EmptyState(
@@ -43,14 +43,14 @@ class AlertsPanel(PanelWidget):
         # Behaviour layout: hides alerts for developers, such as ports
         is_plain = self.density == "comfortable"
         active = [alert for alert in alerts.active if not (is_plain and alert.for_developers)]
-        if active != self.shown:
+        if active != self.shown_alerts:
             self._show(active)
 
     def _show(self, active: list[ActiveAlert]) -> None:
-        rows_by_id = {alert.id: row for alert, row in zip(self.shown, self.rows, strict=True)}
-        self.shown = active
+        rows_by_id = {alert.id: row for alert, row in zip(self.shown_alerts, self.rows, strict=True)}
+        self.shown_alerts = active
         self.rows = [
-            rows_by_id.pop(each.id) if each.id in rows_by_id else self._row(each.id) for each in active
+            rows_by_id.pop(each.id) if each.id in rows_by_id else self._create_row(each.id) for each in active
         ]
         for row in rows_by_id.values():
             self.pages.remove_row(row)
@@ -62,13 +62,13 @@ class AlertsPanel(PanelWidget):
         self.pages.show_rows(bool(active))
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
 
-    def _row(self, alert_id: str) -> AlertRow:
+    def _create_row(self, alert_id: str) -> AlertRow:
         row = AlertRow(self.theme)
         row.button.clicked.connect(lambda: self._run_action(alert_id))
         return row
 
     def _run_action(self, alert_id: str) -> None:
-        action = next((alert.action for alert in self.shown if alert.id == alert_id), None)
+        action = next((alert.action for alert in self.shown_alerts if alert.id == alert_id), None)
         if action is not None:
             self.context.run(action)
 

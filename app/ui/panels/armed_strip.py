@@ -46,21 +46,21 @@ class ArmedStrip(QWidget):
         self.tokens: list[LinkButton] = []
         self._flow_widget = QWidget()
         self._flow = Flow(self._flow_widget, gap=8, row_gap=4)
-        self.counts = label("", "small", role="textSecondary")
-        for widget in (self.switch, self.text_label, self._targets_label, self.counts):
+        self.summary_label = label("", "small", role="textSecondary")
+        for widget in (self.switch, self.text_label, self._targets_label, self.summary_label):
             self._flow.addWidget(widget)
-        self.question = label("", "small", role="warn", wrap=True)
-        self.question.setMinimumWidth(0)
+        self.question_label = label("", "small", role="warn", wrap=True)
+        self.question_label.setMinimumWidth(0)
         self.allow_button = Button(self._theme, _("Arm sending"), size="small")
-        self.cancel = Button(self._theme, _("Cancel"), size="small")
+        self.cancel_button = Button(self._theme, _("Cancel"), size="small")
         self.allow_button.clicked.connect(lambda: self.acting.answer(is_allowed=True))
-        self.cancel.clicked.connect(lambda: self.acting.answer(is_allowed=False))
+        self.cancel_button.clicked.connect(lambda: self.acting.answer(is_allowed=False))
         self._question_row = QWidget()
         row = QHBoxLayout(self._question_row)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
-        row.addWidget(self.question, 1)
-        for button in (self.allow_button, self.cancel):
+        row.addWidget(self.question_label, 1)
+        for button in (self.allow_button, self.cancel_button):
             row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
         content = QVBoxLayout()
         content.setContentsMargins(12, 7, 12, 7)
@@ -73,7 +73,7 @@ class ArmedStrip(QWidget):
         column.addLayout(content)
         column.addWidget(Separator(self._theme))
         self._question_row.hide()
-        self.counts.hide()
+        self.summary_label.hide()
         self.refresh()
 
     @property
@@ -82,31 +82,31 @@ class ArmedStrip(QWidget):
         return self._context.session.acting
 
     def refresh(self) -> None:
-        """Update the switch, the targets and the counts."""
+        """Update the switch, the targets and the summary."""
         acting = self.acting
         arming, question = acting.arming, acting.question
-        remaining, replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
+        remaining, is_replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
         targets = arming.targets if arming.is_on else ()
-        more = self.summary_text()
-        state = (arming.is_on, remaining, targets, question, replaying, more)
+        summary = self.summary_text()
+        state = (arming.is_on, remaining, targets, question, is_replaying, summary)
         if state == self._last_state:
             return
         self._last_state = state
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
-        can_arm = self.is_for_replay or not replaying
+        can_arm = self.is_for_replay or not is_replaying
         self.switch.setEnabled(can_arm or arming.is_on)
-        nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
-        self.text_label.setText(_("{time} left").format(time=remaining) if arming.is_on else nothing)
+        disarmed_text = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
+        self.text_label.setText(_("{time} left").format(time=remaining) if arming.is_on else disarmed_text)
         set_role(self.text_label, "warn" if arming.is_on else "textSecondary")
         self._targets_label.setVisible(bool(targets))
-        self.counts.setVisible(bool(more))
-        self.counts.setText(more)
+        self.summary_label.setVisible(bool(summary))
+        self.summary_label.setText(summary)
         self._show_tokens(targets)
         message = question.message if question is not None else ""
         self._question_row.setVisible(question is not None)
-        if message != self.question.text():
-            self.question.setText(message)
+        if message != self.question_label.text():
+            self.question_label.setText(message)
             paint.announce(self, message)
         self.update()
 
@@ -142,8 +142,8 @@ class ArmedStrip(QWidget):
             token.clicked.connect(lambda _on=False, target=target: self.acting.deny(target))
             self._flow.addWidget(token)
             self.tokens.append(token)
-        self._flow.removeWidget(self.counts)
-        self._flow.addWidget(self.counts)  # keeps it last
+        self._flow.removeWidget(self.summary_label)
+        self._flow.addWidget(self.summary_label)  # keeps it last
 
     def _toggle_armed(self) -> None:
         if self.acting.arming.is_on:

@@ -45,10 +45,7 @@ class ShowToast(Protocol):
         run: Callable[[], object] | None = None,
         *,
         until: Callable[[], bool] | None = None,
-    ) -> None:
-        # Shows `text`, such as "Copied robots.Pepper.pose.y", and a `button` that calls `run`. The toast
-        # closes early once `until` returns True.
-        ...
+    ) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,18 +96,18 @@ class Blocker:
     run: Callable[[], object]
 
 
-def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
+def paused_blocker(panel: str, resume: Callable[[], object]) -> Blocker:
     """Return the blocker for a panel that is paused.
 
     Args:
         panel: Title of the panel.
-        go_on: Resumes the panel.
+        resume: Resumes the panel.
     """
     return Blocker(
         _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
         _("Resume"),
-        go_on,
+        resume,
     )
 
 

@@ -37,24 +37,24 @@ class CameraPanel(OneRobotPanel):
         self._topic = ""
         self._stream: ImageStream | None = None
         # has a fixed width: the topic next to it is elided instead
-        self.rate = SteadyLabel("body", "textSecondary", min_width=110)
-        self.header = [self.rate]
+        self.rate_label = SteadyLabel("body", "textSecondary", min_width=110)
+        self.header = [self.rate_label]
         self._rates = RateText()
-        self._detecting: tuple[str, ...] = ()
+        self._detection_names: tuple[str, ...] = ()
         self._last_snapshot: tuple[object, ...] = ()
-        self._size = QSize()
-        self._looks_s = 0.0
+        self._last_size = QSize()
+        self._next_update_s = 0.0
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.view = PictureView(self.theme, fill=True, labelled=False)
+        self.view = PictureView(self.theme, fills_view=True, has_label=False)
         self.view.setAccessibleName(_("Robot camera"))
         title, text = (
             _("No images yet"),
             _("Images appear here as soon as a robot with a camera is connected."),
         )
-        start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
-        self.empty = EmptyState(self.theme, "camera", title, text, [start])
-        self._no_robot = NoRobotController(self.empty, title, text, [start])
+        start_action = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
+        self.empty = EmptyState(self.theme, "camera", title, text, [start_action])
+        self._no_robot = NoRobotController(self.empty, title, text, [start_action])
         self._no_robot.set_starting(self.session.starting_robots)
         self.pages = self.make_page_stack(self.empty, self.view)
 
@@ -66,24 +66,24 @@ class CameraPanel(OneRobotPanel):
         silent_s = self._stream.silent_s
         snapshot, size, now = self._snapshot(link, silent_s), self.view.size(), time.monotonic()
         if (
-            now < self._looks_s
-            and size == self._size
+            now < self._next_update_s
+            and size == self._last_size
             and len(snapshot) == len(self._last_snapshot)
             and all(map(is_, snapshot, self._last_snapshot))
         ):
             return  # called 60 times a second, mostly without a new image
         self.view.show_image(self._stream, boxes_in_camera(link, self._topic))
-        silent = silent_s is not None and silent_s > STALE_AFTER_S
+        is_silent = silent_s is not None and silent_s > STALE_AFTER_S
         rate_text = self._rates.for_stream(self._stream)
-        self.rate.setText("" if silent else rate_text)
-        self.chip.set(_("silent for {age}").format(age=age_text(silent_s)) if silent else "", "error")
+        self.rate_label.setText("" if is_silent else rate_text)
+        self.chip.set(_("silent for {age}").format(age=age_text(silent_s)) if is_silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
-        self._last_snapshot, self._size, self._looks_s = snapshot, size, now + REFRESH_INTERVAL_S
+        self._last_snapshot, self._last_size, self._next_update_s = snapshot, size, now + REFRESH_INTERVAL_S
 
     def _snapshot(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
         # Unchanged items must be the identical objects of the last call.
-        detections = (link.values.get(name) for name in self._detecting)
+        detections = (link.values.get(name) for name in self._detection_names)
         picture = self._stream.picture if self._stream is not None else None
         return (picture, None if silent_s is None else int(silent_s * 2), *detections)
 
@@ -104,7 +104,7 @@ class CameraPanel(OneRobotPanel):
 
     def show_robot(self, link: RobotLink) -> None:
         self._topic = _topic_of(link)
-        self._detecting = tuple(each.name for each in link.robot.sensors if each.kind == "detections")
+        self._detection_names = tuple(each.name for each in link.robot.sensors if each.kind == "detections")
         self._last_snapshot = ()
         self._stream = self.session.live.images.stream(self._topic)
         self.view.clear()

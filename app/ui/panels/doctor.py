@@ -54,7 +54,7 @@ class DoctorPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Connection doctor"))
         self._last_state: tuple[object, ...] = ()
-        self._offered: tuple[object, ...] = ()
+        self._last_topic_state: tuple[object, ...] = ()
         self._master = ""
         self._stalled_panel: PanelWidget | None = None
         self._shown_blockers: list[Blocker] = []
@@ -62,14 +62,14 @@ class DoctorPanel(PanelWidget):
         self._suggestions: dict[str, str | None] = {}
         self._shown_texts: tuple[object, ...] = ()
         self.rows: list[AlertRow] = []
-        self.shown: list[Finding] = []  # parallel to `rows`
+        self.shown_findings: list[Finding] = []  # parallel to `rows`
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.again = IconButton(self.theme, "refresh-cw", _("Check again"), size=26)
-        self.again.clicked.connect(self.session.doctor.start)
-        self.header = [self.again]
-        self._copy = QAction(_("Copy the report"), self)
-        self._copy.triggered.connect(self.copy_report)
+        self.check_button = IconButton(self.theme, "refresh-cw", _("Check again"), size=26)
+        self.check_button.clicked.connect(self.session.doctor.start)
+        self.header = [self.check_button]
+        self._copy_action = QAction(_("Copy the report"), self)
+        self._copy_action.triggered.connect(self.copy_report)
         self.empty = EmptyState(
             self.theme, "stethoscope", _("Checking connections"), _("This takes a second or two.")
         )
@@ -79,24 +79,24 @@ class DoctorPanel(PanelWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        about = label(_("Missing topic"), "body", role="textSecondary")
-        about.setBuddy(self.topic_choice)
-        self.looked = ElidedLabel("small", "textTertiary", min_width=40)
+        choice_label = label(_("Missing topic"), "body", role="textSecondary")
+        choice_label.setBuddy(self.topic_choice)
+        self.progress_label = ElidedLabel("small", "textTertiary", min_width=40)
         top = QHBoxLayout()
         top.setContentsMargins(12, 8, 12, 4)
         top.setSpacing(8)
-        top.addWidget(about)
+        top.addWidget(choice_label)
         top.addWidget(self.topic_choice, 1)
-        top.addWidget(self.looked, 1)
-        self.terminal = ElidedLabel("small", "textSecondary", min_width=40)
-        self.copy = Button(self.theme, _("Copy the report"), "copy", size="small")
-        self.copy.allow_shrinking()
-        self.copy.clicked.connect(self.copy_report)
+        top.addWidget(self.progress_label, 1)
+        self.command_label = ElidedLabel("small", "textSecondary", min_width=40)
+        self.copy_button = Button(self.theme, _("Copy the report"), "copy", size="small")
+        self.copy_button.allow_shrinking()
+        self.copy_button.clicked.connect(self.copy_report)
         footer = QHBoxLayout()
         footer.setContentsMargins(12, 5, 12, 6)
         footer.setSpacing(8)
-        footer.addWidget(self.terminal, 1)
-        footer.addWidget(self.copy)
+        footer.addWidget(self.command_label, 1)
+        footer.addWidget(self.copy_button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -107,17 +107,17 @@ class DoctorPanel(PanelWidget):
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def set_stalled_panel(self, asker: PanelWidget | None) -> None:
+    def set_stalled_panel(self, panel: PanelWidget | None) -> None:
         """Report findings about a panel too. The topic of the doctor must be set before.
 
         Args:
-            asker: Panel that shows no new data; None for no panel.
+            panel: Panel that shows no new data; None for no panel.
         """
         if self._stalled_panel is not None:
             self._stalled_panel.destroyed.disconnect(self._clear_stalled_panel)
-        self._stalled_panel = asker
-        if asker is not None:
-            asker.destroyed.connect(self._clear_stalled_panel)
+        self._stalled_panel = panel
+        if panel is not None:
+            panel.destroyed.connect(self._clear_stalled_panel)
         self.refresh()
 
     def _clear_stalled_panel(self) -> None:
@@ -134,26 +134,26 @@ class DoctorPanel(PanelWidget):
         self._update_topics()
         blockers = list(self._blockers())
         texts = tuple((each.message, each.button) for each in blockers)
-        now = (doctor.revision, doctor.is_running, texts)
-        if now == self._last_state:
+        state = (doctor.revision, doctor.is_running, texts)
+        if state == self._last_state:
             return
-        self._last_state = now
-        self.again.setEnabled(not doctor.is_running)
-        so_far = doctor.partial_findings
+        self._last_state = state
+        self.check_button.setEnabled(not doctor.is_running)
+        partial_findings = doctor.partial_findings
         is_new = doctor.finished_s is None or doctor.checked_topic != doctor.expected_topic
-        if so_far is None and doctor.finished_s is None:
+        if partial_findings is None and doctor.finished_s is None:
             return
         self._shown_blockers = blockers  # earlier findings stay visible until the next check is done
         findings = self._merge_findings(
-            blockers, so_far if so_far is not None and is_new else doctor.findings
+            blockers, partial_findings if partial_findings is not None and is_new else doctor.findings
         )
-        if findings != self.shown or texts != self._shown_texts:
+        if findings != self.shown_findings or texts != self._shown_texts:
             self._shown_texts = texts
             self._show(findings)
         if doctor.finished_s is not None:
             self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.finished_s)))
-        self._show_chip(is_done=so_far is None)
-        self._update_progress(is_done=so_far is None)
+        self._show_chip(is_done=partial_findings is None)
+        self._update_progress(is_done=partial_findings is None)
         self.pages.show_rows(bool(self.rows))
 
     @staticmethod
@@ -206,26 +206,26 @@ class DoctorPanel(PanelWidget):
         suggestion = self._suggestions[topic]
         if suggestion is None:
             return Blocker(message, "", *doctor_button)
-        fix, use = _("Did you mean {topic}?"), _("Use {topic}")
+        fix_template, button_template = _("Did you mean {topic}?"), _("Use {topic}")
         return Blocker(
             message,
-            fix.format(topic=suggestion),
-            use.format(topic=suggestion),
+            fix_template.format(topic=suggestion),
+            button_template.format(topic=suggestion),
             lambda: panel.show_topic(suggestion),
         )
 
     def _replay_blocker(self, topic: str) -> Blocker:
-        recorded = not topic or self.session.topics.get(topic) is not None
+        is_recorded = not topic or self.session.topics.get(topic) is not None
         message = _("A recording is open, so panels show recorded data instead of live data.")
-        if not recorded:
+        if not is_recorded:
             message = _("The open recording doesn't contain {topic}.").format(topic=topic_label(topic))
         fix = _("The checks below are about the live network.")
         return Blocker(message, fix, _("Back to live"), lambda: self.context.run("replay.live"))
 
     def _network_blockers(self, topic: str, lost: str) -> Iterator[Blocker]:
         # Topics of another network: the doctor can't check them.
-        unread = self.session.live.networks.read_problem(topic)
-        message = lost or (f"{topic_label(topic)}: {unread}." if unread else "")
+        problem = self.session.live.networks.read_problem(topic)
+        message = lost or (f"{topic_label(topic)}: {problem}." if problem else "")
         if message:
             fix = _("Check its address, and its password or key if it needs one.")
             yield Blocker(message, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
@@ -233,9 +233,9 @@ class DoctorPanel(PanelWidget):
     def _update_topics(self) -> None:
         live, expected_topic = self.session.live, self.session.doctor.expected_topic
         state = (live.topics.revision, live.networks.revision, expected_topic)
-        if state == self._offered or self.topic_choice.view().isVisible():
+        if state == self._last_topic_state or self.topic_choice.view().isVisible():
             return
-        self._offered = state
+        self._last_topic_state = state
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.topic_choice.clear()
         self.topic_choice.addItem(_("no specific topic"), "")
@@ -247,32 +247,34 @@ class DoctorPanel(PanelWidget):
             if expected_topic and not split_key(expected_topic)[0]
             else "nep doctor"
         )
-        self.terminal.setText(_("In a terminal: {command}").format(command=command))
+        self.command_label.setText(_("In a terminal: {command}").format(command=command))
 
     def _update_progress(self, *, is_done: bool) -> None:
         doctor = self.session.doctor
         checked, count = (number(each, ".0f") for each in (doctor.check_count, doctor.total_checks))
         if not is_done:
-            self.looked.setText(_("Checking: {done} of {count}").format(done=checked, count=count))
+            self.progress_label.setText(_("Checking: {done} of {count}").format(done=checked, count=count))
             return
         template = ngettext("{count} check done", "{count} checks done", doctor.check_count)
-        if all(each.severity not in PROBLEM_SEVERITIES for each in self.shown):
+        if all(each.severity not in PROBLEM_SEVERITIES for each in self.shown_findings):
             template = ngettext("{count} check passed", "All {count} checks passed", doctor.check_count)
-        self.looked.setText(template.format(count=checked))
+        self.progress_label.setText(template.format(count=checked))
 
     def _show(self, findings: Sequence[Finding]) -> None:
         for row in self.rows:
             self.pages.remove_row(row)
-        self.shown = list(findings)
+        self.shown_findings = list(findings)
         steps = [self._next_step(finding) for finding in findings]
         fixes = [index for index, step in enumerate(steps) if step is not None and step.is_fix]
-        self.rows = [self._row(finding, step) for finding, step in zip(findings, steps, strict=True)]
+        self.rows = [self._create_row(finding, step) for finding, step in zip(findings, steps, strict=True)]
         for index, row in enumerate(self.rows):
             row.button.set_kind("primary" if index in fixes[:1] else "plain")
             self.pages.insert_row(index, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
-        problem_severities = [each.severity for each in self.shown if each.severity in PROBLEM_SEVERITIES]
+        problem_severities = [
+            each.severity for each in self.shown_findings if each.severity in PROBLEM_SEVERITIES
+        ]
         if problem_severities:
             self.chip.set(str(len(problem_severities)), STATUS_BY_SEVERITY[problem_severities[0]])
         elif is_done:
@@ -280,8 +282,8 @@ class DoctorPanel(PanelWidget):
         else:
             self.chip.set("", "info")
 
-    def _row(self, finding: Finding, step: NextStep | None) -> AlertRow:
-        row = AlertRow(self.theme, framed=finding.severity in PROBLEM_SEVERITIES)
+    def _create_row(self, finding: Finding, step: NextStep | None) -> AlertRow:
+        row = AlertRow(self.theme, is_framed=finding.severity in PROBLEM_SEVERITIES)
         row.set_texts(
             STATUS_BY_SEVERITY[finding.severity],
             finding.sentence,
@@ -295,11 +297,11 @@ class DoctorPanel(PanelWidget):
     # -- next steps ---------------------------------------------------------------------------------------
 
     def _next_step(self, finding: Finding) -> NextStep | None:
-        kind, _colon, rest = finding.id.partition(":")
-        if kind == "studio" and not self._shown_blockers[int(rest)].button:
+        kind, _colon, index = finding.id.partition(":")
+        if kind == "studio" and not self._shown_blockers[int(index)].button:
             return None
         if kind == "studio":
-            return NextStep(self._shown_blockers[int(rest)].button, self._shown_blockers[int(rest)].run)
+            return NextStep(self._shown_blockers[int(index)].button, self._shown_blockers[int(index)].run)
         if finding.id == "topic:near":
             text = _("Use {topic}").format(topic=finding.instead)
             return NextStep(text, lambda: self._use_topic(finding.instead))
@@ -308,14 +310,14 @@ class DoctorPanel(PanelWidget):
                 _("Call {service}").format(service=finding.instead),
                 lambda: self.context.run(f"service.call:{finding.instead}"),
             )
-        run = {
+        button = {
             "topic:closed": (_("Let other computers connect"), "network.others"),
             "topic:unreadable": (_("Show the bytes"), f"inspect:{self.session.doctor.expected_topic}"),
             "topic:name": (_("Choose a topic"), "panel:topics"),
         }.get(finding.id)
-        if run is not None:
+        if button is not None:
             return NextStep(
-                run[0], lambda: self.context.run(run[1]), is_fix=finding.severity in PROBLEM_SEVERITIES
+                button[0], lambda: self.context.run(button[1]), is_fix=finding.severity in PROBLEM_SEVERITIES
             )
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
@@ -354,14 +356,14 @@ class DoctorPanel(PanelWidget):
     def copy_report(self) -> None:
         """Copy all findings to the clipboard as a report."""
         expected_topic = self.session.doctor.expected_topic
-        about = (
+        heading = (
             _("Missing: {topic}").format(topic=topic_label(expected_topic)) + "\n" if expected_topic else ""
         )
-        QGuiApplication.clipboard().setText(about + report_text(self.shown))
+        QGuiApplication.clipboard().setText(heading + report_text(self.shown_findings))
         self.context.show_toast(_("Copied the report"))
 
     def more_actions(self) -> Sequence[QAction]:
-        return (self._copy,)
+        return (self._copy_action,)
 
 
 PANEL = Panel("doctor", lazy("Connection doctor"), "stethoscope", (), DoctorPanel)

@@ -30,8 +30,8 @@ class NetworkTable(TablePanel[Row]):
         super().__init__(context, texts, icon)
         self.networks = NetworkLine(self.theme, context.run)
         self._network_count = 0
-        self._others = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
-        self._others.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
+        self._networks_action = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
+        self._networks_action.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
 
     def has_other_networks(self) -> bool:
         """Return True if the table shows other networks in addition to Studio's own."""
@@ -45,7 +45,7 @@ class NetworkTable(TablePanel[Row]):
             self.table.fit_columns()
 
     def more_actions(self) -> list[QAction]:
-        return [*super().more_actions(), self._others]
+        return [*super().more_actions(), self._networks_action]
 
 
 class NetworkLine(QWidget):
@@ -82,6 +82,6 @@ def are_own_nodes(nodes: Iterable[str]) -> bool:
 
     On ROS, the names of nodes contain the process id. Return False if `nodes` is empty.
     """
-    process = f"{NODE_NAME}_{os.getpid()}_"
+    name_prefix = f"{NODE_NAME}_{os.getpid()}_"
     names = [name.lstrip("/") for name in nodes]
-    return bool(names) and all(name == NODE_NAME or name.startswith(process) for name in names)
+    return bool(names) and all(name == NODE_NAME or name.startswith(name_prefix) for name in names)

@@ -23,14 +23,14 @@ class NoRobotController:
         self._empty, self._title, self._text, self._actions = empty, title, text, tuple(actions)
         self._starting: tuple[str, ...] = ()
 
-    def set_starting(self, coming: tuple[str, ...]) -> None:
+    def set_starting(self, robot_names: tuple[str, ...]) -> None:
         """Set the names of the robots that are starting; call on every refresh without a robot."""
-        if coming == self._starting:
+        if robot_names == self._starting:
             return
-        self._starting = coming
-        if coming:
+        self._starting = robot_names
+        if robot_names:
             self._empty.set_texts(
-                connected_text((), coming), _("A virtual robot takes a few seconds to start.")
+                connected_text((), robot_names), _("A virtual robot takes a few seconds to start.")
             )
             self._empty.set_actions(())
         else:

@@ -26,7 +26,7 @@ class OneRobotPanel(PanelWidget):
     def __init__(self, context: PanelContext, title: str) -> None:
         super().__init__(context, title)
         self._robot = ""
-        self._shown_key: object = None  # value of `key_of` for the robot shown
+        self._shown_rebuild_key: object = None  # value of `rebuild_key` for the robot shown
         self._watch: Watch | None = None
         self._revision = -1
 
@@ -42,14 +42,14 @@ class OneRobotPanel(PanelWidget):
             self._revision = fleet.revision
             self.fleet_changed()
             link = self.robot_to_show()
-            if link is not None and self.rebuild_key(link) != self._shown_key:
+            if link is not None and self.rebuild_key(link) != self._shown_rebuild_key:
                 self.switch_to(link)
         self.refresh_robot(fleet.link(self._robot) if self._robot else None)
 
     def switch_to(self, link: RobotLink) -> None:
         """Switch to a robot and watch its topics."""
         self.dispose()
-        self._robot, self._shown_key, self._revision = (
+        self._robot, self._shown_rebuild_key, self._revision = (
             link.name,
             self.rebuild_key(link),
             self.session.fleet.revision,
@@ -89,4 +89,4 @@ class OneRobotPanel(PanelWidget):
         if self._watch is not None:
             self._watch.close()
             self._watch = None
-        self._shown_key, self._revision = None, -1
+        self._shown_rebuild_key, self._revision = None, -1

@@ -44,7 +44,7 @@ class ProblemRow(QWidget):
 
     Args:
         line: Problem with its fixes.
-        large: True for large text.
+        is_large: True for large text.
 
     Signals:
         pressed: Id of the block with the problem.
@@ -56,10 +56,10 @@ class ProblemRow(QWidget):
     fix_requested = Signal(str)
     step_requested = Signal(int)
 
-    def __init__(self, theme: Theme, line: ProblemLine, *, large: bool) -> None:
+    def __init__(self, theme: Theme, line: ProblemLine, *, is_large: bool) -> None:
         super().__init__()
         problem = line.problem
-        self._theme, self.line, self.problem, self._large = theme, line, problem, large
+        self._theme, self.line, self.problem, self._is_large = theme, line, problem, is_large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         severity = _(SEVERITY_NAMES[problem.severity])
         text = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
@@ -78,7 +78,7 @@ class ProblemRow(QWidget):
         icon = problem.icon or theme.block_icon(category)
         if problem.category:
             row.addWidget(Tile(theme, icon, category, 22))
-        kind = "bodyLarge" if large else "body"
+        kind = "bodyLarge" if is_large else "body"
         row.addWidget(PartlyBoldLabel(theme, problem.message, problem.subject, kind), 1)
         self.buttons = [self._make_fix_button(fix) for fix in line.fixes]
         for button in self.buttons:
@@ -94,7 +94,7 @@ class ProblemRow(QWidget):
         return self.hasFocus() or any(button.hasFocus() for button in self.buttons)
 
     def sizeHint(self) -> QSize:
-        size = "comfortable" if self._large else "compact"
+        size = "comfortable" if self._is_large else "compact"
         return QSize(300, max(round(self._theme.scaled(self._theme.size("row", size))), 30))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -134,29 +134,29 @@ class ProblemsPanel(PanelWidget):
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.checked = label(_("Checked as you build"), "body", role="textSecondary")
-        self.header = [self.checked]
+        self.status_label = label(_("Checked as you build"), "body", role="textSecondary")
+        self.header = [self.status_label]
         self._scroll = ScrollColumn(_("Problems"), margins=(0, 4, 0, 4))
         self._column = self._scroll.column
-        self.others = label("", "body", role="textSecondary")
-        self.others.setContentsMargins(14, 6, 8, 6)
-        self.others.hide()
-        self._column.insertWidget(0, self.others)
-        self.nothing = label(_(NO_PROBLEMS_TEXT), "bodyLarge", role="textSecondary", wrap=True)
-        self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.pages = self.make_page_stack(ContentScrollArea(self.nothing), self._scroll)
+        self.overflow_label = label("", "body", role="textSecondary")
+        self.overflow_label.setContentsMargins(14, 6, 8, 6)
+        self.overflow_label.hide()
+        self._column.insertWidget(0, self.overflow_label)
+        self.empty_label = label(_(NO_PROBLEMS_TEXT), "bodyLarge", role="textSecondary", wrap=True)
+        self.empty_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.pages = self.make_page_stack(ContentScrollArea(self.empty_label), self._scroll)
 
     def refresh(self) -> None:
         document = self.session.document
         program = document.newest_program()
         if program is None:
-            self.checked.setText(_("Checking"))
+            self.status_label.setText(_("Checking"))
             return
-        of_editor = self.session.alerts.get(not_installed.ALERT_ID)
-        if program is self._program and of_editor == self._editor_alert:
+        editor_alert = self.session.alerts.get(not_installed.ALERT_ID)
+        if program is self._program and editor_alert == self._editor_alert:
             return
-        self._program, self._editor_alert = program, of_editor
-        self.checked.setText(_("Checked as you build"))
+        self._program, self._editor_alert = program, editor_alert
+        self.status_label.setText(_("Checked as you build"))
         lines = problem_lines(
             program.problems,
             document.workspace if program.absent else {},  # parsed only if robots are missing
@@ -165,9 +165,9 @@ class ProblemsPanel(PanelWidget):
             VIRTUAL_ROBOT_MODULES,
             program.absent,
         )
-        if of_editor is not None:
-            message = f"{of_editor.title} {of_editor.detail}"
-            lines = (ProblemLine(Problem("error", None, None, of_editor.title, message), ()), *lines)
+        if editor_alert is not None:
+            message = f"{editor_alert.title} {editor_alert.detail}"
+            lines = (ProblemLine(Problem("error", None, None, editor_alert.title, message), ()), *lines)
         if lines != self._problem_lines:
             self._problem_lines = lines
             self._show(lines)
@@ -188,23 +188,25 @@ class ProblemsPanel(PanelWidget):
                 row.hide()
                 row.deleteLater()
         self.rows = [
-            rows_by_line.get(line) or self._row(line) for line in list(dict.fromkeys(lines))[:MAX_ROWS]
+            rows_by_line.get(line) or self._create_row(line) for line in list(dict.fromkeys(lines))[:MAX_ROWS]
         ]
         for index, row in enumerate(self.rows):
             self._column.insertWidget(index, row)
-        more = max(0, len(lines) - MAX_ROWS)
+        hidden_count = max(0, len(lines) - MAX_ROWS)
         text = ngettext(
-            "{count} more, shown once these are fixed", "{count} more, shown once these are fixed", more
+            "{count} more, shown once these are fixed",
+            "{count} more, shown once these are fixed",
+            hidden_count,
         )
-        self.others.setText(text.format(count=more))
-        paint.show_when(self.others, more > 0)
+        self.overflow_label.setText(text.format(count=hidden_count))
+        paint.show_when(self.overflow_label, hidden_count > 0)
         self.pages.setCurrentIndex(1 if lines else 0)
         if had_focus:  # the focus stays in the panel when the focused problem is fixed
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
         self._show_counts(lines)
 
-    def _row(self, line: ProblemLine) -> ProblemRow:
-        row = ProblemRow(self.theme, line, large=self.density == "comfortable")
+    def _create_row(self, line: ProblemLine) -> ProblemRow:
+        row = ProblemRow(self.theme, line, is_large=self.density == "comfortable")
         row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
         row.fix_requested.connect(self.context.run)
         row.step_requested.connect(lambda step: self._step_focus(row, step))

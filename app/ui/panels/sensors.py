@@ -39,7 +39,7 @@ class SensorRow(QWidget):
         self._theme, self.sensor = theme, sensor
         self.title = sensor.title[:1].upper() + sensor.title[1:]
         self.reading = ReadingText()
-        self.large = True
+        self.is_large = True
         self._last_true_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(self.title)
@@ -65,15 +65,15 @@ class SensorRow(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        min_height = ROW_HEIGHTS["comfortable" if self.large else "compact"]
+        min_height = ROW_HEIGHTS["comfortable" if self.is_large else "compact"]
         return QSize(260, max(min_height, round(self._theme.scaled(min_height))))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         rect = QRectF(self.rect()).adjusted(16, 0, -16, 0)
         middle = rect.center().y()
-        font = theme.font("bodyLarge" if self.large else "body")
-        bold = theme.font("bodyLarge" if self.large else "body")
+        font = theme.font("bodyLarge" if self.is_large else "body")
+        bold = theme.font("bodyLarge" if self.is_large else "body")
         bold.setWeight(bold.Weight.Bold)
         icon = QRectF(rect.left(), middle - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
         paint_icon(painter, icon, self.sensor.icon, theme.colour("textSecondary"))
@@ -83,12 +83,14 @@ class SensorRow(QWidget):
         value_width = max(paint.width_of(bold, self.reading.value), theme.scaled(54))
         value = QRectF(rect.right() - value_width, rect.top(), value_width, rect.height())
         paint.text_line(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
-        between = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
-        if self.reading.fraction is not None and between.width() > 30:
-            track = QRectF(between.left(), between.center().y() - 3, between.width(), BAR_HEIGHT)
+        details_rect = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
+        if self.reading.fraction is not None and details_rect.width() > 30:
+            track = QRectF(
+                details_rect.left(), details_rect.center().y() - 3, details_rect.width(), BAR_HEIGHT
+            )
             paint_bar(painter, theme, track, self.reading.fraction)
-        elif self.reading.details and between.width() > 20:
-            paint.text_line(painter, between, self.reading.details, font, theme.colour("textSecondary"))
+        elif self.reading.details and details_rect.width() > 20:
+            paint.text_line(painter, details_rect, self.reading.details, font, theme.colour("textSecondary"))
         painter.end()
 
 
@@ -130,7 +132,7 @@ class SensorsPanel(OneRobotPanel):
             row.deleteLater()
         self.rows = [SensorRow(self.theme, sensor) for sensor in _listed_sensors(link)]
         for index, row in enumerate(self.rows):
-            row.large = self.density == "comfortable"
+            row.is_large = self.density == "comfortable"
             self._column.insertWidget(index, row)
         self._fit_rows()
         self.pages.setCurrentIndex(1 if self.rows else 0)
@@ -142,11 +144,11 @@ class SensorsPanel(OneRobotPanel):
         # Scrolls by rows, so that only whole rows are visible.
         if not self.rows:
             return
-        room = self.height() - self._column.contentsMargins().top()
+        available_height = self.height() - self._column.contentsMargins().top()
         height = self.rows[0].sizeHint().height()
-        row_count = max(1, room // height)
-        below = room - row_count * height if row_count < len(self.rows) else 0
-        self._frame.setContentsMargins(0, 0, 0, max(0, below))
+        row_count = max(1, available_height // height)
+        bottom_margin = available_height - row_count * height if row_count < len(self.rows) else 0
+        self._frame.setContentsMargins(0, 0, 0, max(0, bottom_margin))
         self.pages.setMinimumHeight(height + self._column.contentsMargins().top())  # at least one whole row
         self._scroll.verticalScrollBar().setSingleStep(height)
 
@@ -160,7 +162,7 @@ class SensorsPanel(OneRobotPanel):
 
     def set_density(self, density: Density) -> None:
         for row in self.rows:
-            row.large = density == "comfortable"
+            row.is_large = density == "comfortable"
             row.updateGeometry()
         super().set_density(density)
 

@@ -39,9 +39,11 @@ def clock_text(record: SentRecord) -> str:
 
 def format_line(record: SentRecord) -> str:
     """Format a log entry as a line for the clipboard."""
-    asker = _(SENDERS[record.origin][1])
-    often = f"{group_digits(record.count)} \u00d7 " if record.count > 1 else ""
-    return " ".join(filter(None, (clock_text(record), f"[{asker}]", record.name, often + record.result_text)))
+    sender = _(SENDERS[record.origin][1])
+    count_prefix = f"{group_digits(record.count)} \u00d7 " if record.count > 1 else ""
+    return " ".join(
+        filter(None, (clock_text(record), f"[{sender}]", record.name, count_prefix + record.result_text))
+    )
 
 
 class SentPanel(PanelWidget):
@@ -70,13 +72,13 @@ class SentPanel(PanelWidget):
         self.refresh()
 
     def _make_actions(self) -> None:
-        self._copy = QAction(_("Copy"), self.table)
-        self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
-        self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        self._copy.triggered.connect(self.copy)
-        self.table.addAction(self._copy)
-        self._clear = QAction(_("Clear"), self)
-        self._clear.triggered.connect(self.clear)
+        self._copy_action = QAction(_("Copy"), self.table)
+        self._copy_action.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
+        self._copy_action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        self._copy_action.triggered.connect(self.copy)
+        self.table.addAction(self._copy_action)
+        self._clear_action = QAction(_("Clear"), self)
+        self._clear_action.triggered.connect(self.clear)
 
     def _connect(self) -> None:
         self.filter.textChanged.connect(self._rebuild)
@@ -88,8 +90,8 @@ class SentPanel(PanelWidget):
         self.table.selectionModel().currentRowChanged.connect(self._update_repeat_button)
 
     def _arrange(self) -> None:
-        below = QWidget()
-        row = QHBoxLayout(below)
+        footer = QWidget()
+        row = QHBoxLayout(footer)
         row.setContentsMargins(12, 4, 12, 4)
         row.addWidget(self.foot, 1)
         row.addWidget(self.total)
@@ -99,20 +101,20 @@ class SentPanel(PanelWidget):
         layout.setSpacing(0)
         layout.addWidget(self.table, 1)
         layout.addWidget(Separator(self.theme))
-        layout.addWidget(below)
+        layout.addWidget(footer)
         self.pages: QStackedWidget = self.make_page_stack(self.empty, page)
 
     # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         self._ticks += 1
-        if self.acting.sent.revision != self._last_revision:
+        if self.acting.sent_log.revision != self._last_revision:
             self._rebuild()
         elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._update_repeat_button()
 
     def _rebuild(self) -> None:
-        log, keywords = self.acting.sent, self.filter.text().casefold().split()
+        log, keywords = self.acting.sent_log, self.filter.text().casefold().split()
         self._last_revision = log.revision
         rows = [
             each for each in reversed(log.records) if all(keyword in _haystack(each) for keyword in keywords)
@@ -133,23 +135,23 @@ class SentPanel(PanelWidget):
         self._update_repeat_button()
 
     def _total_text(self) -> str:
-        log = self.acting.sent
+        log = self.acting.sent_log
         if log.since_s is None:
             return ""
         clock = time.strftime("%H:%M", time.localtime(log.since_s))
-        template = ngettext("{count} since {time}", "{count} since {time}", log.total)
+        template = ngettext("{count} sent since {time}", "{count} sent since {time}", log.total)
         return template.format(count=group_digits(log.total), time=clock)
 
-    def selected(self) -> SentRecord | None:
+    def selected_record(self) -> SentRecord | None:
         """Return the selected entry, or None."""
         key = self.table.selected_key()
-        return self.acting.sent.get(int(key)) if key else None
+        return self.acting.sent_log.get(int(key)) if key else None
 
     def _can_repeat(self, record: SentRecord | None) -> bool:
         return record is not None and record.resend is not None and self.acting.arming.allows(record.target)
 
     def _update_repeat_button(self) -> None:
-        self.repeat_button.setEnabled(self._can_repeat(self.selected()))
+        self.repeat_button.setEnabled(self._can_repeat(self.selected_record()))
 
     def blockers(self) -> list[Blocker]:
         filter_text = self.filter.text().strip()
@@ -159,7 +161,7 @@ class SentPanel(PanelWidget):
 
     def repeat(self) -> None:
         """Send the selected entry again. Show a confirmation if necessary, or the reason on failure."""
-        record = self.selected()
+        record = self.selected_record()
         reason = self.acting.resend(record.number) if record is not None else ""
         if reason:
             self.context.show_toast(reason)
@@ -169,7 +171,7 @@ class SentPanel(PanelWidget):
 
     def copy(self) -> None:
         """Copy the selected entry to the clipboard."""
-        record = self.selected()
+        record = self.selected_record()
         if record is not None:
             self._copy_text(format_line(record), _("Copied the line"))
 
@@ -179,7 +181,7 @@ class SentPanel(PanelWidget):
 
     def clear(self) -> None:
         """Clear the log."""
-        self.acting.sent.clear()
+        self.acting.sent_log.clear()
         self.refresh()
 
     def show_row(self, key: str) -> None:
@@ -188,7 +190,7 @@ class SentPanel(PanelWidget):
         Args:
             key: Key of the entry.
         """
-        record = self.acting.sent.get(int(key))
+        record = self.acting.sent_log.get(int(key))
         if record is None or not record.name:
             return
         if record.origin == "service":
@@ -198,7 +200,7 @@ class SentPanel(PanelWidget):
 
     def menu_of(self, key: str) -> Menu | None:
         """Return the context menu of an entry, or None if the log no longer contains the entry."""
-        record = self.acting.sent.get(int(key))
+        record = self.acting.sent_log.get(int(key))
         if record is None:
             return None
         menu = Menu(self.theme, self)
@@ -209,13 +211,15 @@ class SentPanel(PanelWidget):
             menu.addAction(self.theme.icon("repeat"), text, self.repeat).setEnabled(can_repeat)
         actions = [RowAction(_("Copy the line"), "copy", self.copy)]
         if record.text:
-            copied = _("Copied the request") if record.origin == "service" else _("Copied the message")
-            copies = _("Copy the request") if record.origin == "service" else _("Copy the message")
-            actions.append(RowAction(copies, "braces", lambda: self._copy_text(record.text, copied)))
+            toast = _("Copied the request") if record.origin == "service" else _("Copied the message")
+            copy_label = _("Copy the request") if record.origin == "service" else _("Copy the message")
+            actions.append(RowAction(copy_label, "braces", lambda: self._copy_text(record.text, toast)))
         if record.name:
             is_call = record.origin == "service"
-            shows = _("Open the service") if is_call else _("Show messages")
-            actions.append(RowAction(shows, "spline" if is_call else "list-tree", lambda: self.show_row(key)))
+            show_label = _("Open the service") if is_call else _("Show messages")
+            actions.append(
+                RowAction(show_label, "spline" if is_call else "list-tree", lambda: self.show_row(key))
+            )
         return fill_menu(menu, self.theme, actions)
 
     def _show_menu(self, key: str, position: QPoint) -> None:
@@ -227,8 +231,8 @@ class SentPanel(PanelWidget):
     # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
-        self._clear.setEnabled(bool(self.acting.sent.records))
-        return (self._clear,)
+        self._clear_action.setEnabled(bool(self.acting.sent_log.records))
+        return (self._clear_action,)
 
     def focus_filter(self) -> bool:
         self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)

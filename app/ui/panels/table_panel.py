@@ -42,7 +42,6 @@ class TableTexts:
     no_matches: str
     clear_filter_hint: str
     not_recorded: str = ""
-    """Text of the empty state while a recording is open; "" for tables that don't depend on the source."""
 
 
 class TablePanel(PanelWidget, Generic[Row]):
@@ -120,18 +119,18 @@ class TablePanel(PanelWidget, Generic[Row]):
         """Return the words of the filter. A row matches if it contains all of them."""
         return self.filter.text().casefold().split()
 
-    def show_table(self, any_rows: bool, filtered: bool) -> None:
+    def show_table(self, has_rows: bool, is_filtered: bool) -> None:
         """Show the table or the empty state.
 
         Args:
-            any_rows: True if the table has rows.
-            filtered: True if the filter is not empty; the empty state then offers to clear it.
+            has_rows: True if the table has rows.
+            is_filtered: True if the filter is not empty; the empty state then offers to clear it.
         """
-        self.pages.setCurrentIndex(0 if any_rows else 1)
-        self.doctor.setVisible(not any_rows and not filtered)
-        if any_rows:
+        self.pages.setCurrentIndex(0 if has_rows else 1)
+        self.doctor.setVisible(not has_rows and not is_filtered)
+        if has_rows:
             return
-        if filtered:
+        if is_filtered:
             texts = self._table_texts
             self.empty.set_texts(_(texts.no_matches), _(texts.clear_filter_hint), "search")
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")

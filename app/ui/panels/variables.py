@@ -109,7 +109,7 @@ COLUMNS: tuple[Column[VariableRow], ...] = (
 def rows_of(
     variables: Sequence[Variable],
     values: Mapping[str, VariableValue],
-    opened: Collection[str],
+    expanded_ids: Collection[str],
     order: Order[VariableRow],
     *,
     changed_ids: Collection[str] = (),
@@ -120,7 +120,7 @@ def rows_of(
     Args:
         variables: Variables of the behaviour.
         values: Values by variable id.
-        opened: Ids of expanded lists, which are followed by the rows of their first items.
+        expanded_ids: Ids of expanded lists, which are followed by the rows of their first items.
         order: Sort order of the variables.
         changed_ids: Ids of variables whose value has just changed.
         has_ended: True if the run has ended.
@@ -128,7 +128,11 @@ def rows_of(
     rows: list[VariableRow] = []
     variable_rows = [
         VariableRow(
-            each, values.get(each.id), each.id in opened, is_new=each.id in changed_ids, has_ended=has_ended
+            each,
+            values.get(each.id),
+            each.id in expanded_ids,
+            is_new=each.id in changed_ids,
+            has_ended=has_ended,
         )
         for each in variables
     ]
@@ -148,10 +152,10 @@ class VariablesPanel(TablePanel[VariableRow]):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, TABLE_TEXTS, "variable")
         self.clock: Callable[[], float] = time.monotonic
-        self.add = IconButton(self.theme, "plus", _("New variable"), size=26)
-        self.add.clicked.connect(lambda: context.run("variable.new"))
-        self.when = ElidedLabel("body", "textSecondary")
-        self.header = [self.when, self.filter, self.add]
+        self.add_button = IconButton(self.theme, "plus", _("New variable"), size=26)
+        self.add_button.clicked.connect(lambda: context.run("variable.new"))
+        self.status_label = ElidedLabel("body", "textSecondary")
+        self.header = [self.status_label, self.filter, self.add_button]
         self.table.horizontalHeader().hide()  # name and value need no header, and the panel is low
         self.table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.table.customContextMenuRequested.connect(self._show_menu)
@@ -163,7 +167,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         column.addWidget(self.foot)
         self.line.hide()
         self.foot.hide()
-        self._opened: set[str] = set()
+        self._expanded_ids: set[str] = set()
         self._variables: tuple[Variable, ...] = ()
         self._last_state: tuple[object, ...] = ()
         self._values: Mapping[str, VariableValue] = {}
@@ -186,16 +190,21 @@ class VariablesPanel(TablePanel[VariableRow]):
         program = document.newest_program()
         if program is None:
             return
-        mine = runs.document is document
+        is_own_run = runs.document is document
         now = self.clock()
-        values = runs.values if mine else {}
-        state = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
-        faded = [id for id, since in self._change_times_s.items() if now - since >= CHANGE_HIGHLIGHT_S]
-        for id in faded:
+        values = runs.values if is_own_run else {}
+        state = (
+            document.key,
+            program.variables,
+            runs.values_revision if is_own_run else -1,
+            is_own_run and runs.active,
+        )
+        expired_ids = [id for id, since in self._change_times_s.items() if now - since >= CHANGE_HIGHLIGHT_S]
+        for id in expired_ids:
             del self._change_times_s[id]
-        if state == self._last_state and not faded:
+        if state == self._last_state and not expired_ids:
             return
-        if state[:1] == self._last_state[:1] and mine and runs.active:
+        if state[:1] == self._last_state[:1] and is_own_run and runs.active:
             self._change_times_s.update(
                 {id: now for id, value in values.items() if self._values.get(id) != value}
             )
@@ -213,14 +222,14 @@ class VariablesPanel(TablePanel[VariableRow]):
             rows_of(
                 matches,
                 self._values,
-                self._opened,
+                self._expanded_ids,
                 self.table.order,
                 changed_ids=self._change_times_s,
                 has_ended=has_ended,
             )
         )
         self.filter.setVisible(len(self._variables) > MAX_WITHOUT_FILTER or bool(keywords))
-        self.when.setText(self._status_text(has_ended=has_ended))
+        self.status_label.setText(self._status_text(has_ended=has_ended))
         self.table.refresh_visible()
         self.show_table(bool(matches), bool(keywords))
 
@@ -229,9 +238,9 @@ class VariablesPanel(TablePanel[VariableRow]):
             return ""
         return _("Final values") if has_ended else _("Live")
 
-    def show_table(self, any_rows: bool, filtered: bool) -> None:
-        if any_rows or filtered:
-            super().show_table(any_rows, filtered)
+    def show_table(self, has_rows: bool, is_filtered: bool) -> None:
+        if has_rows or is_filtered:
+            super().show_table(has_rows, is_filtered)
             self.doctor.hide()
         else:  # the empty state does not depend on the master
             self.pages.setCurrentIndex(1)
@@ -253,13 +262,13 @@ class VariablesPanel(TablePanel[VariableRow]):
     def open_row(self, key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is not None and row.value is not None and row.value.kind == "list" and not row.item:
-            self._set_expanded(key, row.variable.id not in self._opened)
+            self._set_expanded(key, row.variable.id not in self._expanded_ids)
 
-    def _set_expanded(self, key: str, opened: bool) -> None:
+    def _set_expanded(self, key: str, is_expanded: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))
-        if row is None or (opened and row.item):
+        if row is None or (is_expanded and row.item):
             return
-        (self._opened.add if opened else self._opened.discard)(row.variable.id)
+        (self._expanded_ids.add if is_expanded else self._expanded_ids.discard)(row.variable.id)
         self.rebuild()
         self.table.select_key(VariableRow(row.variable, row.value).key)
 
@@ -275,16 +284,16 @@ class VariablesPanel(TablePanel[VariableRow]):
             return None
         menu = Menu(self.theme, self)
         runs = self.session.runs
-        running = runs.active and runs.document is self.session.document
-        for text, icon, command, possible in (
+        is_running = runs.active and runs.document is self.session.document
+        for text, icon, command, is_enabled in (
             (_("Show next to the blocks"), "eye", "variable.watch", True),
             (_("Show where it is used"), "search", "variable.find", bool(row.variable.python)),
-            (_("Change the value"), "pencil", "variable.put", running and bool(row.variable.python)),
+            (_("Change the value"), "pencil", "variable.put", is_running and bool(row.variable.python)),
             (_("Rename"), "text-cursor-input", "variable.rename", True),
             (_("Delete"), "trash-2", "variable.delete", True),
         ):
             action = QAction(self.theme.icon(icon), text, menu)
-            action.setEnabled(possible)
+            action.setEnabled(is_enabled)
             action.triggered.connect(lambda _on=False, command=command: self._run_command_for(command, key))
             menu.addAction(action)
         return menu
@@ -307,7 +316,7 @@ class _VariableTable(TableView[VariableRow]):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.selected_key()
         if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
-            self.keyboard = True
+            self.is_keyboard_navigation = True
             self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         elif key is not None and event.key() == Qt.Key.Key_F2:
             self.rename_requested.emit(key)

@@ -41,14 +41,14 @@ class DetectionBox:
     sensor_index: int = 0
 
 
-def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
+def boxes_of(detections: object, sensor_index: int = 0) -> tuple[DetectionBox, ...]:
     """Return the bounding boxes in the value of a detection sensor; malformed items are skipped.
 
     The result is empty if the value lacks the items or the size of the image.
 
     Args:
         detections: Value of the sensor.
-        kind: Index of the sensor, which selects the colour.
+        sensor_index: Index of the sensor, which selects the colour.
     """
     if not isinstance(detections, Mapping):
         return ()
@@ -64,7 +64,10 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
             area = QRectF(x / width, y / height, w / width, h / height)
             boxes.append(
                 DetectionBox(
-                    bounded_str(item.get("name", "")), _float_or_none(item.get("confidence")), area, kind
+                    bounded_str(item.get("name", "")),
+                    _float_or_none(item.get("confidence")),
+                    area,
+                    sensor_index,
                 )
             )
     return tuple(boxes)
@@ -81,10 +84,10 @@ def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
     """
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
     boxes: list[DetectionBox] = []
-    detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
-    for kind, sensor in enumerate(detecting):
+    detection_sensors = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
+    for index, sensor in enumerate(detection_sensors):
         if sensor.camera is None or sensor.camera in cameras:
-            boxes += boxes_of(link.values.get(sensor.name), kind)
+            boxes += boxes_of(link.values.get(sensor.name), index)
     return tuple(boxes)
 
 

@@ -37,14 +37,14 @@ class ClickablePicture(ZoomablePicture):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
         self._accepts_clicks = False
-        self._pressed: tuple[QPointF, PicturePoint] | None = None
+        self._pressed_point: tuple[QPointF, PicturePoint] | None = None
         self._pending_click: PicturePoint | None = None
         self._double_click_timer = QTimer(self)
         self._double_click_timer.setSingleShot(True)
         self._double_click_timer.timeout.connect(self._emit_click)
-        self.pointed: tuple[int, int] | None = None
+        self.cursor_pixel: tuple[int, int] | None = None
         """Pixel under the keyboard cursor, or None."""
-        self.marked: PicturePoint | None = None
+        self.marked_point: PicturePoint | None = None
         """Point with a mark, or None."""
         self._mark_timer = QTimer(self)
         self._mark_timer.setSingleShot(True)
@@ -56,35 +56,35 @@ class ClickablePicture(ZoomablePicture):
         return self._accepts_clicks
 
     @accepts_clicks.setter
-    def accepts_clicks(self, takes: bool) -> None:
+    def accepts_clicks(self, is_enabled: bool) -> None:
         """True if clicks are emitted. Setting another value discards a pending click."""
-        if takes != self._accepts_clicks:
-            self._accepts_clicks = takes
+        if is_enabled != self._accepts_clicks:
+            self._accepts_clicks = is_enabled
             self.discard_click()
             self._update_cursor_shape()
-            if takes:
+            if is_enabled:
                 announce(self, _(KEYBOARD_HINT))
 
     def show_mark(self, point: PicturePoint) -> None:
         """Show a mark at a point for a short time."""
-        self.marked = point
+        self.marked_point = point
         self._mark_timer.start(MARK_DURATION_MS)
         self.update()
 
     def _clear_mark(self) -> None:
-        self.marked = None
+        self.marked_point = None
         self.update()
 
     def discard_click(self) -> None:
         """Discard a pending click and the keyboard cursor."""
-        self._pressed = self._pending_click = None
+        self._pressed_point = self._pending_click = None
         self._double_click_timer.stop()
         self._clear_cursor()
 
     def clear(self) -> None:
         super().clear()
         self.discard_click()
-        self.marked = None
+        self.marked_point = None
 
     def _emit_click(self) -> None:
         point, self._pending_click = self._pending_click, None
@@ -104,8 +104,8 @@ class ClickablePicture(ZoomablePicture):
         self._emit_click()  # this press is not the second one of a double click
         super().mousePressEvent(event)
         point = self._point_at(event)
-        alone = event.buttons() == event.button()
-        self._pressed = (event.position(), point) if point is not None and alone else None
+        is_single_button = event.buttons() == event.button()
+        self._pressed_point = (event.position(), point) if point is not None and is_single_button else None
 
     def _point_at(self, event: QMouseEvent) -> PicturePoint | None:
         button, picture = BUTTON_NAMES.get(event.button()), self.picture
@@ -116,22 +116,22 @@ class ClickablePicture(ZoomablePicture):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self._clear_cursor()
-        if self._pressed is not None:
-            moved = event.position() - self._pressed[0]
-            if moved.manhattanLength() >= QApplication.startDragDistance():
-                self._pressed = None
+        if self._pressed_point is not None:
+            distance = event.position() - self._pressed_point[0]
+            if distance.manhattanLength() >= QApplication.startDragDistance():
+                self._pressed_point = None
         super().mouseMoveEvent(event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        self._pressed = None
+        self._pressed_point = None
         super().wheelEvent(event)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         super().mouseReleaseEvent(event)
         self._update_cursor_shape()
-        pressed, self._pressed = self._pressed, None
-        if pressed is not None:
-            self._pending_click = pressed[1]
+        pressed_point, self._pressed_point = self._pressed_point, None
+        if pressed_point is not None:
+            self._pending_click = pressed_point[1]
             self._double_click_timer.start(QApplication.doubleClickInterval())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
@@ -149,20 +149,20 @@ class ClickablePicture(ZoomablePicture):
             self._move_cursor(
                 -direction[0], -direction[1], LARGE_CURSOR_STEP_PX if name.startswith("Shift+") else 1
             )
-        elif name in {"Return", "Enter"} and self.pointed is not None and not event.isAutoRepeat():
+        elif name in {"Return", "Enter"} and self.cursor_pixel is not None and not event.isAutoRepeat():
             self._emit_click()
-            x, y = _clamp_to_picture(self.pointed, picture)
+            x, y = _clamp_to_picture(self.cursor_pixel, picture)
             self.clicked.emit(PicturePoint(x, y, picture.width, picture.height, picture.stamp_ns, "left"))
         else:
             super().keyPressEvent(event)
 
     def _move_cursor(self, dx: int, dy: int, count: int) -> None:
         # Directions are those on the screen. The cursor starts at the centre of the visible part.
-        if self.pointed is None:
+        if self.cursor_pixel is None:
             target = QRectF(self.rect()).center()
         else:
             step = count * max(1.0, self.scale())
-            target = self._view_position(self.pointed) + QPointF(dx * step, dy * step)
+            target = self._view_position(self.cursor_pixel) + QPointF(dx * step, dy * step)
         area = self.area()
         clamped = QPointF(
             min(max(target.x(), area.left()), area.right() - 1e-3),
@@ -171,16 +171,16 @@ class ClickablePicture(ZoomablePicture):
         pixel = self.pixel_at(clamped)
         if pixel is None:
             return
-        self.pointed = pixel
+        self.cursor_pixel = pixel
         self._scroll_to_cursor()
         self.update()
 
     def _scroll_to_cursor(self) -> None:
         # Scrolls a zoomed image so that the cursor is visible.
-        if self.pointed is None or self.placement.zoom is None:
+        if self.cursor_pixel is None or self.placement.zoom is None:
             return
         position, visible_rect = (
-            self._view_position(self.pointed),
+            self._view_position(self.cursor_pixel),
             QRectF(self.rect()).adjusted(*SCROLL_MARGINS),
         )
         dx = min(0.0, visible_rect.right() - position.x()) + max(0.0, visible_rect.left() - position.x())
@@ -194,36 +194,36 @@ class ClickablePicture(ZoomablePicture):
         if picture is None:
             return QPointF()
         x, y = _clamp_to_picture(pixel, picture)
-        share = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
-        return self.placement.to_view(self.area()).map(share)
+        fraction = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
+        return self.placement.to_view(self.area()).map(fraction)
 
     def _clear_cursor(self) -> None:
-        if self.pointed is not None:
-            self.pointed = self.mouse = None
+        if self.cursor_pixel is not None:
+            self.cursor_pixel = self.mouse_position = None
             self.update()
 
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self.pointed is not None:  # zoom, rotation or size may have moved the cursor's pixel
-            self.mouse = self._view_position(self.pointed)
+        if self.cursor_pixel is not None:  # zoom, rotation or size may have moved the cursor's pixel
+            self.mouse_position = self._view_position(self.cursor_pixel)
         super().paintEvent(event)
         if self.picture is None:
             return
-        if self.marked is not None:
+        if self.marked_point is not None:
             self._paint_cross(
-                self.placement.to_view(self.area()).map(QPointF(*self.marked.relative_position))
+                self.placement.to_view(self.area()).map(QPointF(*self.marked_point.relative_position))
             )
-        if self.pointed is not None and self._accepts_clicks:
-            self._paint_cross(self._view_position(self.pointed), ring=False)
+        if self.cursor_pixel is not None and self._accepts_clicks:
+            self._paint_cross(self._view_position(self.cursor_pixel), has_ring=False)
 
-    def _paint_cross(self, position: QPointF, *, ring: bool = True) -> None:
+    def _paint_cross(self, position: QPointF, *, has_ring: bool = True) -> None:
         # Dark below and light above, so that the mark is visible on every image.
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for colour, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
             painter.setPen(QPen(colour, width))
-            if ring:
+            if has_ring:
                 painter.drawEllipse(
                     QRectF(position.x() - RING_PX, position.y() - RING_PX, 2 * RING_PX, 2 * RING_PX)
                 )

@@ -40,14 +40,14 @@ class PicturePlacement:
         """Return the size of the rotated image in image pixels."""
         return picture.transposed() if self.rotation_deg % 180 else picture
 
-    def fit_zoom(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
+    def fit_zoom(self, view: QSizeF, picture: QSizeF, *, fills_view: bool = False) -> float:
         """Return the zoom that fits the image into the view.
 
         Args:
             view: Size of the view.
             picture: Size of the image.
-            fill: True to fill the view instead, if the shapes of view and image are similar; the edges of the
-                image are cut off.
+            fills_view: True to fill the view instead, if the shapes of view and image are similar; the edges
+                of the image are cut off.
         """
         rotated = self.rotated_size(picture)
         x_scale, y_scale = (
@@ -55,16 +55,16 @@ class PicturePlacement:
             view.height() / max(1.0, rotated.height()),
         )
         scale = min(x_scale, y_scale)
-        if fill and scale > 0 and max(x_scale, y_scale) / scale < MAX_FILL_RATIO:
+        if fills_view and scale > 0 and max(x_scale, y_scale) / scale < MAX_FILL_RATIO:
             return max(x_scale, y_scale)
         return scale
 
-    def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
+    def area(self, view: QSizeF, picture: QSizeF, *, fills_view: bool = False) -> QRectF:
         """Return the rectangle of the rotated image in the view; arguments as for `fit_zoom`.
 
         The rectangle may exceed the view. It leaves a gap only if the image is smaller than the view.
         """
-        scale = self.zoom if self.zoom is not None else self.fit_zoom(view, picture, fill=fill)
+        scale = self.zoom if self.zoom is not None else self.fit_zoom(view, picture, fills_view=fills_view)
         rotated = self.rotated_size(picture) * scale
         x, y = self.centre if self.zoom is not None else (0.5, 0.5)
         left = _offset(view.width(), rotated.width(), x)
@@ -92,30 +92,30 @@ class PicturePlacement:
         return self.orientation() * transform
 
     def to_picture(self, position: QPointF, area: QRectF) -> QPointF:
-        """Convert a point in the view to fractions of the image; below 0 or above 1 beside the image.
+        """Convert a point in the view to fractions of the image; below 0 or above 1 outside the image.
 
         Args:
             position: Point in the view.
             area: Rectangle of the rotated image in the view.
         """
-        back, _good = self.to_view(area).inverted()
-        return back.map(position)
+        inverse, _is_invertible = self.to_view(area).inverted()
+        return inverse.map(position)
 
     # -- commands of the user -----------------------------------------------------------------------------
 
     def zoom_at(self, factor: float, position: QPointF, view: QSizeF, picture: QSizeF) -> None:
         """Zoom by a factor; the image point at ``position`` (in the view) stays in place."""
         area = self.area(view, picture)
-        before = area.width() / max(1.0, self.rotated_size(picture).width())
-        smallest = min(MIN_ZOOM, self.fit_zoom(view, picture))
-        after = min(MAX_ZOOM, max(smallest, before * factor))
-        share_x = (position.x() - area.x()) / max(1e-9, area.width())
-        share_y = (position.y() - area.y()) / max(1e-9, area.height())
-        rotated = self.rotated_size(picture) * after
-        self.zoom = after
+        old_zoom = area.width() / max(1.0, self.rotated_size(picture).width())
+        min_zoom = min(MIN_ZOOM, self.fit_zoom(view, picture))
+        new_zoom = min(MAX_ZOOM, max(min_zoom, old_zoom * factor))
+        fraction_x = (position.x() - area.x()) / max(1e-9, area.width())
+        fraction_y = (position.y() - area.y()) / max(1e-9, area.height())
+        rotated = self.rotated_size(picture) * new_zoom
+        self.zoom = new_zoom
         self.centre = (
-            share_x + (view.width() / 2 - position.x()) / max(1e-9, rotated.width()),
-            share_y + (view.height() / 2 - position.y()) / max(1e-9, rotated.height()),
+            fraction_x + (view.width() / 2 - position.x()) / max(1e-9, rotated.width()),
+            fraction_y + (view.height() / 2 - position.y()) / max(1e-9, rotated.height()),
         )
         self._clamp_centre(view, picture)
 
@@ -146,14 +146,14 @@ class PicturePlacement:
         elif degrees % 360:
             self.centre = (1 - self.centre[0], 1 - self.centre[1])
 
-    def flip(self, *, horizontally: bool) -> None:
+    def flip(self, *, is_horizontal: bool) -> None:
         """Mirror the image.
 
         Args:
-            horizontally: True to mirror horizontally, False to mirror vertically.
+            is_horizontal: True to mirror horizontally, False to mirror vertically.
         """
         x, y = self.centre
-        if horizontally:
+        if is_horizontal:
             self.is_flipped_horizontally, self.centre = not self.is_flipped_horizontally, (1 - x, y)
         else:
             self.is_flipped_vertically, self.centre = not self.is_flipped_vertically, (x, 1 - y)
@@ -182,7 +182,7 @@ class PicturePlacement:
         """Restore a placement from the result of `to_json`; invalid values are ignored."""
         if not isinstance(saved, Mapping):
             return
-        zoom, centre, turned = saved.get("zoom"), saved.get("centre"), saved.get("turned")
+        zoom, centre, rotation_deg = saved.get("zoom"), saved.get("centre"), saved.get("turned")
         if isinstance(zoom, (int, float)) and not isinstance(zoom, bool) and zoom > 0:
             self.set_zoom(float(zoom))
             if (
@@ -191,16 +191,16 @@ class PicturePlacement:
                 and all(isinstance(n, (int, float)) for n in centre)
             ):
                 self.centre = (float(centre[0]), float(centre[1]))
-        if turned in {0, 90, 180, 270}:
-            self.rotation_deg = int(turned)
+        if rotation_deg in {0, 90, 180, 270}:
+            self.rotation_deg = int(rotation_deg)
         self.is_flipped_horizontally, self.is_flipped_vertically = (
             saved.get("across") is True,
             saved.get("down") is True,
         )
 
 
-def _offset(room: float, length: float, centre: float) -> float:
+def _offset(view_length: float, length: float, centre: float) -> float:
     # Offset of `length` that puts `centre` into the middle without leaving a gap.
-    if length <= room:
-        return (room - length) / 2
-    return min(0.0, max(room - length, room / 2 - centre * length))
+    if length <= view_length:
+        return (view_length - length) / 2
+    return min(0.0, max(view_length - length, view_length / 2 - centre * length))

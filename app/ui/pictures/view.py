@@ -59,13 +59,15 @@ class RateText:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._text, self._since = "", 0.0
+        self._text, self._text_changed_s = "", 0.0
 
     def for_stream(self, stream: ImageStream) -> str:
         """Return the current text for a stream."""
         text, now = rate_text(stream.displayed_hz, stream.arriving_hz), self._clock()
-        if text != self._text and (not self._text or not text or now - self._since >= STATS_INTERVAL_S):
-            self._text, self._since = text, now
+        if text != self._text and (
+            not self._text or not text or now - self._text_changed_s >= STATS_INTERVAL_S
+        ):
+            self._text, self._text_changed_s = text, now
         return self._text
 
     def clear(self) -> None:
@@ -99,16 +101,16 @@ class PictureView(QWidget):
         self,
         theme: Theme,
         *,
-        fill: bool = False,
-        labelled: bool = True,
+        fills_view: bool = False,
+        has_label: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        # `fill`: the image fills the view, without borders, if at most a tenth is cut off. If not `labelled`,
-        # a missing stream is reported in the centre.
+        # `fills_view`: the image fills the view, without borders, if at most a quarter is cut off. Without a
+        # label, a stream without new images is reported in the centre.
         super().__init__()
         self._clock = clock
         self._theme = theme
-        self._fill, self._labelled = fill, labelled
+        self._fills_view, self._has_label = fills_view, has_label
         self.placement = PicturePlacement()
         self._picture: Picture | None = None
         self._image: QImage | None = None
@@ -118,7 +120,7 @@ class PictureView(QWidget):
         self._rate = self._state = self._age = ""
         self._rates = RateText(clock)
         self._is_stale = False  # the last image is shown because no new one arrives
-        self.mouse: QPointF | None = None  # position of the mouse if it is over the image
+        self.mouse_position: QPointF | None = None  # position of the mouse if it is over the image
         self._age_updated_s = -STATS_INTERVAL_S  # time of the last update of the age
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -132,10 +134,10 @@ class PictureView(QWidget):
         picture = self._picture
         if picture is None:
             return ""
-        under = self._hovered_pixel_text()
+        hovered_pixel = self._hovered_pixel_text()
         size = "" if self._state else f"{picture.width}\u00d7{picture.height}"
         zoom = f"{round(self.scale() * 100)} %" if self.placement.zoom is not None else ""
-        details = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
+        details = (hovered_pixel, zoom) if hovered_pixel else (size, zoom, "" if self._state else self._age)
         return "  ".join(part for part in (self._state or self._rate, *details) if part)
 
     @property
@@ -166,7 +168,7 @@ class PictureView(QWidget):
         self,
         stream: ImageStream,
         boxes: tuple[DetectionBox, ...] = (),
-        drawn: Callable[[int, int], tuple[AnnotationShape, ...]] | None = None,
+        annotations_for: Callable[[int, int], tuple[AnnotationShape, ...]] | None = None,
     ) -> None:
         """Show the newest image of a stream.
 
@@ -175,9 +177,13 @@ class PictureView(QWidget):
         Args:
             stream: Stream of images.
             boxes: Bounding boxes of detections on the image.
-            drawn: Returns the annotations for an image with the given width and height; None for none.
+            annotations_for: Returns the annotations for an image of the given width and height; None for
+                none.
         """
-        previous_text, before = self.label_text, (self._boxes, self._annotations, self._is_stale, self._state)
+        previous_text, previous_state = (
+            self.label_text,
+            (self._boxes, self._annotations, self._is_stale, self._state),
+        )
         picture, displayed, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.for_stream(stream)
         now = self._clock()
@@ -208,26 +214,26 @@ class PictureView(QWidget):
             self._boxes = boxes  # boxes on a frozen image don't change
             displayed = self._picture
             self._annotations = (
-                drawn(displayed.width, displayed.height)
-                if drawn is not None and displayed is not None
+                annotations_for(displayed.width, displayed.height)
+                if annotations_for is not None and displayed is not None
                 else ()
             )
         stream.set_size(self._requested_size())
-        if (self._boxes, self._annotations, self._is_stale, self._state) != before:
+        if (self._boxes, self._annotations, self._is_stale, self._state) != previous_state:
             self.update()
         self._update_label(previous_text)
 
-    def _update_label(self, before: str) -> None:
+    def _update_label(self, previous_text: str) -> None:
         text = self.label_text
-        if text != before:
+        if text != previous_text:
             self.setAccessibleDescription(text)
-            if self._labelled:
+            if self._has_label:
                 top = self._label_top()
                 self.update(0, top, self.width(), self.height() - top)
 
     def _requested_size(self) -> tuple[int, int] | None:
         # Size of the image in screen pixels; None if all image pixels are needed.
-        if self.mouse is not None:
+        if self.mouse_position is not None:
             return None
         ratio = self.devicePixelRatioF()
         size = self.area().size() if self._picture is not None else QSizeF(self.size())
@@ -247,7 +253,7 @@ class PictureView(QWidget):
         """Return the rectangle of the rotated image, which may exceed the view; without image, the view."""
         if self._picture is None:
             return QRectF(self.rect())
-        return self.placement.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
+        return self.placement.area(QSizeF(self.size()), self.picture_size(), fills_view=self._fills_view)
 
     def scale(self) -> float:
         """Return the number of device pixels per image pixel."""
@@ -259,15 +265,15 @@ class PictureView(QWidget):
         picture = self._picture
         if picture is None:
             return None
-        share = self.placement.to_picture(position, self.area())
-        if not (-1e-9 <= share.x() < 1 and -1e-9 <= share.y() < 1):
+        fraction = self.placement.to_picture(position, self.area())
+        if not (-1e-9 <= fraction.x() < 1 and -1e-9 <= fraction.y() < 1):
             return None
-        x, y = int(share.x() * picture.width + 1e-6), int(share.y() * picture.height + 1e-6)
+        x, y = int(fraction.x() * picture.width + 1e-6), int(fraction.y() * picture.height + 1e-6)
         return min(x, picture.width - 1), min(y, picture.height - 1)
 
     def _hovered_pixel_text(self) -> str:
         picture = self._picture
-        pixel = self.pixel_at(self.mouse) if self.mouse is not None else None
+        pixel = self.pixel_at(self.mouse_position) if self.mouse_position is not None else None
         return pixel_text(*pixel, picture.pixel(*pixel)) if pixel is not None and picture is not None else ""
 
     # -- painting -----------------------------------------------------------------------------------------
@@ -275,29 +281,29 @@ class PictureView(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         area, view = self.area(), QRectF(self.rect())
-        image = self._grey_image() if self._is_stale and not self._labelled else self._image
+        image = self._grey_image() if self._is_stale and not self._has_label else self._image
         if image is None or not area.contains(view):
-            if image is None or not self._fill:
+            if image is None or not self._fills_view:
                 painter.fillRect(self.rect(), QColor("black"))
             else:
                 paint_blurred_background(painter, view, image)
         if image is not None:
             self._paint_image(painter, area, image)
-        if self._is_stale and not self._labelled:
+        if self._is_stale and not self._has_label:
             paint_stale(painter, self._theme, view, self._state)
         elif self._is_stale:
             painter.fillRect(area, QColor(90, 90, 90, 150))
         else:
-            shares = self.placement.to_view(area)
+            to_view = self.placement.to_view(area)
             for box in self._boxes:
-                paint_box(painter, self._theme, shares.mapRect(box.rect), box)
+                paint_box(painter, self._theme, to_view.mapRect(box.rect), box)
             if self._annotations:
                 paint_annotations(
-                    painter, self._theme, shares, self.scale() / self.devicePixelRatioF(), self._annotations
+                    painter, self._theme, to_view, self.scale() / self.devicePixelRatioF(), self._annotations
                 )
-        if self._labelled and self._picture is not None and self._picture.scale is not None:
+        if self._has_label and self._picture is not None and self._picture.scale is not None:
             paint_colour_bar(painter, self._theme, view, self._picture.scale)
-        if self._labelled and self.label_text:
+        if self._has_label and self.label_text:
             self._paint_label(painter)
         painter.end()
 
@@ -307,8 +313,8 @@ class PictureView(QWidget):
         return self._grey
 
     def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
-        smooth = self.scale() < MIN_SHARP_SCALE
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        is_smooth = self.scale() < MIN_SHARP_SCALE
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, is_smooth)
         placement = self.placement
         if (
             not placement.rotation_deg
@@ -360,16 +366,16 @@ def paint_stale(painter: QPainter, theme: Theme, view: QRectF, text: str) -> Non
     painter.fillRect(view, STALE_DIM_COLOUR)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)
-    line = paint.height_of(font)
-    with_icon = view.height() >= ICON_SIZE + line + 12
+    line_height = paint.height_of(font)
+    has_icon = view.height() >= ICON_SIZE + line_height + 12
     middle = view.center()
-    if with_icon:
+    if has_icon:
         icon_rect = QRectF(0, 0, ICON_SIZE, ICON_SIZE)
-        icon_rect.moveCenter(QPointF(middle.x(), middle.y() - line / 2 - 2))
+        icon_rect.moveCenter(QPointF(middle.x(), middle.y() - line_height / 2 - 2))
         paint_icon(painter, icon_rect, "camera", QColor("white"))
-    top = middle.y() + ICON_SIZE / 2 - line / 2 + 4 if with_icon else middle.y() - line / 2
-    room = QRectF(view.left() + 8, top, view.width() - 16, line + 2)
-    paint.text_line(painter, room, text, font, QColor("white"), paint.CENTRE)
+    top = middle.y() + ICON_SIZE / 2 - line_height / 2 + 4 if has_icon else middle.y() - line_height / 2
+    text_rect = QRectF(view.left() + 8, top, view.width() - 16, line_height + 2)
+    paint.text_line(painter, text_rect, text, font, QColor("white"), paint.CENTRE)
 
 
 def _age_text(age_s: float | None) -> str:

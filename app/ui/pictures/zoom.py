@@ -122,11 +122,11 @@ class ZoomablePicture(PictureView):
             step = event.position() - self._drag_position
             self._drag_position = event.position()
             self.move_by(step.x(), step.y())
-        self.mouse = event.position()
+        self.mouse_position = event.position()
         self.update()
 
     def leaveEvent(self, _event: object) -> None:
-        self.mouse = None
+        self.mouse_position = None
         self.update()
 
 

@@ -43,9 +43,9 @@ def wrap_text(text: str, metrics: QFontMetricsF, width: float) -> list[str]:
     """Wrap a text to a width in px; words that are too long are split."""
     lines = [""]
     for word in text.split():
-        tried = f"{lines[-1]} {word}".strip()
-        if metrics.horizontalAdvance(tried) <= width:
-            lines[-1] = tried
+        candidate = f"{lines[-1]} {word}".strip()
+        if metrics.horizontalAdvance(candidate) <= width:
+            lines[-1] = candidate
             continue
         for piece in _split_word(word, metrics, width):
             if lines[-1]:
@@ -104,20 +104,20 @@ def paint_bubble(
         occupied: Rectangles of other bubbles, which are covered only if there is no free space.
     """
     gap, caption = 31.0 * head.scale, state.caption
-    room_right, room_left = bounds.right() - MARGIN - head.u - gap, head.u - gap - bounds.left() - MARGIN
-    face = QFont(font)
-    face.setWeight(QFont.Weight.DemiBold)
-    face.setPixelSize(LARGE_FONT_PX)
+    space_right, space_left = bounds.right() - MARGIN - head.u - gap, head.u - gap - bounds.left() - MARGIN
+    text_font = QFont(font)
+    text_font.setWeight(QFont.Weight.DemiBold)
+    text_font.setPixelSize(LARGE_FONT_PX)
     width = min(SHORT_WIDTH, bounds.width() - 2 * MARGIN)
-    lines = wrap_text(caption, QFontMetricsF(face), width - 2 * PADDING)
+    lines = wrap_text(caption, QFontMetricsF(text_font), width - 2 * PADDING)
     if len(lines) > SHORT_LINES:
-        face.setPixelSize(SMALL_FONT_PX)
-        max_room = max(
-            room_right, room_left
+        text_font.setPixelSize(SMALL_FONT_PX)
+        max_space = max(
+            space_right, space_left
         )  # narrower and higher, so that the bubble doesn't cover the face
-        width = min(max(MIN_WIDTH, max_room), LONG_WIDTH, bounds.width() - 2 * MARGIN)
-        lines = wrap_text(caption, QFontMetricsF(face), width - 2 * PADDING)
-    metrics = QFontMetricsF(face)
+        width = min(max(MIN_WIDTH, max_space), LONG_WIDTH, bounds.width() - 2 * MARGIN)
+        lines = wrap_text(caption, QFontMetricsF(text_font), width - 2 * PADDING)
+    metrics = QFontMetricsF(text_font)
     line_height = metrics.height() + 1
     max_lines = int((bounds.height() - 2 * MARGIN - 30) / line_height)
     text = scroll_to_spoken(
@@ -125,10 +125,10 @@ def paint_bubble(
     )
     width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * PADDING
     height = text.visible_count * line_height + 18
-    side = -1.0 if room_left > room_right and room_right < width else 1.0
+    side = -1.0 if space_left > space_right and space_right < width else 1.0
 
-    def box_at(towards: float) -> QRectF:
-        left = head.u + gap if towards > 0 else head.u - gap - width
+    def box_at(bubble_side: float) -> QRectF:
+        left = head.u + gap if bubble_side > 0 else head.u - gap - width
         left = min(
             max(left, bounds.left() + MARGIN), max(bounds.left() + MARGIN, bounds.right() - MARGIN - width)
         )
@@ -136,13 +136,13 @@ def paint_bubble(
 
     side, box = _pick_box([(side, box_at(side)), (-side, box_at(-side))], occupied, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
-    p.setFont(face)
+    p.setFont(text_font)
     p.setPen(QColor("#1C1B19"))
-    scrolls = text.visible_count < len(lines)
-    for number, line in enumerate(text.visible_lines):
-        line_rect = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
+    is_scrolled = text.visible_count < len(lines)
+    for index, line in enumerate(text.visible_lines):
+        line_rect = QRectF(box.left(), box.top() + 9 + index * line_height, width, line_height)
         p.drawText(line_rect, Qt.AlignmentFlag.AlignCenter, line)
-    if scrolls:
+    if is_scrolled:
         _paint_scroll_thumb(p, box, text)
     return box
 
@@ -152,8 +152,8 @@ def _pick_box(
 ) -> tuple[float, QRectF]:
     # Tries places without overlap first, then below other bubbles, then the one with the smallest overlap.
     def covered_area(candidate: tuple[float, QRectF]) -> float:
-        common = [candidate[1].intersected(other) for other in occupied]
-        return sum(each.width() * each.height() for each in common)
+        overlaps = [candidate[1].intersected(other) for other in occupied]
+        return sum(each.width() * each.height() for each in overlaps)
 
     tops = [other.bottom() + MARGIN for other in occupied]
     lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in candidates]

@@ -19,7 +19,7 @@ TABLE_SPOT = Spot(315.0, 239.0, (239.0 - HORIZON) / UNIT_SCALE_DEPTH)
 
 
 def _paint_table(p: QPainter, spot: Spot) -> None:
-    # Painted at its position in the design and translated from there.
+    # Painted with the coordinates of `TABLE_SPOT`, and transformed from there to `spot`.
     p.save()
     p.translate(spot.u, spot.v)
     p.scale(spot.scale / TABLE_SPOT.scale, spot.scale / TABLE_SPOT.scale)
@@ -47,18 +47,21 @@ def _paint_table(p: QPainter, spot: Spot) -> None:
 def _paint_shelf(p: QPainter, area: QRectF) -> None:
     # Lower than a real table, so that the window stays visible.
     p.fillRect(area, QColor("#8B6644"))
-    edge = area.width() * 0.07
-    inner = area.adjusted(edge, edge, -edge, -edge * 0.6)
+    frame_width = area.width() * 0.07
+    inner = area.adjusted(frame_width, frame_width, -frame_width, -frame_width * 0.6)
     p.fillRect(inner, QColor("#6B4A2F"))
     board = inner.height() / 2
     for row in range(2):
         bottom = inner.top() + board * (row + 1)
-        p.fillRect(QRectF(inner.left(), bottom - edge * 0.7, inner.width(), edge * 0.7), QColor("#9E7654"))
-        x = inner.left() + edge * 0.6
+        p.fillRect(
+            QRectF(inner.left(), bottom - frame_width * 0.7, inner.width(), frame_width * 0.7),
+            QColor("#9E7654"),
+        )
+        x = inner.left() + frame_width * 0.6
         for index, colour in enumerate(BOOK_COLOURS[row]):
-            width, height = edge * (1.5 + index % 2 * 0.5), board * (0.62 + 0.09 * (index * 2 % 3))
-            p.fillRect(QRectF(x, bottom - edge * 0.7 - height, width, height), QColor(colour))
-            x += width + edge * 0.25
+            width, height = frame_width * (1.5 + index % 2 * 0.5), board * (0.62 + 0.09 * (index * 2 % 3))
+            p.fillRect(QRectF(x, bottom - frame_width * 0.7 - height, width, height), QColor(colour))
+            x += width + frame_width * 0.25
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
@@ -77,8 +80,13 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
         r = max(4.0, (thing.size_m or BALL_M) * 110.0 * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
     if thing.kind == "table":
-        share = spot.scale / TABLE_SPOT.scale
-        return QRectF(spot.u - 53 * share, spot.v - 61 * share, 106 * share, 61 * share)
+        relative_scale = spot.scale / TABLE_SPOT.scale
+        return QRectF(
+            spot.u - 53 * relative_scale,
+            spot.v - 61 * relative_scale,
+            106 * relative_scale,
+            61 * relative_scale,
+        )
     width = max(10.0, min(thing.size_m or CARD_M, CARD_M * 0.8) * UNITS_PER_M * spot.scale)
     return QRectF(spot.u - width / 2, spot.v - 78 * spot.scale - width * 0.6, width, width * 1.2)
 
@@ -126,9 +134,9 @@ def _paint_ball(p: QPainter, area: QRectF, colour: QColor) -> None:
     p.setBrush(QBrush(colour))
     p.drawEllipse(area)
     p.setBrush(Qt.BrushStyle.NoBrush)
-    shine = QPen(QColor(255, 255, 255, 190), max(1.0, r * 0.16))
-    shine.setCapStyle(Qt.PenCapStyle.RoundCap)
-    p.setPen(shine)
+    highlight_pen = QPen(QColor(255, 255, 255, 190), max(1.0, r * 0.16))
+    highlight_pen.setCapStyle(Qt.PenCapStyle.RoundCap)
+    p.setPen(highlight_pen)
     inner = area.adjusted(r * 0.18, r * 0.18, -r * 0.18, -r * 0.18)
     p.drawArc(inner, 50 * 16, 92 * 16)
 
@@ -172,5 +180,5 @@ def _paint_marker_card(p: QPainter, area: QRectF) -> None:
     for row, bits in enumerate((0b1010, 0b0110, 0b1001, 0b1110)):
         for column in range(4):
             if bits >> column & 1:
-                white = QRectF(left + cell * (column + 1), top + cell * (row + 1), cell, cell)
-                p.fillRect(white, QColor("#FBFAF7"))
+                cell_rect = QRectF(left + cell * (column + 1), top + cell * (row + 1), cell, cell)
+                p.fillRect(cell_rect, QColor("#FBFAF7"))

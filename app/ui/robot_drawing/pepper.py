@@ -36,13 +36,13 @@ class ProjectedArm:
         side: "left" or "right".
         shoulder: Position of the shoulder.
         hand: Position of the hand.
-        front: Depth of the shoulder from -1 (back) to 1 (front).
+        depth: Depth of the shoulder from -1 (back) to 1 (front).
     """
 
     side: str
     shoulder: QPointF
     hand: QPointF
-    front: float
+    depth: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +97,12 @@ def project_arms(state: RobotState) -> tuple[ProjectedArm, ProjectedArm]:
 
 
 def _project_arm(side: str, sign: int, raised_deg: float, heading: float) -> ProjectedArm:
-    out = sign * math.pi / 2 + heading
-    raised = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
-    shoulder = QPointF(SHOULDER_X * math.sin(out), SHOULDER_Y)
-    projection = math.cos(ARM_PLANE_RAD) * math.sin(out) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
-    hand = shoulder + QPointF(ARM_LENGTH * math.sin(raised) * projection, ARM_LENGTH * math.cos(raised))
-    return ProjectedArm(side, shoulder, hand, math.cos(out))
+    azimuth = sign * math.pi / 2 + heading
+    angle = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
+    shoulder = QPointF(SHOULDER_X * math.sin(azimuth), SHOULDER_Y)
+    projection = math.cos(ARM_PLANE_RAD) * math.sin(azimuth) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
+    hand = shoulder + QPointF(ARM_LENGTH * math.sin(angle) * projection, ARM_LENGTH * math.cos(angle))
+    return ProjectedArm(side, shoulder, hand, math.cos(azimuth))
 
 
 def paint_pepper(p: QPainter, state: RobotState) -> None:
@@ -113,7 +113,7 @@ def paint_pepper(p: QPainter, state: RobotState) -> None:
     p.setBrush(QColor(50, 42, 40, 118))
     p.drawEllipse(QPointF(0, 0), 52, 10.8)
     for arm in arms:
-        if arm.front < -0.08:
+        if arm.depth < -0.08:
             _paint_arm(p, arm, state)
     _paint_base(p)
     _paint_torso(p, heading)
@@ -124,12 +124,12 @@ def paint_pepper(p: QPainter, state: RobotState) -> None:
     p.fillRect(QRectF(-6, -122, 12, 10), QColor(NECK))
     _paint_head(p, state, heading + math.radians(state.head_yaw_deg))
     for arm in arms:
-        if arm.front >= -0.08:
+        if arm.depth >= -0.08:
             _paint_arm(p, arm, state)
 
 
-def _shading_brush(half: float) -> QBrush:
-    gradient = QLinearGradient(-half, 0, half, 0)
+def _shading_brush(half_width: float) -> QBrush:
+    gradient = QLinearGradient(-half_width, 0, half_width, 0)
     gradient.setColorAt(0.0, QColor("#E9EDF4"))
     gradient.setColorAt(0.34, QColor(WHITE))
     gradient.setColorAt(0.55, QColor("#F4F6FA"))
@@ -156,17 +156,21 @@ def _paint_base(p: QPainter) -> None:
 
 
 def _paint_torso(p: QPainter, heading: float) -> None:
-    half = math.hypot(27.5 * math.cos(heading), 23.0 * math.sin(heading))
+    half_width = math.hypot(27.5 * math.cos(heading), 23.0 * math.sin(heading))
     body = QPainterPath(QPointF(0, -115.6))
-    body.cubicTo(QPointF(half * 0.55, -115.6), QPointF(half, -106), QPointF(half, -86))
-    body.cubicTo(QPointF(half, -78), QPointF(half * 0.98, -72), QPointF(half * 0.94, -65.2))
-    body.cubicTo(QPointF(half * 0.6, -60.5), QPointF(-half * 0.6, -60.5), QPointF(-half * 0.94, -65.2))
-    body.cubicTo(QPointF(-half * 0.98, -72), QPointF(-half, -78), QPointF(-half, -86))
-    body.cubicTo(QPointF(-half, -106), QPointF(-half * 0.55, -115.6), QPointF(0, -115.6))
+    body.cubicTo(QPointF(half_width * 0.55, -115.6), QPointF(half_width, -106), QPointF(half_width, -86))
+    body.cubicTo(QPointF(half_width, -78), QPointF(half_width * 0.98, -72), QPointF(half_width * 0.94, -65.2))
+    body.cubicTo(
+        QPointF(half_width * 0.6, -60.5),
+        QPointF(-half_width * 0.6, -60.5),
+        QPointF(-half_width * 0.94, -65.2),
+    )
+    body.cubicTo(QPointF(-half_width * 0.98, -72), QPointF(-half_width, -78), QPointF(-half_width, -86))
+    body.cubicTo(QPointF(-half_width, -106), QPointF(-half_width * 0.55, -115.6), QPointF(0, -115.6))
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(120, 130, 155, 40))
-    p.drawEllipse(QPointF(0, -61.8), half * 0.72, 3.0)
-    p.fillPath(body, _shading_brush(half))
+    p.drawEllipse(QPointF(0, -61.8), half_width * 0.72, 3.0)
+    p.fillPath(body, _shading_brush(half_width))
 
 
 def _paint_tablet(p: QPainter, heading: float) -> None:
@@ -179,9 +183,9 @@ def _paint_tablet(p: QPainter, heading: float) -> None:
     p.drawRoundedRect(QRectF(-17.5, -12.5, 35, 25), 2.6, 2.6)
     p.setBrush(QColor("#2F4FD0"))
     p.drawRoundedRect(QRectF(-15.4, -10.4, 30.8, 20.8), 1.2, 1.2)
-    letter = QPen(QColor(WHITE), 2.1, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
-    letter.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
-    p.setPen(letter)
+    logo_pen = QPen(QColor(WHITE), 2.1, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
+    logo_pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    p.setPen(logo_pen)
     points = ((-7, 3.8), (-7, -3.8), (7, 3.8), (7, -3.8))
     p.drawPolyline(QPolygonF([QPointF(x, y) for x, y in points]))
     p.restore()
@@ -201,8 +205,8 @@ def _paint_back(p: QPainter, heading: float) -> None:
 
 
 def _paint_arm(p: QPainter, arm: ProjectedArm, state: RobotState) -> None:
-    edge = QPen(QColor(LIMB_EDGE), ARM_WIDTH + 0.9, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
-    p.setPen(edge)
+    outline_pen = QPen(QColor(LIMB_EDGE), ARM_WIDTH + 0.9, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
+    p.setPen(outline_pen)
     p.drawLine(QLineF(arm.shoulder, arm.hand))
     p.setPen(QPen(QColor(LIMB), ARM_WIDTH, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     p.drawLine(QLineF(arm.shoulder, arm.hand))
@@ -210,7 +214,7 @@ def _paint_arm(p: QPainter, arm: ProjectedArm, state: RobotState) -> None:
     p.setBrush(QColor(HAND_WHITE))
     p.drawEllipse(arm.hand, HAND_RADIUS, HAND_RADIUS)
     p.setPen(Qt.PenStyle.NoPen)
-    if arm.front > -0.5:
+    if arm.depth > -0.5:
         p.setBrush(QColor(JOINT))
         p.drawEllipse(arm.shoulder, 8.4, 8.4)
         # Seen from the front, the light is where the shoulder faces the viewer, so that it is never hidden.

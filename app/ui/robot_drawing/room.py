@@ -1,7 +1,7 @@
 """Room of the virtual robots: projection from metres to pixels, and painting of wall, window and floor.
 
 The colours belong to the illustration, not to the theme; a dark theme dims them. Lengths are in stage units:
-the stage is 382 x 286 units large, the size of the panel in px in the design at 1440 x 900.
+the stage is 382 x 286 units large, which is the size of the panel in px in a window of 1440 x 900 px.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from app.ui.robot_drawing.state import RoomBounds
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
 BACK, FRONT = 178.0, 280.0  # vertical positions of things at the far wall, and nearest to the viewer
-UNIT_SCALE_DEPTH = 250.6 - HORIZON  # vertical position of the robot in the design, where the scale is 1
+UNIT_SCALE_DEPTH = 250.6 - HORIZON  # distance below the horizon at which the scale of things is 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +86,11 @@ class Stage:
         """Convert a point in px to a floor point in m, limited to the room."""
         unit = self.to_units(point)
         room = self.room
-        share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
-        scale = (BACK + (FRONT - BACK) * share - HORIZON) / UNIT_SCALE_DEPTH
+        depth_fraction = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
+        scale = (BACK + (FRONT - BACK) * depth_fraction - HORIZON) / UNIT_SCALE_DEPTH
         side = _clamp((unit.x() - WIDTH / 2) / _half_width(scale), -1.0, 1.0)
         return (
-            room.x_min + share**2 * (room.x_max - room.x_min),
+            room.x_min + depth_fraction**2 * (room.x_max - room.x_min),
             room.y_min + (side + 1) / 2 * (room.y_max - room.y_min),
         )
 

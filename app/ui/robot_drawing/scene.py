@@ -32,13 +32,13 @@ class Marks:
     """Outlined parts of the drawing, as returned by `RobotDrawing.part_at`.
 
     Attributes:
-        hovered: Part under the mouse, or None.
-        selected: Part selected by keyboard, or None.
+        hovered_part: Part under the mouse, or None.
+        selected_part: Part selected by keyboard, or None.
         colour: Colour of the outline.
     """
 
-    hovered: str | None = None
-    selected: str | None = None
+    hovered_part: str | None = None
+    selected_part: str | None = None
     colour: QColor = field(default_factory=lambda: QColor("#3F7CB3"))
 
 
@@ -67,7 +67,7 @@ class RobotDrawing:
         others: OtherRobots = (),
         *,
         marks: Marks = NO_MARKS,
-        dark: bool = False,
+        is_dark: bool = False,
     ) -> None:
         """Paint the room with its objects and robots.
 
@@ -77,20 +77,20 @@ class RobotDrawing:
             state: State of the main robot.
             others: Names and states of the other robots.
             marks: Outlined parts.
-            dark: True to dim the colours for a dark theme.
+            is_dark: True to dim the colours for a dark theme.
         """
         stage = Stage(area, state.room)
         painter.save()
         painter.setClipRect(area)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self._paint_room(painter, stage, dark)
+        self._paint_room(painter, stage, is_dark)
         painter.translate(stage.origin)
         painter.scale(stage.scale, stage.scale)
         figures = _figures(stage, state, others)
         _paint_reach(painter, figures[0].spot, state)
-        drawn: list[tuple[Spot, Thing | Figure]] = [*_placed_things(stage, state)]
-        drawn += [(figure.spot, figure) for figure in reversed(figures)]
-        for spot, item in sorted(drawn, key=lambda pair: pair[0].v):
+        items: list[tuple[Spot, Thing | Figure]] = [*_placed_things(stage, state)]
+        items += [(figure.spot, figure) for figure in reversed(figures)]
+        for spot, item in sorted(items, key=lambda pair: pair[0].v):
             if isinstance(item, Thing):
                 paint_thing(painter, item, spot, self._font)
             else:
@@ -104,7 +104,7 @@ class RobotDrawing:
                 bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
                 bubbles.append(bubble)
         painter.restore()
-        if dark:
+        if is_dark:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
     def part_at(
@@ -162,12 +162,12 @@ class RobotDrawing:
         """Return the centre of a part (see `part_at`) in px, or None if there is no such part."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            small = figure.state.figure == TURTLE_FIGURE
+            is_turtle = figure.state.figure == TURTLE_FIGURE
             part_positions = (
-                {} if small else {f"{limb.side}_hand": limb.hand for limb in project_arms(figure.state)}
+                {} if is_turtle else {f"{limb.side}_hand": limb.hand for limb in project_arms(figure.state)}
             )
             part_positions |= (
-                {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
+                {"body": TOP_CENTRE} if is_turtle else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
             )
             for name, position in part_positions.items():
                 if part == figure.part_name(name):
@@ -185,7 +185,7 @@ class RobotDrawing:
         areas = {figure.part_name("body"): figure.area for figure in _figures(stage, state, others)}
         for spot, thing in _placed_things(stage, state):
             areas[thing.name or thing.kind] = thing_area(thing, spot)
-        for part, width in ((marks.hovered, 1.4), (marks.selected, 2.4)):
+        for part, width in ((marks.hovered_part, 1.4), (marks.selected_part, 2.4)):
             area = areas.get(part or "")
             if area is not None:
                 p.setBrush(Qt.BrushStyle.NoBrush)
@@ -193,21 +193,21 @@ class RobotDrawing:
                     p.setPen(QPen(colour, pen_width))
                     p.drawRoundedRect(area.adjusted(-4, -4, 4, 4), 6, 6)
 
-    def _paint_room(self, painter: QPainter, stage: Stage, dark: bool) -> None:
+    def _paint_room(self, painter: QPainter, stage: Stage, is_dark: bool) -> None:
         area = stage.area
         ratio = painter.device().devicePixelRatio()
-        key = (area.width(), area.height(), ratio, dark)
+        key = (area.width(), area.height(), ratio, is_dark)
         if self._room is None or key != self._room_key:
             size = QSize(max(1, round(area.width() * ratio)), max(1, round(area.height() * ratio)))
             self._room = QPixmap(size)
             self._room.setDevicePixelRatio(ratio)
             self._room.fill(QColor("#C4AA87"))  # shows through at antialiased edges
-            room = QPainter(self._room)
-            room.setRenderHint(QPainter.RenderHint.Antialiasing)
-            room.translate(stage.origin - area.topLeft())
-            room.scale(stage.scale, stage.scale)
-            paint_room(room, stage.bounds())
-            room.end()
+            room_painter = QPainter(self._room)
+            room_painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            room_painter.translate(stage.origin - area.topLeft())
+            room_painter.scale(stage.scale, stage.scale)
+            paint_room(room_painter, stage.bounds())
+            room_painter.end()
             self._room_key = key
         painter.drawPixmap(area.topLeft(), self._room)
 
@@ -216,12 +216,12 @@ def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     # Sorted from back to front; people in front of the robot are marks on the floor.
     pairs = []
     for thing in state.objects:
-        before = thing.kind in {"person", "face"} and thing.x > state.x
-        drawn_thing = replace(thing, kind="place") if before else thing
+        is_in_front = thing.kind in {"person", "face"} and thing.x > state.x
+        drawn_thing = replace(thing, kind="place") if is_in_front else thing
         spot = stage.spot_at(thing.x, thing.y)
-        half = thing_area(drawn_thing, spot).width() / 2
+        half_width = thing_area(drawn_thing, spot).width() / 2
         # keeps things at a side wall completely visible
-        clamped_u = min(max(spot.u, half + 4), WIDTH - half - 4)
+        clamped_u = min(max(spot.u, half_width + 4), WIDTH - half_width - 4)
         pairs.append((replace(spot, u=clamped_u), drawn_thing))
     return sorted(pairs, key=lambda pair: pair[0].v)
 
@@ -251,13 +251,15 @@ class Figure:
     @property
     def area(self) -> QRectF:
         """Bounding rectangle in stage units."""
-        large = QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE_FIGURE else QRectF(-42, -62, 84, 78)
+        bounds = (
+            QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE_FIGURE else QRectF(-42, -62, 84, 78)
+        )
         scale = self.spot.scale
         return QRectF(
-            self.spot.u + large.x() * scale,
-            self.spot.v + large.y() * scale,
-            large.width() * scale,
-            large.height() * scale,
+            self.spot.u + bounds.x() * scale,
+            self.spot.v + bounds.y() * scale,
+            bounds.width() * scale,
+            bounds.height() * scale,
         )
 
 
@@ -268,8 +270,8 @@ def _figures(stage: Stage, state: RobotState, others: OtherRobots) -> list[Figur
 
 def _paint_figure(p: QPainter, figure: Figure) -> None:
     p.save()
-    lifted = 9.0 if figure.state.is_lifted else 0.0
-    p.translate(figure.spot.u, figure.spot.v - lifted)
+    lift_offset = 9.0 if figure.state.is_lifted else 0.0
+    p.translate(figure.spot.u, figure.spot.v - lift_offset)
     p.scale(figure.spot.scale, figure.spot.scale)
     (paint_turtle if figure.state.figure == TURTLE_FIGURE else paint_pepper)(p, figure.state)
     p.restore()

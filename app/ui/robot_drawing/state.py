@@ -10,7 +10,7 @@ from nep.text import bounded_str
 
 DEFAULT_EYE_COLOUR = "#35B0FA"
 DEFAULT_SHOULDER_COLOUR = "#3AB5FF"
-MAX_HEARD_CHARS = 200  # characters
+MAX_HEARD_CHARS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +104,8 @@ class RobotState:
     @property
     def caption(self) -> str:
         """Text of the speech bubble: the spoken text, and the sound such as ``♪ bell``; "" for no bubble."""
-        played = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
-        return " ".join(each for each in (self.speech or "", played) if each)
+        sound_text = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
+        return " ".join(each for each in (self.speech or "", sound_text) if each)
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:

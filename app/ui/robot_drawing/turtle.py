@@ -43,15 +43,18 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
     _paint_mast(p, heading)
 
 
-def point_on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
+def point_on_body(azimuth: float, radius_fraction: float = 1.0, height: float = 0.0) -> QPointF:
     """Return the position of a point on the body.
 
     Args:
         azimuth: Azimuth in rad; 0 faces the viewer.
-        share: Distance from the axis as a fraction of the radius.
+        radius_fraction: Distance from the axis as a fraction of the radius.
         height: Vertical position; negative is up.
     """
-    return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
+    return QPointF(
+        RADIUS * radius_fraction * math.sin(azimuth),
+        RADIUS * radius_fraction * FLAT * math.cos(azimuth) + height,
+    )
 
 
 def bumper_side_at(point: QPointF, theta_deg: float) -> str:
@@ -68,11 +71,11 @@ def bumper_side_at(point: QPointF, theta_deg: float) -> str:
         return "front"
     if along > 0:  # near edge of the deck and drum below it: counts as the side that faces the viewer
         along = math.sqrt(max(0.0, 1.0 - across * across))
-    aside = math.degrees(math.atan2(across, along)) - theta_deg
-    aside = (aside + 180.0) % 360.0 - 180.0
-    if abs(aside) <= FRONT_DEG:
+    angle_deg = math.degrees(math.atan2(across, along)) - theta_deg
+    angle_deg = (angle_deg + 180.0) % 360.0 - 180.0
+    if abs(angle_deg) <= FRONT_DEG:
         return "front"
-    return "back" if abs(aside) > BACK_DEG else "left" if aside > 0 else "right"
+    return "back" if abs(angle_deg) > BACK_DEG else "left" if angle_deg > 0 else "right"
 
 
 def _paint_wheel(p: QPainter, azimuth: float) -> None:
@@ -81,11 +84,11 @@ def _paint_wheel(p: QPainter, azimuth: float) -> None:
     middle = point_on_body(azimuth, 0.98, -WHEEL_RADIUS + 1.5)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(RUBBER))
-    thick = 5.0 * abs(math.sin(azimuth)) + 1.0
+    thickness = 5.0 * abs(math.sin(azimuth)) + 1.0
     box = QRectF(
-        middle.x() - half_width - thick / 2,
+        middle.x() - half_width - thickness / 2,
         middle.y() - WHEEL_RADIUS,
-        2 * half_width + thick,
+        2 * half_width + thickness,
         2 * WHEEL_RADIUS,
     )
     p.drawRoundedRect(box, min(box.width() / 2, WHEEL_RADIUS), WHEEL_RADIUS)
@@ -108,33 +111,33 @@ def _paint_body(p: QPainter, state: RobotState) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QBrush(gradient))
     p.drawPath(drum)
-    ring = QColor(state.eyes)
-    ring.setAlpha(235)
+    ring_colour = QColor(state.eyes)
+    ring_colour.setAlpha(235)
     p.setBrush(Qt.BrushStyle.NoBrush)
-    p.setPen(QPen(ring, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+    p.setPen(QPen(ring_colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
     p.drawArc(QRectF(-RADIUS, LOW - 4 - flat, 2 * RADIUS, 2 * flat), 180 * 16, 180 * 16)
 
 
-def _paint_bumper(p: QPainter, heading: float, bumped: str) -> None:
-    # An arc around the visible front; the touching side is amber.
+def _paint_bumper(p: QPainter, heading: float, pressed_bumper: str) -> None:
+    # An arc around the visible front. The pressed side is amber; all sides are if the front is pressed.
     sides = {"left": (18.0, 70.0), "front": (-18.0, 18.0), "right": (-70.0, -18.0)}
     for side, (first, last) in sides.items():
         shape = QPainterPath()
-        drawn = False
+        is_drawing = False
         for step in range(9):
             azimuth = heading + math.radians(first + (last - first) * step / 8)
             if math.cos(azimuth) < -0.05:
-                drawn = False
+                is_drawing = False
                 continue
             point = point_on_body(azimuth, 1.05, LOW + 2)
-            if drawn:
+            if is_drawing:
                 shape.lineTo(point)
             else:
                 shape.moveTo(point)
-            drawn = True
-        hit = bumped in {side, "front"} if side != "front" else bumped == "front"
+            is_drawing = True
+        is_pressed = pressed_bumper in {side, "front"} if side != "front" else pressed_bumper == "front"
         p.setBrush(Qt.BrushStyle.NoBrush)
-        colour = QColor("#FFB300") if hit else QColor(RUBBER)
+        colour = QColor("#FFB300") if is_pressed else QColor(RUBBER)
         p.setPen(QPen(colour, 4.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         p.drawPath(shape)
 
@@ -169,14 +172,14 @@ def _paint_mast(p: QPainter, heading: float) -> None:
     base, top = QPointF(0, HIGH - 1), QPointF(0, MAST_TOP + 6)
     p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     p.drawLine(base, top)
-    half = 10.5 - 2.5 * abs(math.sin(heading))
+    half_width = 10.5 - 2.5 * abs(math.sin(heading))
     p.setPen(QPen(QColor("#9AA2B4"), 0.8))
     p.setBrush(QColor("#E9EDF4"))
-    p.drawRoundedRect(QRectF(-half, MAST_TOP - 7, 2 * half, 14), 4.5, 4.5)
-    towards = math.cos(heading)
-    if towards > -0.2:
-        eye = QPointF(half * 0.85 * math.sin(heading), MAST_TOP)
-        radius_x = max(1.4, 5.0 * max(0.0, towards))
+    p.drawRoundedRect(QRectF(-half_width, MAST_TOP - 7, 2 * half_width, 14), 4.5, 4.5)
+    facing = math.cos(heading)
+    if facing > -0.2:
+        eye = QPointF(half_width * 0.85 * math.sin(heading), MAST_TOP)
+        radius_x = max(1.4, 5.0 * max(0.0, facing))
         p.setPen(Qt.PenStyle.NoPen)
         p.setBrush(QColor("#1B1E2A"))
         p.drawEllipse(eye, radius_x, 5.0)

@@ -50,11 +50,13 @@ class ClosedTab:
     Args:
         document: Document of the tab.
         message: Text for the toast, or "" if nothing was saved.
-        earlier: Previous version of the file, or None if no file was overwritten.
+        earlier_version: Previous version of the file, or None if no file was overwritten.
     """
 
-    def __init__(self, document: Document, message: str = "", earlier: SavedVersion | None = None) -> None:
-        self.message, self.earlier = message, earlier
+    def __init__(
+        self, document: Document, message: str = "", earlier_version: SavedVersion | None = None
+    ) -> None:
+        self.message, self.earlier_version = message, earlier_version
         self.workspace = document.workspace
         self.stamp = stamp_of(document.path) if document.path is not None else None
 
@@ -120,16 +122,16 @@ class DocumentController:
         listed in an alert.
         """
         self._session.alerts.resolve("strange")
-        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHER_SUFFIXES}]
+        unknown_files = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHER_SUFFIXES}]
         for path in paths:
             if path.suffix.lower() == SUFFIX:
                 self.open(path)
-        for kind, show in ((LAYOUT, self.open_layout), (RECORDING, self.open_recording)):
-            for path in [each for each in paths if each.suffix.lower() == kind][-1:]:  # only one is shown
-                show(path)
-        if strange:
+        for suffix, open_file in ((LAYOUT, self.open_layout), (RECORDING, self.open_recording)):
+            for path in [each for each in paths if each.suffix.lower() == suffix][-1:]:  # only one is shown
+                open_file(path)
+        if unknown_files:
             self._raise_alert(
-                unknown_type_text(strange), "file.open", _("Open another file"), alert="strange"
+                unknown_type_text(unknown_files), "file.open", _("Open another file"), alert="strange"
             )
 
     def open_example(self, path: Path) -> None:
@@ -203,8 +205,8 @@ class DocumentController:
 
         The toast has an Undo button.
         """
-        before, old = document.name, document.path
-        if name.strip() == before:
+        old_name, old_path = document.name, document.path
+        if name.strip() == old_name:
             return True
         try:
             self._documents.rename(document, name)
@@ -212,13 +214,13 @@ class DocumentController:
             self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
             return False
         self._session.tabs.save()
-        if old is not None and document.path is not None:
+        if old_path is not None and document.path is not None:
             try:
-                self._session.settings.rename_recent(old, document.path)
+                self._session.settings.rename_recent(old_path, document.path)
             except SettingsError as error:
                 self._session.console.add("warn", "studio", str(error))
-        message = _("Renamed {name} to {other}").format(name=before, other=document.name)
-        self._show_toast(message, _("Undo"), lambda: self.rename(document, before))
+        message = _("Renamed {name} to {other}").format(name=old_name, other=document.name)
+        self._show_toast(message, _("Undo"), lambda: self.rename(document, old_name))
         return True
 
     def move(self, document: Document, position: int) -> None:
@@ -307,7 +309,7 @@ class DocumentController:
             try:
                 save_version(current_path)
             except DocumentError as error:
-                message = _("No earlier versions: {error}").format(error=error)
+                message = _("Can't keep the earlier version: {error}").format(error=error)
                 self._session.console.add("warn", "studio", message)
         return None, ""
 
@@ -341,35 +343,38 @@ class DocumentController:
         message = _("Saved {name}") if path is not None else _("Closed {name}. You'll find it under Recent.")
         return ClosedTab(document, message.format(name=name), earlier)
 
-    def _notify_closed(self, closed: Sequence[ClosedTab]) -> None:
+    def _notify_closed(self, closed_tabs: Sequence[ClosedTab]) -> None:
         # Shows a toast that names the saved behaviours and offers undo.
-        if not closed:
+        if not closed_tabs:
             return
-        message = closed[0].message
-        if len(closed) > 1:
-            message = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed))
-            message = message.format(count=len(closed))
-        back = [each for each in closed if each.earlier is not None]
-        if back:
-            self._show_toast(message, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
+        message = closed_tabs[0].message
+        if len(closed_tabs) > 1:
+            message = ngettext("Saved {count} behaviour", "Saved {count} behaviours", len(closed_tabs))
+            message = message.format(count=len(closed_tabs))
+        restorable_tabs = [each for each in closed_tabs if each.earlier_version is not None]
+        if restorable_tabs:
+            self._show_toast(
+                message, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(restorable_tabs))
+            )
         else:
             self._show_toast(message)
 
-    def _undo_close(self, closed: Sequence[ClosedTab]) -> None:
+    def _undo_close(self, closed_tabs: Sequence[ClosedTab]) -> None:
         # Restores the files, and reopens the tabs with unsaved work.
-        for tab in closed:
-            if tab.earlier is None:
+        for tab in closed_tabs:
+            if tab.earlier_version is None:
                 continue
-            if stamp_of(tab.earlier.path) != tab.stamp:
-                name = _("{name} (previous version)").format(name=tab.earlier.path.stem)
-                self._documents.copy(tab.earlier.copy, name)  # the file was changed since then
+            if stamp_of(tab.earlier_version.path) != tab.stamp:
+                name = _("{name} (previous version)").format(name=tab.earlier_version.path.stem)
+                self._documents.copy(tab.earlier_version.copy, name)  # the file was changed since then
                 continue
-            opened = self._documents.find_by_path(tab.earlier.path)  # reopened before "Undo" was pressed
-            tab.earlier.restore()
-            if opened is not None:
-                opened.on_file_reverted()
+            # the user may have reopened the tab before pressing "Undo"
+            reopened_document = self._documents.find_by_path(tab.earlier_version.path)
+            tab.earlier_version.restore()
+            if reopened_document is not None:
+                reopened_document.on_file_reverted()
             else:
-                self._documents.open(tab.earlier.path).apply_edit(tab.workspace)
+                self._documents.open(tab.earlier_version.path).apply_edit(tab.workspace)
 
     def _add_recent(self, path: Path, name: str | None = None) -> None:
         try:
@@ -431,35 +436,35 @@ class FlushBeforeClose(QObject):
     """
 
     def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
-        # `close` is called once if `ready` had to wait.
+        # `close` is called once if `can_close` had to wait.
         super().__init__(parent)
         self._editor, self._close = editor, close
-        self._is_requested = self._ready = self._is_waiting = False
+        self._is_requested = self._is_ready = self._is_waiting = False
 
-    def ready(self) -> bool:
+    def can_close(self) -> bool:
         """Return True if the window can be closed now.
 
         The first call requests the pending edit. If it returns False, the window is closed when the
         edit has arrived.
         """
         if not self._is_requested:
-            self._is_requested, self._ready = True, False
+            self._is_requested, self._is_ready = True, False
             editor = self._editor()
             if isinstance(editor, SupportsFlush):
                 editor.flush(self._on_flushed)
             else:
-                self._ready = True
-            self._is_waiting = not self._ready
+                self._is_ready = True
+            self._is_waiting = not self._is_ready
             if self._is_waiting:
                 QTimer.singleShot(MAX_FLUSH_MS, self, self._on_flushed)
-        return self._ready
+        return self._is_ready
 
     def reset(self) -> None:
         """Reset the state after closing the window was cancelled."""
-        self._is_requested = self._ready = self._is_waiting = False
+        self._is_requested = self._is_ready = self._is_waiting = False
 
     def _on_flushed(self) -> None:
-        self._ready = True
+        self._is_ready = True
         if self._is_waiting:
             self._is_waiting = False
             QTimer.singleShot(0, self, self._close)

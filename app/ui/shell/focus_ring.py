@@ -55,10 +55,10 @@ class FocusRing(QWidget):
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
         self._theme = theme
-        self._home = self._window = window
+        self._main_window = self._window = window
         set_keyboard_navigation(False)
         self._target: QWidget | None = None
-        self._chain: list[QWidget] = []
+        self._watched_widgets: list[QWidget] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -82,8 +82,8 @@ class FocusRing(QWidget):
             window.installEventFilter(self)
 
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
-        pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
-        if pressed or not is_keyboard_navigation() or new is None or not self._accepts_ring(new):
+        is_mouse_pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
+        if is_mouse_pressed or not is_keyboard_navigation() or new is None or not self._accepts_ring(new):
             self._set_target(None)
             return
         if new.window() is not self._window:
@@ -93,8 +93,8 @@ class FocusRing(QWidget):
 
     def _accepts_ring(self, widget: QWidget) -> bool:
         window = widget.window()
-        is_own_window = window is self._home or (
-            isinstance(window, QDockWidget) and self._home.isAncestorOf(window)
+        is_own_window = window is self._main_window or (
+            isinstance(window, QDockWidget) and self._main_window.isAncestorOf(window)
         )
         if not is_own_window or widget is window or widget.property("ownFocus"):
             return False
@@ -105,10 +105,10 @@ class FocusRing(QWidget):
         return not isinstance(widget, excluded_types)
 
     def _set_target(self, target: QWidget | None) -> None:
-        for widget in self._chain:
+        for widget in self._watched_widgets:
             if isValid(widget):  # the focus also changes when a widget is deleted
                 widget.removeEventFilter(self)
-        self._chain = []
+        self._watched_widgets = []
         self._target = target
         if target is None:
             self.hide()
@@ -116,7 +116,7 @@ class FocusRing(QWidget):
         step: QWidget | None = target
         while step is not None and step is not self._window:
             step.installEventFilter(self)
-            self._chain.append(step)
+            self._watched_widgets.append(step)
             step = step.parentWidget()
         self._reposition()
 
@@ -135,8 +135,8 @@ class FocusRing(QWidget):
                 QTimer.singleShot(
                     0, self, self._show_at_focus
                 )  # after the key had a chance to move the focus
-        elif kind == QEvent.Type.Show and watched is self._home:
-            self._window_changed(self._home.windowHandle())
+        elif kind == QEvent.Type.Show and watched is self._main_window:
+            self._window_changed(self._main_window.windowHandle())
         elif kind in _GEOMETRY_EVENTS:
             self._reposition()
         return super().eventFilter(watched, event)
@@ -151,12 +151,13 @@ class FocusRing(QWidget):
             self.hide()
             return
         inset = int(target.property("focusInset") or 0)
-        out = self._theme.size("focusRing", "offset") + self._theme.size("focusRing", "width") - inset
-        rect = QRect(target.mapTo(self._window, QPoint(0, 0)), target.size()).adjusted(-out, -out, out, out)
+        outset = self._theme.size("focusRing", "offset") + self._theme.size("focusRing", "width") - inset
+        target_rect = QRect(target.mapTo(self._window, QPoint(0, 0)), target.size())
+        rect = target_rect.adjusted(-outset, -outset, outset, outset)
         visible_rect = rect
-        for widget in self._chain[1:]:
-            scroller = widget.parentWidget()
-            if isinstance(scroller, QAbstractScrollArea) and scroller.viewport() is widget:
+        for widget in self._watched_widgets[1:]:
+            scroll_area = widget.parentWidget()
+            if isinstance(scroll_area, QAbstractScrollArea) and scroll_area.viewport() is widget:
                 view = QRect(widget.mapTo(self._window, QPoint(0, 0)), widget.size())
                 visible_rect = visible_rect.intersected(view)
         self.setGeometry(rect)
@@ -176,15 +177,15 @@ class FocusRing(QWidget):
             return
         width = self._theme.size("focusRing", "width")
         radius = int(self._target.property("focusRadius") or self._theme.radius("small"))
-        outside = radius + width + self._theme.size("focusRing", "offset")
+        outer_radius = radius + width + self._theme.size("focusRing", "offset")
         painter = QPainter(self)
-        paint.box(painter, QRectF(self.rect()), outside, None, self._theme.colour("focus"), width)
+        paint.box(painter, QRectF(self.rect()), outer_radius, None, self._theme.colour("focus"), width)
         painter.end()
 
 
 def _moves_focus(event: QKeyEvent) -> bool:
     # Tab, arrows, F6, and Ctrl+1 to Ctrl+9, which focus a panel.
-    to_panel = _Key.Key_1 <= event.key() <= _Key.Key_9
+    is_panel_key = _Key.Key_1 <= event.key() <= _Key.Key_9
     return event.key() in _NAVIGATION_KEYS or (
-        to_panel and event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        is_panel_key and event.modifiers() == Qt.KeyboardModifier.ControlModifier
     )

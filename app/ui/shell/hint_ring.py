@@ -10,7 +10,7 @@ from shiboken6 import isValid
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 
-RING_OFFSET, HALO = 5, 5
+RING_OFFSET, HALO_WIDTH = 5, 5
 CORNER_RADIUS = 12
 POLL_MS = 100
 TIMEOUT_MS = 15_000
@@ -80,8 +80,9 @@ class HintRing(QWidget):
             self.clear()
             return
         inset = int(target.property("focusInset") or 0)
-        out = RING_OFFSET + HALO - inset
-        geometry = QRect(target.mapTo(self._window, QPoint()), target.size()).adjusted(-out, -out, out, out)
+        outset = RING_OFFSET + HALO_WIDTH - inset
+        target_rect = QRect(target.mapTo(self._window, QPoint()), target.size())
+        geometry = target_rect.adjusted(-outset, -outset, outset, outset)
         if geometry != self.geometry():
             self.setGeometry(geometry)
         self.show()
@@ -92,6 +93,8 @@ class HintRing(QWidget):
         halo = self._theme.colour("accent")
         halo.setAlphaF(0.28)
         rect = QRectF(self.rect())
-        paint.box(painter, rect.adjusted(0.5, 0.5, -0.5, -0.5), CORNER_RADIUS + HALO, None, halo, HALO)
-        paint.box(painter, rect.adjusted(HALO, HALO, -HALO, -HALO), CORNER_RADIUS, None, accent, 2)
+        halo_rect = rect.adjusted(0.5, 0.5, -0.5, -0.5)
+        ring_rect = rect.adjusted(HALO_WIDTH, HALO_WIDTH, -HALO_WIDTH, -HALO_WIDTH)
+        paint.box(painter, halo_rect, CORNER_RADIUS + HALO_WIDTH, None, halo, HALO_WIDTH)
+        paint.box(painter, ring_rect, CORNER_RADIUS, None, accent, 2)
         painter.end()

@@ -23,7 +23,7 @@ class PanelFocus(QObject):
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._on_focus_changed)
 
-    def next(self, step: int) -> None:
+    def focus_next(self, step: int) -> None:
         """Focus another visible panel by its offset from the focused one, wrapping around.
 
         Args:
@@ -69,20 +69,20 @@ class PanelFocus(QObject):
         focus = QApplication.focusWidget()
         if focus is None:
             return False
-        skipped = False
+        has_skipped = False
         for stop in tab_stops(window, focus, forward=forward):
             if not isinstance(stop, QTabBar) and not self._is_covered(stop):
-                if skipped:
+                if has_skipped:
                     reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
                     stop.setFocus(reason)
-                return skipped
-            skipped = True
+                return has_skipped
+            has_skipped = True
         return False
 
     def _is_covered(self, widget: QWidget) -> bool:
         bench = self._bench()
         docks = bench.docks.values() if bench is not None else ()
-        return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
+        return any(dock.isAncestorOf(widget) and not dock.is_front for dock in docks)
 
     def focused_dock(self) -> Dock | None:
         """Return the dock that contains the focused widget, or None."""
@@ -96,9 +96,9 @@ class PanelFocus(QObject):
         if new is None or bench is None:
             return
         for dock in bench.docks.values():
-            has = _contains(dock, new)
-            dock.title.set_active(has)
-            if has:
+            has_focus = _contains(dock, new)
+            dock.title.set_active(has_focus)
+            if has_focus:
                 bench.record_use(dock)
 
 

@@ -154,7 +154,7 @@ class MainWindow(QMainWindow):
         self.banner.setParent(middle)  # in no layout, because it floats over the free area of a bar
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
-        self.question_card = QuestionCard(theme, self, self.session.runs.asking.answer)
+        self.question_card = QuestionCard(theme, self, self.session.runs.open_question.answer)
         self.permission_card = MotionPermissionCard(
             theme, self, self.session.fleet.permission, self.log_problem
         )
@@ -188,7 +188,7 @@ class MainWindow(QMainWindow):
 
     def _update_shortcut_texts(self) -> None:
         shortcuts = self.commands.shortcuts
-        self.bar.search.show_key(shortcuts.first("palette.open"))
+        self.bar.search.show_key(shortcuts.first_shortcut("palette.open"))
         shortcuts.update_tooltips()
 
     def _page_changed(self) -> None:
@@ -293,12 +293,12 @@ class MainWindow(QMainWindow):
     def preload_steps(self) -> list[Callable[[], object]]:
         """Return functions that create in advance the panels of layouts not opened yet, one panel each."""
 
-        def make(layout: Layout, name: str) -> None:
+        def create(layout: Layout, name: str) -> None:
             if not self._is_closed and layout.name not in self.benches:
                 self._prepared_benches[layout.name] = bench = self._new_bench(layout)
                 bench.preload(name)
 
-        return [partial(make, layout, name) for layout in LAYOUTS for name in layout.default_panels]
+        return [partial(create, layout, name) for layout in LAYOUTS for name in layout.default_panels]
 
     def show_placeholder(self, layout: str) -> None:
         """Show the bars of a layout, and a placeholder until `show_layout` creates its workbench."""
@@ -399,7 +399,7 @@ class MainWindow(QMainWindow):
         if self._half_ticks % 2 or not self._has_double_rate:
             self.tick()
         elif self.bench is not None:
-            self.bench.refresh(pictures=True)
+            self.bench.refresh(video_only=True)
         self.tools.on_half_tick()
 
     def _update_source(self) -> None:
@@ -414,10 +414,10 @@ class MainWindow(QMainWindow):
         now = self._clock()
         for bench in self.benches.values():
             bench.update_suspension(now)
-        twice = self.bench is not None and self.bench.shows_video()
-        if twice != self._has_double_rate:
-            self._has_double_rate, self._half_ticks = twice, 1
-            self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
+        needs_double_rate = self.bench is not None and self.bench.shows_video()
+        if needs_double_rate != self._has_double_rate:
+            self._has_double_rate, self._half_ticks = needs_double_rate, 1
+            self.timer.setInterval(TICK_MS // 2 if needs_double_rate else TICK_MS)
 
     def tick(self) -> None:
         """Process pending changes of the session and refresh the visible parts of the window."""
@@ -437,18 +437,20 @@ class MainWindow(QMainWindow):
         with guarded(lazy("show panels")):
             if self.bench is not None:
                 self.bench.refresh()
-        spent = (time.perf_counter() - start_s) * 1000
-        self._status_formatter.window_ms += 0.1 * (spent - self._status_formatter.window_ms)
+        duration_ms = (time.perf_counter() - start_s) * 1000
+        self._status_formatter.refresh_ms += 0.1 * (duration_ms - self._status_formatter.refresh_ms)
 
     def _show_session(self) -> None:
         view = self.session.runs.view()
         text, status = robots_chip(self.session)
         self.bar.show_robots(text, status)
         self.toast.refresh()
-        self.question_card.show_question(self.session.runs.asking.question, paused=view.state == "paused")
+        self.question_card.show_question(
+            self.session.runs.open_question.question, paused=view.state == "paused"
+        )
         if self.current_layout == START_PAGE:
             self.bar.stop.show_state(
-                _(view.stop_label), ring=view.state == "stopping", filled=self._may_move()
+                _(view.stop_label), has_ring=view.state == "stopping", is_filled=self._may_move()
             )
             is_connected = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
             self.start.show_robot(text if is_connected else "", status)
@@ -498,7 +500,7 @@ class MainWindow(QMainWindow):
                 formatter.recording(),
                 formatter.flight_recorder(),
                 formatter.displayed_messages(),
-                formatter.window(),
+                formatter.refresh_duration(),
             )
             if self.session.replay is not None:
                 left = (alerts, *formatter.replayed_recording(), web)
@@ -507,7 +509,7 @@ class MainWindow(QMainWindow):
                     formatter.flight_recorder(),
                     formatter.live_network_note(),
                     formatter.master(),
-                    formatter.window(),
+                    formatter.refresh_duration(),
                 )
             self.status.show_entries(left, right)
         title = (
@@ -519,14 +521,15 @@ class MainWindow(QMainWindow):
             self.setWindowTitle(title)
 
     def _is_moving(self) -> bool:
-        moves = {"busy", STOPPING}
-        return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
+        moving_states = {"busy", STOPPING}
+        links = self.session.fleet.links
+        return self.session.runs.active or any(link.state in moving_states for link in links)
 
     def _may_move(self) -> bool:
         # Also True for a robot that hasn't confirmed Stop.
-        is_open = self.session.runs.view().stop_label != "Stop"
+        is_stop_pending = self.session.runs.view().stop_label != "Stop"
         return (
-            is_open
+            is_stop_pending
             or self._is_moving()
             or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
         )
@@ -571,7 +574,7 @@ class MainWindow(QMainWindow):
         if not self._is_closed:
             if self._is_moving():
                 self.session.runs.stop()  # sent now, so that replies can arrive while the session closes
-            if not self._flush_before_close.ready():
+            if not self._flush_before_close.can_close():
                 event.ignore()
                 return
             if not self._may_discard_work():
@@ -581,7 +584,7 @@ class MainWindow(QMainWindow):
                 return
             self._is_closed = True
             self.timer.stop()
-            with log_errors("keep how the window looks"):
+            with log_errors("save the state of the window"):
                 self._save_state()
             self.hide()
             for bench in (*self.benches.values(), *self._prepared_benches.values()):
@@ -592,11 +595,11 @@ class MainWindow(QMainWindow):
 
     def _may_discard_work(self) -> bool:
         # True if no unsaved work would be lost, or the user has confirmed the loss.
-        unkept = self.session.documents.retry_journals()
-        if not unkept or self.session.confirm_discard(unkept[0]):
+        documents = self.session.documents.retry_journals()
+        if not documents or self.session.confirm_discard(documents[0]):
             return True
         self.show_layout("behaviour")
-        self.session.documents.show(unkept[0])
+        self.session.documents.show(documents[0])
         self.toast.show_toast(
             _(
                 "Can't close Studio: this behaviour can't be backed up. Save it, or close again to discard "

@@ -41,8 +41,8 @@ class StopKeys(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in _EVENT_TYPES and isinstance(event, QKeyEvent):
-            pressed = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
-            if pressed in self._keys():
+            key = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
+            if key in self._keys():
                 event.accept()
                 if event.type() == QEvent.Type.KeyPress and not event.isAutoRepeat():
                     self._stop()

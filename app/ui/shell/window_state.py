@@ -66,10 +66,10 @@ class WindowState:
             data = base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
             return False
-        restored = bool(data) and window.restoreGeometry(QByteArray(data))
+        is_restored = bool(data) and window.restoreGeometry(QByteArray(data))
         if window.isFullScreen():  # only the robot's room uses full screen, and it isn't shown at startup
             window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
-        return restored
+        return is_restored
 
     def save_geometry(self, window: QMainWindow) -> None:
         """Save position and size of the window."""

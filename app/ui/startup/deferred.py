@@ -25,14 +25,14 @@ class DeferredSteps(QObject):
         # follows.
         super().__init__(window)
         self._window, self._steps = window, deque(steps)
-        self.began = False
+        self.has_started = False
         """True once the window was painted or the time limit has passed."""
         self._idle_timer = QTimer(self)
         self._idle_timer.timeout.connect(self._run_step)
-        self._deadline = QTimer(self)
-        self._deadline.setSingleShot(True)
-        self._deadline.timeout.connect(self._start)
-        self._deadline.start(MAX_DELAY_MS)
+        self._deadline_timer = QTimer(self)
+        self._deadline_timer.setSingleShot(True)
+        self._deadline_timer.timeout.connect(self._start)
+        self._deadline_timer.start(MAX_DELAY_MS)
         window.installEventFilter(self)
 
     def prepend(self, steps: Sequence[Callable[[], object]]) -> None:
@@ -45,9 +45,9 @@ class DeferredSteps(QObject):
         return False
 
     def _start(self) -> None:
-        if not self.began:
-            self.began = True
-            self._deadline.stop()
+        if not self.has_started:
+            self.has_started = True
+            self._deadline_timer.stop()
             self._window.removeEventFilter(self)
             self._idle_timer.start(0)
 
@@ -58,10 +58,10 @@ class DeferredSteps(QObject):
         step = self._steps.popleft()
         try:
             step()
-        except Exception:  # noqa: BLE001  it fails again, and is reported, where it is used
+        except Exception:  # noqa: BLE001  the failure is repeated and reported at the first use
             _log.exception("a deferred step failed")
 
     @property
-    def done(self) -> bool:
+    def is_done(self) -> bool:
         """True if no step is pending."""
         return not self._steps

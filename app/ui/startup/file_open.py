@@ -30,11 +30,11 @@ class FileDropFilter(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
         if kind in DROP_EVENTS:
-            dropped = cast("QDropEvent | QDragMoveEvent", event)
-            paths = paths_of(dropped.mimeData())
+            drop_event = cast("QDropEvent | QDragMoveEvent", event)
+            paths = paths_of(drop_event.mimeData())
             if not paths:
                 return False
-            dropped.acceptProposedAction()
+            drop_event.acceptProposedAction()
             if kind == QEvent.Type.Drop:
                 self._handler(paths)
             return True
@@ -52,7 +52,7 @@ class Application(QApplication):
     def __init__(self, arguments: Sequence[str]) -> None:
         super().__init__(list(arguments))
         self._handler: Callable[[Sequence[Path]], object] | None = None
-        self._waiting: list[Path] = []
+        self._pending_paths: list[Path] = []
 
     def set_file_opener(self, handler: Callable[[Sequence[Path]], object]) -> None:
         """Set the function that opens files, and call it with the files that have arrived before.
@@ -61,14 +61,14 @@ class Application(QApplication):
             handler: Called with the paths.
         """
         self._handler = handler
-        waiting, self._waiting = self._waiting, []
-        if waiting:
-            handler(waiting)
+        paths, self._pending_paths = self._pending_paths, []
+        if paths:
+            handler(paths)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.FileOpen and (name := cast("QFileOpenEvent", event).file()):
             if self._handler is None:
-                self._waiting.append(Path(name))
+                self._pending_paths.append(Path(name))
             else:
                 self._handler([Path(name)])
             return True
@@ -85,6 +85,6 @@ class Application(QApplication):
         )
 
 
-def paths_of(dropped: QMimeData) -> list[Path]:
+def paths_of(mime_data: QMimeData) -> list[Path]:
     """Return the paths of local files in drag-and-drop data."""
-    return [Path(url.toLocalFile()) for url in dropped.urls() if url.isLocalFile()]
+    return [Path(url.toLocalFile()) for url in mime_data.urls() if url.isLocalFile()]

@@ -24,7 +24,7 @@ GPU_DEVICE_PATTERNS = (
 """Patterns for the device files of GPUs on Linux, including WSL and single-board computers."""
 FALLBACK_ADAPTERS = ("Microsoft Basic Display", "Microsoft Basic Render")
 """Prefixes of the names of Windows' fallback graphics adapters."""
-_ATTACHED = 0x1
+_ATTACHED_TO_DESKTOP = 0x1
 
 
 def use_software_renderer(
@@ -68,16 +68,16 @@ def adapters() -> list[str]:
             _fields_ = (
                 ("size", ctypes.c_uint32),
                 ("name", ctypes.c_wchar * 32),
-                ("words", ctypes.c_wchar * 128),
+                ("description", ctypes.c_wchar * 128),
                 ("state", ctypes.c_uint32),
                 ("id", ctypes.c_wchar * 128),
                 ("key", ctypes.c_wchar * 128),
             )
 
-        device, number = Device(), 0
+        device, index = Device(), 0
         device.size = ctypes.sizeof(device)
-        while ctypes.windll.user32.EnumDisplayDevicesW(None, number, ctypes.byref(device), 0):
-            number += 1
-            if device.state & _ATTACHED:
-                names.append(device.words)
+        while ctypes.windll.user32.EnumDisplayDevicesW(None, index, ctypes.byref(device), 0):
+            index += 1
+            if device.state & _ATTACHED_TO_DESKTOP:
+                names.append(device.description)
     return names

@@ -25,7 +25,11 @@ SWITCH_INTERVAL_S = 0.0005
 FREEZE_DELAY_MS = 1000
 COLLECT_INTERVAL_MS = 250
 NEW_OBJECTS_THRESHOLD, COLLECTIONS_THRESHOLD = 10_000, 20
-"""Thresholds: new objects for a collection of generation 0, and collections for one of the next older."""
+"""Thresholds as in `gc.set_threshold`.
+
+These are the number of new objects for a collection of generation 0, and the number of collections for a
+collection of the next older generation.
+"""
 
 
 def shorten_switch_interval() -> None:

@@ -47,7 +47,7 @@ _log = logging.getLogger("qt")
 
 
 def quiet_chromium(environ: MutableMapping[str, str]) -> None:
-    """Disable Chromium's log, unless the flags in the environment configure it."""
+    """Limit Chromium's log to fatal messages, unless the flags in the environment configure it."""
     flags = environ.get(FLAGS_VARIABLE, "")
     if "--log-level" not in flags and "--enable-logging" not in flags:
         environ[FLAGS_VARIABLE] = f"{flags} {QUIET_FLAG}".strip()
@@ -93,14 +93,14 @@ class ConsoleHandler(logging.Handler):
             level = "error" if filtered.levelno >= logging.ERROR else "warn"
             self._records.append((level, filtered.name.partition(".")[0], filtered.getMessage()))
 
-    def drain(self, add: Callable[[str, str, str], object]) -> None:
+    def drain(self, add_record: Callable[[str, str, str], object]) -> None:
         """Remove the stored records and pass them to a function, oldest first.
 
         Args:
-            add: Called with level ("warn" or "error"), origin and text of each record.
+            add_record: Called with level ("warn" or "error"), origin and text of each record.
         """
         while self._records:
-            add(*self._records.popleft())
+            add_record(*self._records.popleft())
 
 
 class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
@@ -142,7 +142,7 @@ def install_handlers() -> ConsoleHandler:
     root = logging.getLogger()
     if not root.handlers:
         root.addHandler(TerminalHandler(sys.stderr))
-    log = ConsoleHandler()
-    root.addHandler(log)
+    console_handler = ConsoleHandler()
+    root.addHandler(console_handler)
     root.addHandler(faults.LogFile(faults.log_folder()))
-    return log
+    return console_handler

@@ -20,7 +20,7 @@ from app.ui.startup.qt_log import FLAGS_VARIABLE
 
 NO_NAMESPACES_FLAG = "--disable-namespace-sandbox"
 DISABLE_VARIABLE = "QTWEBENGINE_DISABLE_SANDBOX"
-NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
+CLONE_NEWUSER, CLONE_NEWPID = 0x10000000, 0x20000000
 EMPTY_ROOT = b"/proc/self/fdinfo"
 """Root folder of an isolated process; the folder is empty once the process that created it has ended."""
 TIMEOUT_S = 2.0
@@ -29,21 +29,21 @@ _log = logging.getLogger("studio.editor")
 
 
 class SandboxTrial:
-    """Test in a child process whether this program may create namespaces as Chromium does."""
+    """Child process that tests whether this program may create namespaces as Chromium does."""
 
     def __init__(self) -> None:
         # The test takes about 20 ms, during which other work can be done.
-        self._ended, writer = os.pipe()  # the write end is closed when the process has ended
+        self._exit_reader, writer = os.pipe()  # the write end is closed when the process has ended
         try:
-            self._process = os.fork()
-            if self._process == 0:
+            self._process_id = os.fork()
+            if self._process_id == 0:
                 code = 1
                 try:
                     code = 0 if try_isolation() else 1
                 finally:
                     os._exit(code)
         except OSError:
-            self._process = -1
+            self._process_id = -1
         finally:
             os.close(writer)
 
@@ -52,12 +52,12 @@ class SandboxTrial:
 
         Blocks for up to 2 s. Can be called only once.
         """
-        if self._process < 0:
+        if self._process_id < 0:
             return False
-        if not select.select([self._ended], [], [], TIMEOUT_S)[0]:
-            os.kill(self._process, signal.SIGKILL)
-        os.close(self._ended)
-        return os.waitpid(self._process, 0)[1] == 0
+        if not select.select([self._exit_reader], [], [], TIMEOUT_S)[0]:
+            os.kill(self._process_id, signal.SIGKILL)
+        os.close(self._exit_reader)
+        return os.waitpid(self._process_id, 0)[1] == 0
 
 
 def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
@@ -99,7 +99,7 @@ def try_isolation() -> bool:
         return False
     user, group = os.geteuid(), os.getegid()
     system = ctypes.CDLL(None, use_errno=True)
-    if system.unshare(NEW_USER | NEW_PROCESSES) != 0:
+    if system.unshare(CLONE_NEWUSER | CLONE_NEWPID) != 0:
         return False
     process_folder = Path("/proc/self")
     try:

@@ -48,11 +48,11 @@ class StartRequest:
 
     Attributes:
         files: Files to open.
-        demo: True to start the demonstration.
+        starts_demo: True to start the demonstration.
     """
 
     files: tuple[Path, ...] = ()
-    demo: bool = False
+    starts_demo: bool = False
 
 
 def socket_name(folder: Path) -> str:
@@ -63,9 +63,9 @@ def socket_name(folder: Path) -> str:
     The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary
     folder. In a shared folder, another user could impersonate the running instance.
     """
-    mark = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
+    folder_hash = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
     if os.name != "posix":
-        return f"nep-studio-{mark}"  # a named pipe that only this user may open
+        return f"nep-studio-{folder_hash}"  # a named pipe that only this user may open
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     runtime_folders = (
         [Path(runtime) / "nep-studio"] if Path(runtime).is_absolute() and is_private(Path(runtime)) else []
@@ -75,7 +75,7 @@ def socket_name(folder: Path) -> str:
         folder.resolve(),
         Path(tempfile.gettempdir()) / f"nep-studio-{os.geteuid()}",
     ):
-        path = candidate / f"window-{mark}.socket"
+        path = candidate / f"window-{folder_hash}.socket"
         if len(os.fsencode(path)) >= MAX_PATH_LENGTH:
             continue
         with contextlib.suppress(OSError):
@@ -91,10 +91,10 @@ def is_private(folder: Path) -> bool:
     Symbolic links are rejected.
     """
     try:
-        about = folder.lstat()
+        status = folder.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid() and not about.st_mode & 0o077
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid() and not status.st_mode & 0o077
 
 
 def is_own_socket(name: str) -> bool:
@@ -105,10 +105,10 @@ def is_own_socket(name: str) -> bool:
     if os.name != "posix":
         return bool(name)
     try:
-        about = Path(name).lstat()
+        status = Path(name).lstat()
     except OSError:
         return False
-    return stat.S_ISSOCK(about.st_mode) and about.st_uid == os.geteuid() and is_private(Path(name).parent)
+    return stat.S_ISSOCK(status.st_mode) and status.st_uid == os.geteuid() and is_private(Path(name).parent)
 
 
 def peer_user(descriptor: int) -> int | None:
@@ -118,11 +118,11 @@ def peer_user(descriptor: int) -> int | None:
         descriptor: File descriptor of the socket.
     """
     peer_option = getattr(socket, "SO_PEERCRED", None)
-    copy = os.dup(descriptor)
+    descriptor_copy = os.dup(descriptor)
     try:
-        socket_copy = socket.socket(fileno=copy)
+        socket_copy = socket.socket(fileno=descriptor_copy)
     except OSError:
-        os.close(copy)
+        os.close(descriptor_copy)
         return None
     try:
         with socket_copy:
@@ -147,24 +147,24 @@ def send_request(name: str, request: StartRequest) -> bool:
     """
     if not is_own_socket(name):
         return False  # checked on Unix before Qt's network module is loaded, which takes time
-    line = QtNetwork.QLocalSocket()
-    line.connectToServer(name)
-    if not line.waitForConnected(CONNECT_TIMEOUT_MS) or _belongs_to_other_user(line):
+    client = QtNetwork.QLocalSocket()
+    client.connectToServer(name)
+    if not client.waitForConnected(CONNECT_TIMEOUT_MS) or _belongs_to_other_user(client):
         return False
     files = [str(path.absolute()) for path in request.files]
-    line.write(json.dumps({"files": files, "demo": request.demo}).encode() + b"\n")
-    line.flush()
-    reply, until = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
-    while len(reply) < len(OK_REPLY) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
-        if not line.waitForReadyRead(left_ms):
+    client.write(json.dumps({"files": files, "demo": request.starts_demo}).encode() + b"\n")
+    client.flush()
+    reply, deadline = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
+    while len(reply) < len(OK_REPLY) and (remaining_ms := int((deadline - time.monotonic()) * 1000)) > 0:
+        if not client.waitForReadyRead(remaining_ms):
             break
-        reply += line.readAll().data()
-    line.disconnectFromServer()
+        reply += client.readAll().data()
+    client.disconnectFromServer()
     return reply == OK_REPLY
 
 
 def pass_to_running(
-    name: str, request: StartRequest, lock: FileLock, within_s: float = START_TIMEOUT_S
+    name: str, request: StartRequest, lock: FileLock, timeout_s: float = START_TIMEOUT_S
 ) -> bool:
     """Send a request to a running instance, or to one that is just starting.
 
@@ -172,31 +172,31 @@ def pass_to_running(
         name: Name of the socket.
         request: Request.
         lock: Lock of the instance that is starting.
-        within_s: Maximum time in seconds to wait for an instance that is starting.
+        timeout_s: Maximum time in seconds to wait for an instance that is starting.
 
     Returns:
         True if an instance accepted the request. False if this process must open a window. It then
         holds `lock`, unless the time limit was exceeded or `name` is empty; release the lock when the
         window can receive requests.
     """
-    until, pause, waited = time.monotonic() + within_s, threading.Event(), False
+    deadline, pause, has_waited = time.monotonic() + timeout_s, threading.Event(), False
     while not send_request(name, request):
-        if not name or time.monotonic() >= until:
+        if not name or time.monotonic() >= deadline:
             return False
         if lock.acquire():
-            if waited and send_request(name, request):  # the window appeared between the two attempts
+            if has_waited and send_request(name, request):  # the window appeared between the two attempts
                 lock.release()
                 return True
             return False
-        waited = True
+        has_waited = True
         pause.wait(POLL_S)
     return True
 
 
-def _belongs_to_other_user(line: QtNetwork.QLocalSocket) -> bool:
+def _belongs_to_other_user(client: QtNetwork.QLocalSocket) -> bool:
     if os.name != "posix":
         return False
-    user = peer_user(int(line.socketDescriptor()))
+    user = peer_user(int(client.socketDescriptor()))
     return user is not None and user != os.geteuid()
 
 
@@ -209,7 +209,7 @@ class SingleInstanceServer(QObject):
         # `on_request` is called with each request.
         super().__init__(parent)
         self._on_request = on_request
-        self._received: dict[QtNetwork.QLocalSocket, bytes] = {}
+        self._buffers: dict[QtNetwork.QLocalSocket, bytes] = {}
         self._server = QtNetwork.QLocalServer(self)
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
         self._server.newConnection.connect(self._accept)
@@ -236,20 +236,20 @@ class SingleInstanceServer(QObject):
                 socket.abort()
                 socket.deleteLater()
                 continue
-            self._received[socket] = b""
+            self._buffers[socket] = b""
             socket.readyRead.connect(lambda socket=socket: self._read(socket))
             socket.disconnected.connect(lambda socket=socket: self._on_disconnected(socket))
             self._read(socket)
 
     def _read(self, socket: QtNetwork.QLocalSocket) -> None:
-        if socket not in self._received:
+        if socket not in self._buffers:
             return
-        self._received[socket] += socket.readAll().data()
-        data = self._received[socket]
+        self._buffers[socket] += socket.readAll().data()
+        data = self._buffers[socket]
         if len(data) > MAX_REQUEST_LENGTH:
             socket.abort()
         elif data.endswith(b"\n"):
-            self._received[socket] = b""
+            self._buffers[socket] = b""
             request = parse(data)
             if request is None:
                 socket.abort()
@@ -259,7 +259,7 @@ class SingleInstanceServer(QObject):
             self._on_request(request)
 
     def _on_disconnected(self, socket: QtNetwork.QLocalSocket) -> None:
-        self._received.pop(socket, None)
+        self._buffers.pop(socket, None)
         if isValid(socket):  # the socket may have been deleted with the window
             socket.deleteLater()
 

@@ -54,10 +54,10 @@ def size_text(size_bytes: float) -> str:
     if size_bytes < 1000:
         return f"{round(size_bytes)} B"
     value, unit = size_bytes / 1000, "kB"
-    for larger in ("MB", "GB", "TB"):
+    for larger_unit in ("MB", "GB", "TB"):
         if value < 999.5:
             break
-        value, unit = value / 1000, larger
+        value, unit = value / 1000, larger_unit
     return f"{number(value, '.1f')} {unit}" if value < 9.95 else f"{round(value)} {unit}"
 
 
@@ -131,6 +131,6 @@ def _translate_keys(shortcut: str, signs: Mapping[str, str]) -> str:
 def length_text(seconds: float) -> str:
     """Format a duration of a recording, such as "0:42", "12:04" or "1:32:10"."""
     total_s = int(seconds) if 0 <= seconds < 1e9 else 0
-    minutes, rest = divmod(total_s, 60)
+    minutes, remaining_s = divmod(total_s, 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+    return f"{hours}:{minutes:02d}:{remaining_s:02d}" if hours else f"{minutes}:{remaining_s:02d}"

@@ -22,15 +22,15 @@ def make_breakable(text: str) -> str:
 
 def _break_word(word: str) -> str:
     # Combining characters are not separated from their letter.
-    result, since = "", 0
+    result, piece_length = "", 0
     for letter in word:
         if (
-            since >= PIECE_LENGTH
+            piece_length >= PIECE_LENGTH
             and not unicodedata.combining(letter)
             and unicodedata.category(letter)[0] in "LN"
         ):
-            result, since = result + ZERO_WIDTH_SPACE, 0
-        result, since = result + letter, since + 1
+            result, piece_length = result + ZERO_WIDTH_SPACE, 0
+        result, piece_length = result + letter, piece_length + 1
     return result
 
 

@@ -106,14 +106,14 @@ def _object_text(sensor: Sensor, value: Mapping[str, object]) -> ReadingText:
             ),
         )
     unit = numbers[0][0].unit
-    together = [
+    same_unit_texts = [
         number(measured, ".1f").replace("-", MINUS) for field, measured in numbers if field.unit == unit
     ]
-    others = [(field, measured) for field, measured in numbers if field.unit != unit]
+    other_unit_values = [(field, measured) for field, measured in numbers if field.unit != unit]
     details = ", ".join(
-        f"{field.title} {quantity_text(round(measured), field.unit)}" for field, measured in others
+        f"{field.title} {quantity_text(round(measured), field.unit)}" for field, measured in other_unit_values
     )
-    return ReadingText(f"{', '.join(together)}{f' {unit}' if unit else ''}", details)
+    return ReadingText(f"{', '.join(same_unit_texts)}{f' {unit}' if unit else ''}", details)
 
 
 def _is_number(value: object) -> TypeGuard[float]:

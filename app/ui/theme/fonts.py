@@ -34,14 +34,14 @@ def load() -> tuple[str, ...]:
     application = QCoreApplication.instance()
     if application is not None and application.property(REJECTED_PROPERTY) is not None:
         return tuple(application.property(REJECTED_PROPERTY))
-    refused: list[str] = []
+    rejected: list[str] = []
     for name in FONT_FILES:
-        number = QFontDatabase.addApplicationFont(str(resources.path("fonts", name)))
-        if number < 0:
-            refused.append(name)
+        font_id = QFontDatabase.addApplicationFont(str(resources.path("fonts", name)))
+        if font_id < 0:
+            rejected.append(name)
     if application is not None:
-        application.setProperty(REJECTED_PROPERTY, refused)
-    return tuple(refused)
+        application.setProperty(REJECTED_PROPERTY, rejected)
+    return tuple(rejected)
 
 
 def make_font(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:

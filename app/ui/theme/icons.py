@@ -18,7 +18,7 @@ from PySide6.QtSvg import QSvgRenderer
 from app import resources
 from app.ui.overrides import guard
 
-THIN_FROM_PX = 20
+MIN_THIN_SIZE_PX = 20
 DOT_SIZE_RATIO = 10 / 16
 FALLBACK_ICON = "circle-question-mark"
 SVG_START_TAG = (
@@ -56,18 +56,20 @@ def _suggestion(name: str) -> str:
 
 
 @lru_cache(maxsize=512)
-def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) -> QSvgRenderer:
+def _renderer(name: str, colour: str, opacity: float, is_filled: bool, is_thin: bool) -> QSvgRenderer:
     text = _source(name).replace("currentColor", colour)
-    if thin:
+    if is_thin:
         text = text.replace('stroke-width="2"', 'stroke-width="1.75"')
-    if filled:
+    if is_filled:
         text = text.replace('fill="none"', f'fill="{colour}"', 1)
     if opacity < 1:
         text = text.replace("<svg", f'<svg opacity="{opacity:.3f}"', 1)
     return QSvgRenderer(QByteArray(text.encode("utf-8")))
 
 
-def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
+def paint_icon(
+    painter: QPainter, rect: QRectF, name: str, colour: QColor, *, is_filled: bool = False
+) -> None:
     """Paint an icon into a square.
 
     Args:
@@ -76,7 +78,7 @@ def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, fi
         name: Name of the icon, or "dot" for a filled disc. An unknown name is logged with a suggestion
             and replaced by a question mark.
         colour: Colour of the lines.
-        filled: True to fill the shape with the colour.
+        is_filled: True to fill the shape with the colour.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -86,8 +88,8 @@ def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, fi
         radius = min(rect.width(), rect.height()) * DOT_SIZE_RATIO / 2
         painter.drawEllipse(rect.center(), radius, radius)
     else:
-        thin = rect.width() >= THIN_FROM_PX
-        _renderer(name, colour.name(), round(colour.alphaF(), 3), filled, thin).render(painter, rect)
+        is_thin = rect.width() >= MIN_THIN_SIZE_PX
+        _renderer(name, colour.name(), round(colour.alphaF(), 3), is_filled, is_thin).render(painter, rect)
     painter.restore()
 
 

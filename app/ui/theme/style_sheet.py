@@ -24,7 +24,7 @@ class ThemeValues(Protocol):
     """Interface of a theme that the style sheet uses."""
 
     @property
-    def dark(self) -> bool:
+    def is_dark(self) -> bool:
         """True if the theme is dark."""
 
     def hex(self, role: str) -> str:
@@ -157,7 +157,7 @@ def build(theme: ThemeValues) -> str:
         small=str(theme.radius("small")),
         control=str(theme.radius("control")),
         panel_radius=str(theme.radius("panel")),
-        field=theme.hex("sunken") if theme.dark else theme.hex("panel"),
+        field=theme.hex("sunken") if theme.is_dark else theme.hex("panel"),
         small_text=str(round(theme.scaled(theme.text_kinds()["small"].size_px))),
     )
     return STYLE_SHEET_TEMPLATE.format_map(roles) + _label_rules(theme)

@@ -12,7 +12,7 @@ from PySide6.QtGui import QStyleHints
 
 Preference = Literal["system", "on", "off"]
 PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
-SPI_GETCLIENTAREAANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
+SPI_GETCLIENTAREAANIMATION = 0x1042  # action of SystemParametersInfoW on Windows
 
 
 def parse_preference(value: object) -> Preference:
@@ -34,18 +34,20 @@ def prefers_contrast(hints: QStyleHints) -> bool:
     )
 
 
-def on_contrast_changed(hints: QStyleHints, call: Callable[[], object]) -> None:
+def on_contrast_changed(hints: QStyleHints, callback: Callable[[], object]) -> None:
     """Register a callback for changes of the system's contrast preference, if Qt reports them."""
     accessibility = getattr(hints, "accessibility", None)
     if accessibility is not None:
-        accessibility().contrastPreferenceChanged.connect(call)
+        accessibility().contrastPreferenceChanged.connect(callback)
 
 
 def prefers_reduced_motion(platform: str = sys.platform) -> bool:
     """Return True if the system requests reduced motion; False where programs can't query it."""
     if platform != "win32":
         return False
-    animated = ctypes.c_int(1)
+    is_animation_enabled = ctypes.c_int(1)
     user32 = getattr(ctypes, "windll").user32  # noqa: B009  mypy knows that it exists only on Windows
-    succeeded = user32.SystemParametersInfoW(SPI_GETCLIENTAREAANIMATION, 0, ctypes.byref(animated), 0)
-    return bool(succeeded) and animated.value == 0
+    has_succeeded = user32.SystemParametersInfoW(
+        SPI_GETCLIENTAREAANIMATION, 0, ctypes.byref(is_animation_enabled), 0
+    )
+    return bool(has_succeeded) and is_animation_enabled.value == 0

@@ -73,8 +73,8 @@ class Theme(QObject):
         self._text_percent = TEXT_PERCENT_RANGE[0]
         self.motion: Preference = "off"  # "on" means reduced motion
         self.contrast: Preference = "off"  # "on" means high contrast
-        self.reduced_motion = self.high_contrast = False
-        self._dark = self._resolve_dark()
+        self.is_motion_reduced = self.is_high_contrast = False
+        self._is_dark = self._resolve_dark()
         self._icons: dict[tuple[str, str, str], QIcon] = {}
         self._fonts: dict[str, QFont] = {}
         self._hints.colorSchemeChanged.connect(self._system_changed)
@@ -88,9 +88,9 @@ class Theme(QObject):
         return self._mode
 
     @property
-    def dark(self) -> bool:
+    def is_dark(self) -> bool:
         """True if the dark colours are in use."""
-        return self._dark
+        return self._is_dark
 
     @property
     def tokens(self) -> Mapping[str, object]:
@@ -112,7 +112,7 @@ class Theme(QObject):
             contrast: High contrast: "on", "off" or "system".
         """
         self._mode, self.contrast = mode, contrast
-        self.high_contrast = self._resolve_contrast()
+        self.is_high_contrast = self._resolve_contrast()
         self._text_percent = min(max(text_percent, TEXT_PERCENT_RANGE[0]), TEXT_PERCENT_RANGE[1])
         self._fonts.clear()
         self.set_motion(motion)
@@ -127,7 +127,7 @@ class Theme(QObject):
     def set_motion(self, preference: Preference) -> None:
         """Set reduced motion: "on", "off", or "system" to follow the system."""
         self.motion = preference
-        self.reduced_motion = preference == "on" or (
+        self.is_motion_reduced = preference == "on" or (
             preference == "system" and system.prefers_reduced_motion()
         )
         self.changed.emit()
@@ -138,8 +138,8 @@ class Theme(QObject):
         High contrast has strong borders and no tinted backgrounds.
         """
         self.contrast = preference
-        if self._resolve_contrast() != self.high_contrast:
-            self.high_contrast = not self.high_contrast
+        if self._resolve_contrast() != self.is_high_contrast:
+            self.is_high_contrast = not self.is_high_contrast
             self.apply()
         else:
             self.changed.emit()
@@ -180,14 +180,14 @@ class Theme(QObject):
             self._refresh()
 
     def _refresh(self) -> None:
-        self._dark = self._resolve_dark()
+        self._is_dark = self._resolve_dark()
         self.apply()
 
     # -- colours ----------------------------------------------------------------------------------
 
     @property
     def _colour_scheme(self) -> str:
-        return "dark" if self._dark else "light"
+        return "dark" if self._is_dark else "light"
 
     def hex(self, role: str) -> str:
         """Return the colour of a role as ``#RRGGBB`` or ``#RRGGBBAA``.
@@ -195,7 +195,7 @@ class Theme(QObject):
         Raises:
             KeyError: The role is unknown.
         """
-        if self.high_contrast:
+        if self.is_high_contrast:
             if role in HC_STRONG_ROLES:
                 role = "controlBorder"
             elif role in HC_FLAT_ROLES:
@@ -296,7 +296,7 @@ class Theme(QObject):
         If motion is reduced, durations of animations are 0; the display times of messages are
         unchanged.
         """
-        if self.reduced_motion and not name.endswith("Shown"):
+        if self.is_motion_reduced and not name.endswith("Shown"):
             return 0
         return self._tokens.motion_ms[name]
 
@@ -335,21 +335,21 @@ class Theme(QObject):
         """
         return self._tokens.icons[use]
 
-    def icon(self, name: str, role: str = "textSecondary", *, active: str = "text") -> QIcon:
+    def icon(self, name: str, role: str = "textSecondary", *, active_role: str = "text") -> QIcon:
         """Return an icon that follows changes of the theme.
 
         Args:
             name: Name of the icon.
             role: Colour role.
-            active: Colour role while the icon is active, for example hovered.
+            active_role: Colour role while the icon is active, for example hovered.
         """
-        key = (name, role, active)
+        key = (name, role, active_role)
         if key not in self._icons:
 
             def colour(mode: QIcon.Mode, _state: QIcon.State) -> QColor:
                 if mode == QIcon.Mode.Disabled:
                     return self.colour("textDisabled")
-                return self.colour(active if mode == QIcon.Mode.Active else role)
+                return self.colour(active_role if mode == QIcon.Mode.Active else role)
 
             self._icons[key] = QIcon(IconEngine(name, colour))
         return self._icons[key]
@@ -361,8 +361,8 @@ class Theme(QObject):
         return theme_tokens.tokens_for_page(
             self._tokens,
             self.hex,
-            dark=self._dark,
-            reduced_motion=self.reduced_motion,
+            is_dark=self._is_dark,
+            is_motion_reduced=self.is_motion_reduced,
             text_percent=self._text_percent,
         )
 

@@ -156,20 +156,20 @@ def _parse_text_kinds(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, Text
 
 
 def tokens_for_page(
-    tokens: Tokens, colour: Callable[[str], str], *, dark: bool, reduced_motion: bool, text_percent: int
+    tokens: Tokens, colour: Callable[[str], str], *, is_dark: bool, is_motion_reduced: bool, text_percent: int
 ) -> dict[str, object]:
     """Return the values for the page of the block editor, as a JSON-serializable dict.
 
     Args:
         tokens: Design tokens.
         colour: Returns the colour of a role in the current mode.
-        dark: True for the dark theme.
-        reduced_motion: True to reduce motion.
+        is_dark: True for the dark theme.
+        is_motion_reduced: True to reduce motion.
         text_percent: Text size in percent.
     """
-    scheme = "dark" if dark else "light"
+    scheme = "dark" if is_dark else "light"
     return {
-        "dark": dark,
+        "dark": is_dark,
         "colour": {role: colour(role) for role in tokens.colours[scheme]},
         "block": {
             name: {
@@ -181,6 +181,6 @@ def tokens_for_page(
         },
         "glow": tokens.raw.get("blockGlow", {}),
         "font": {"text": tokens.families["text"], "mono": tokens.families["mono"]},
-        "reducedMotion": reduced_motion,
+        "reducedMotion": is_motion_reduced,
         "textPercent": text_percent,
     }

@@ -96,10 +96,10 @@ class PaintedButton(QAbstractButton):
         """True if the button is the drop target of a drag."""
         return self._is_drop_target
 
-    def set_drop_target(self, aimed: bool) -> None:
+    def set_drop_target(self, is_drop_target: bool) -> None:
         """Set whether the button is the drop target of a drag; a drop target has a ring."""
-        if aimed != self._is_drop_target:
-            self._is_drop_target = aimed
+        if is_drop_target != self._is_drop_target:
+            self._is_drop_target = is_drop_target
             self.update()
 
     def set_text(self, text: str, name: str = "") -> None:
@@ -177,7 +177,7 @@ class Button(PaintedButton):
         super().__init__(theme, text, radius=self.metrics.radius, parent=parent)
         self.kind: Kind = kind
         self.icon_name = icon
-        self.fill_icon = False
+        self.has_filled_icon = False
         self.icon_role = ""
         """Colour role of the icon; "" for the colour of the text."""
         self._min_width: int | None = None
@@ -191,8 +191,8 @@ class Button(PaintedButton):
             icon: Name of the icon; None keeps the current one.
             name: Accessible name, or "" to use the text.
         """
-        same = text == self.text() and (name or text) == self.accessibleName()
-        if same and icon in {None, self.icon_name}:
+        is_unchanged = text == self.text() and (name or text) == self.accessibleName()
+        if is_unchanged and icon in {None, self.icon_name}:
             return
         self.set_text(text, name)
         self.icon_name = icon if icon is not None else self.icon_name
@@ -268,11 +268,12 @@ class Button(PaintedButton):
         left = max(frame.left() + 6, frame.center().x() - (icon + gap + text_width) / 2)
         if self.icon_name is not None:
             top = frame.center().y() - icon / 2
-            filled = self.fill_icon and self.isEnabled()
+            is_filled = self.has_filled_icon and self.isEnabled()
             icon_colour = (
                 self._theme.colour(self.icon_role) if self.icon_role and self.isEnabled() else colour
             )
-            paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, icon_colour, filled=filled)
+            icon_rect = QRectF(left, top, icon, icon)
+            paint_icon(painter, icon_rect, self.icon_name, icon_colour, is_filled=is_filled)
         end = frame.bottomRight() - QPointF(4, 0)
         area = QRectF(QPointF(left + icon + gap, frame.top()), end)
         paint.text_line(painter, area, text, font, colour)
@@ -280,11 +281,11 @@ class Button(PaintedButton):
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         # Colours of fill, border and text.
         theme = self._theme
-        rest, hover, pressed, border, text_role = _COLOURS[self.kind]
+        normal, hover, pressed, border, text_role = _COLOURS[self.kind]
         if not self.isEnabled():
             edge = "border" if self.kind != "ghost" else None
             return None, theme.colour(edge) if edge else None, theme.colour("textDisabled")
-        role = pressed if self.isDown() or self.isChecked() else hover if self.underMouse() else rest
+        role = pressed if self.isDown() or self.isChecked() else hover if self.underMouse() else normal
         return (
             theme.colour(role) if role else None,
             theme.colour(border) if border else None,
@@ -424,23 +425,23 @@ class RunButton(Button):
     """Button of the run bar, 112 x 44 px or larger for large text."""
 
     def __init__(
-        self, theme: Theme, text: str, icon: str, *, widest: str = "", parent: QWidget | None = None
+        self, theme: Theme, text: str, icon: str, *, longest_text: str = "", parent: QWidget | None = None
     ) -> None:
-        # `widest` is the longest text that the button will show, so that its width never changes.
+        # `longest_text` is the longest text that the button will show, so that its width never changes.
         super().__init__(theme, text, icon, size="large", parent=parent)
-        self._widest = widest or text
+        self._longest_text = longest_text or text
         self._is_icon_only = False
-        self.fill_icon = False
+        self.has_filled_icon = False
 
-    def set_filled(self, filled: bool) -> None:
-        """Fill the button green if `filled`, else paint only its outline."""
-        self.fill_icon = filled
-        self.set_kind("run" if filled else "plain")
+    def set_filled(self, is_filled: bool) -> None:
+        """Fill the button green if `is_filled`, else paint only its outline."""
+        self.has_filled_icon = is_filled
+        self.set_kind("run" if is_filled else "plain")
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Show only the icon if `icon_only`, else icon and text. The accessible name doesn't change."""
-        if icon_only != self._is_icon_only:
-            self._is_icon_only = icon_only
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Show only the icon if `is_icon_only`, else icon and text. The accessible name doesn't change."""
+        if is_icon_only != self._is_icon_only:
+            self._is_icon_only = is_icon_only
             self.updateGeometry()
             self.update()
 
@@ -462,7 +463,7 @@ class RunButton(Button):
 
     def full_width(self) -> int:
         """Return the width in px with the longest text that the button can show."""
-        text_width = paint.width_of(self._theme.font("button"), self._widest)
+        text_width = paint.width_of(self._theme.font("button"), self._longest_text)
         return max(RUN_WIDTH, round(self.icon_side() + self.metrics.gap + text_width) + 28)
 
 
@@ -474,29 +475,29 @@ class StopButton(PaintedButton):
     """
 
     def __init__(self, theme: Theme, bar: BarName = "runBar", parent: QWidget | None = None) -> None:
-        self._corners = "large" if bar == "runBar" else "control"
-        super().__init__(theme, _("Stop"), radius=self._corners, parent=parent)
+        self._radius_name = "large" if bar == "runBar" else "control"
+        super().__init__(theme, _("Stop"), radius=self._radius_name, parent=parent)
         self._bar: BarName = bar
-        self._ring = False
-        self.filled = True
+        self._has_ring = False
+        self.is_filled = True
         # A click doesn't take the focus, so sheets stay open and typing continues.
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         assign_command(self, "run.stop")
         self.setProperty("focusInset", STOP_RING_WIDTH)
 
-    def show_state(self, caption: str, *, ring: bool = False, filled: bool = True) -> None:
+    def show_state(self, caption: str, *, has_ring: bool = False, is_filled: bool = True) -> None:
         """Set the state of the button.
 
         Args:
             caption: "Stop", "Stopping" or "Stop again", translated.
-            ring: True while replies of robots are pending.
-            filled: False to paint only the outline, because nothing can move.
+            has_ring: True while replies of robots are pending.
+            is_filled: False to paint only the outline, because nothing can move.
         """
-        if (caption, ring, filled) == (self.text(), self._ring, self.filled):
+        if (caption, has_ring, is_filled) == (self.text(), self._has_ring, self.is_filled):
             return
         self.set_text(caption)
-        self._ring = ring
-        self.filled = filled
+        self._has_ring = has_ring
+        self.is_filled = is_filled
         self.update()
 
     def sizeHint(self) -> QSize:
@@ -513,22 +514,22 @@ class StopButton(PaintedButton):
         return self.sizeHint()
 
     def _fonts(self) -> tuple[QFont, QFont]:
-        large = self._bar == "runBar"
-        font = self._theme.font("heading" if large else "title")
+        is_large = self._bar == "runBar"
+        font = self._theme.font("heading" if is_large else "title")
         font.setWeight(font.Weight.Bold)
-        if large:
+        if is_large:
             font.setPixelSize(round(self._theme.scaled(17)))
-        return font, self._theme.font("small" if large else "caption")
+        return font, self._theme.font("small" if is_large else "caption")
 
     def _icon_side(self) -> int:
         return 16 if self._bar == "runBar" else 12
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        theme, radius = self._theme, self._theme.radius(self._corners)
+        theme, radius = self._theme, self._theme.radius(self._radius_name)
         frame = rect.adjusted(STOP_RING_WIDTH, STOP_RING_WIDTH, -STOP_RING_WIDTH, -STOP_RING_WIDTH)
-        if self._ring:
+        if self._has_ring:
             paint.box(painter, rect, radius + STOP_RING_WIDTH, None, theme.colour("stop"), 2)
-        if self.filled:
+        if self.is_filled:
             paint.box(painter, frame, radius, theme.colour("stopHover" if self.is_highlighted else "stop"))
             colour = theme.colour("onStop")
         else:

@@ -19,7 +19,7 @@ BORDER_ROLES = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", 
 
 
 class Card(QFrame):
-    """Frame with a border and large round corners."""
+    """Frame with a border and large rounded corners."""
 
     def __init__(self, theme: Theme, *, radius: str = "card", fill: str = "panel") -> None:
         super().__init__()
@@ -60,15 +60,15 @@ class AlertBox(QWidget):
     icon_side, icon_left, left, vertical_margin, gap = 18, 12, 40, 10, 10
     min_text_width = 220  # minimum width of the text beside the buttons, in px at 100 %
 
-    def __init__(self, theme: Theme, *, framed: bool = True) -> None:
+    def __init__(self, theme: Theme, *, is_framed: bool = True) -> None:
         # Without a frame only the icon shows the status; used for "ok".
         super().__init__()
-        self._theme, self._framed = theme, framed
+        self._theme, self._is_framed = theme, is_framed
         self._status = "info"
         self.text_column, self.button_row = QVBoxLayout(), QHBoxLayout()
         self.button_row.setSpacing(self.gap)
         self._main_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        vertical_margin = self.vertical_margin if framed else 4
+        vertical_margin = self.vertical_margin if is_framed else 4
         self._main_layout.setContentsMargins(self.left, vertical_margin, 12, vertical_margin)
         self._main_layout.setSpacing(self.gap)
         self._main_layout.addLayout(self.text_column, 1)
@@ -100,12 +100,12 @@ class AlertBox(QWidget):
 
     def icon_top(self) -> float:
         """Return the distance in px between the upper edges of the box and the icon."""
-        return 11.0 if self._framed else 4.0
+        return 11.0 if self._is_framed else 4.0
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         status = theme.status(self._status)
-        if self._framed:
+        if self._is_framed:
             edge = theme.colour(BORDER_ROLES.get(self._status, "borderStrong"))
             fill = theme.colour(status.tint or "panel")
             paint.box(painter, QRectF(self.rect()), theme.radius("panel"), fill, edge)
@@ -117,11 +117,11 @@ class AlertBox(QWidget):
 class AlertRow(AlertBox):
     """Row of an alert: title in bold, detail, shell command, note and button."""
 
-    def __init__(self, theme: Theme, *, framed: bool = True) -> None:
-        super().__init__(theme, framed=framed)
+    def __init__(self, theme: Theme, *, is_framed: bool = True) -> None:
+        super().__init__(theme, is_framed=is_framed)
         self.text_column.setSpacing(2)
         self._lines = (
-            label("", "title" if framed else "body", wrap=True),
+            label("", "title" if is_framed else "body", wrap=True),
             label("", "body", role="textSecondary", wrap=True),
             label("", "code", role="textSecondary", wrap=True),
             label("", "small", role="textTertiary"),

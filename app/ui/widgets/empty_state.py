@@ -111,18 +111,18 @@ class EmptyState(QWidget):
     def _update_visibility(self) -> None:
         # If the height is low, the tile is hidden first, then the text; the buttons stay.
         width = self.width() - 32
-        text = self._text.heightForWidth(min(width, TEXT_WIDTH))
+        text_height = self._text.heightForWidth(min(width, TEXT_WIDTH))
         # otherwise the last line would be cut off if the height is low
-        self._text.setMinimumHeight(max(0, text))
-        content_height = self._title.heightForWidth(width) + text + 4
+        self._text.setMinimumHeight(max(0, text_height))
+        content_height = self._title.heightForWidth(width) + text_height + 4
         content_height += ROW_TOP_MARGIN + self._buttons[0].sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= content_height + TILE_SIZE + BELOW_TILE)
         is_low = bool(self._buttons) and self.height() - 2 * MARGIN < content_height
         self._text.setVisible(not is_low)
         self._title.setToolTip(plain.tip(self._text.text()) if is_low else "")
         self._row.setContentsMargins(0, 0 if is_low else ROW_TOP_MARGIN, 0, 0)
-        edge = 2 if is_low else MARGIN
-        self._column.setContentsMargins(16, edge, 16, edge)
+        margin = 2 if is_low else MARGIN
+        self._column.setContentsMargins(16, margin, 16, margin)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -71,8 +71,8 @@ class FieldDrag(QObject):
         self._is_accepted = False
         self._source = source
         self._label = _floating_label(self._data.text(), source.window())
-        self._watched = {source, QApplication.focusWidget() or source}
-        for widget in self._watched:
+        self._watched_widgets = {source, QApplication.focusWidget() or source}
+        for widget in self._watched_widgets:
             widget.installEventFilter(self)
         QGuiApplication.setOverrideCursor(Qt.CursorShape.ForbiddenCursor)
         self._move(QCursor.pos())
@@ -134,7 +134,7 @@ class FieldDrag(QObject):
             QApplication.sendEvent(target, QDragLeaveEvent())
 
     def _end(self) -> None:
-        for widget in self._watched:
+        for widget in self._watched_widgets:
             if isValid(widget):
                 widget.removeEventFilter(self)
         self._target, self._is_accepted = None, False
@@ -150,8 +150,8 @@ class FieldDrag(QObject):
         return event.isAccepted()
 
     def _event_arguments(self) -> tuple[Qt.DropAction, QMimeData, Qt.MouseButton, Qt.KeyboardModifier]:
-        plain = Qt.KeyboardModifier.NoModifier
-        return Qt.DropAction.CopyAction, self._data, Qt.MouseButton.LeftButton, plain
+        no_modifiers = Qt.KeyboardModifier.NoModifier
+        return Qt.DropAction.CopyAction, self._data, Qt.MouseButton.LeftButton, no_modifiers
 
 
 def _drop_target(position: QPoint) -> QWidget | None:

@@ -37,10 +37,12 @@ def resolve_kind(path: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple
         kind: Selected type.
         kinds: Types that were offered.
     """
-    ending = path.suffix.lower()
-    if ending != kind.suffix:
-        typed = next((each for each in kinds if each.suffix == ending), None)
-        return (path, typed) if typed is not None else (path.with_name(path.name + kind.suffix), kind)
+    suffix = path.suffix.lower()
+    if suffix != kind.suffix:
+        typed_kind = next((each for each in kinds if each.suffix == suffix), None)
+        if typed_kind is None:
+            return path.with_name(path.name + kind.suffix), kind
+        return path, typed_kind
     return path, kind
 
 
@@ -94,10 +96,10 @@ def pictures_folder() -> str:
     return folder if folder and Path(folder).is_dir() else str(Path.home())
 
 
-BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
-RECORDINGS = (lazy("Recordings"), "*.mcap")
-LAYOUTS = (lazy("Layouts"), "*.nep-layout")
-PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_SUFFIXES))
+BEHAVIOUR_FILTER = (lazy("Behaviours"), f"*{SUFFIX}")
+RECORDING_FILTER = (lazy("Recordings"), "*.mcap")
+LAYOUT_FILTER = (lazy("Layouts"), "*.nep-layout")
+PICTURE_FILTER = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_SUFFIXES))
 """Name filter for images in file dialogs, as label and patterns."""
 
 
@@ -112,12 +114,12 @@ class SystemDialogs:
         self._window = window
 
     def open(self, folder: str, callback: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a behaviour"), folder, callback, BEHAVIOURS)
+        dialog = self._dialog(_("Open a behaviour"), folder, callback, BEHAVIOUR_FILTER)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
     def save(self, suggestion: str, callback: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Save behaviour"), str(Path(suggestion).parent), callback, BEHAVIOURS)
+        dialog = self._dialog(_("Save behaviour"), str(Path(suggestion).parent), callback, BEHAVIOUR_FILTER)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
@@ -130,33 +132,33 @@ class SystemDialogs:
         kinds: Sequence[FileKind],
         callback: Callable[[Path, FileKind], None],
     ) -> None:
-        offered = {f"{_(kind.label)} (*{kind.suffix})": kind for kind in kinds}
+        kinds_by_filter = {f"{_(kind.label)} (*{kind.suffix})": kind for kind in kinds}
 
         def take_path(path: Path) -> None:
-            callback(*resolve_kind(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
+            callback(*resolve_kind(path, kinds_by_filter.get(dialog.selectedNameFilter(), kinds[0]), kinds))
 
         dialog = self._dialog(title, str(suggestion.parent), take_path)
-        dialog.setNameFilters(list(offered))
+        dialog.setNameFilters(list(kinds_by_filter))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(kinds[0].suffix.lstrip("."))
         dialog.filterSelected.connect(
-            lambda words: dialog.setDefaultSuffix(offered[words].suffix.lstrip("."))
+            lambda name_filter: dialog.setDefaultSuffix(kinds_by_filter[name_filter].suffix.lstrip("."))
         )
         dialog.selectFile(suggestion.name)
         dialog.show()
 
     def open_picture(self, folder: str, callback: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Choose an image"), folder or pictures_folder(), callback, PICTURES)
+        dialog = self._dialog(_("Choose an image"), folder or pictures_folder(), callback, PICTURE_FILTER)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
     def open_recording(self, folder: str, callback: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a recording"), folder, callback, RECORDINGS)
+        dialog = self._dialog(_("Open a recording"), folder, callback, RECORDING_FILTER)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
     def open_layout(self, folder: str, callback: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Open a layout"), folder, callback, LAYOUTS)
+        dialog = self._dialog(_("Open a layout"), folder, callback, LAYOUT_FILTER)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
@@ -168,9 +170,9 @@ class SystemDialogs:
     def _dialog(
         self, title: str, folder: str, callback: Callable[[Path], None], kind: tuple[str, str] | None = None
     ) -> QFileDialog:
-        offered = f"{_(kind[0])} ({kind[1]})" if kind is not None else ""
-        dialog = QFileDialog(self._window, title, folder, offered)
+        name_filter = f"{_(kind[0])} ({kind[1]})" if kind is not None else ""
+        dialog = QFileDialog(self._window, title, folder, name_filter)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowModality(Qt.WindowModality.NonModal)
-        dialog.fileSelected.connect(lambda chosen: callback(Path(chosen)))
+        dialog.fileSelected.connect(lambda path: callback(Path(path)))
         return dialog

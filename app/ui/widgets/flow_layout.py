@@ -19,22 +19,22 @@ class Flow(QLayout):
         super().__init__(parent)
         self._items: list[QLayoutItem] = []
         self._gap, self._row_gap = gap, row_gap
-        self._push = -1
-        self._elastic: dict[QWidget, bool] = {}
+        self._push_index = -1
+        self._greedy_by_widget: dict[QWidget, bool] = {}
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
         """Align all items that are added later to the right, if everything is in one row."""
-        self._push = len(self._items)
+        self._push_index = len(self._items)
 
-    def add_elastic(self, widget: QWidget, *, greedy: bool = False) -> None:
+    def add_elastic(self, widget: QWidget, *, is_greedy: bool = False) -> None:
         """Add a widget that can be narrower than its size hint.
 
         Args:
             widget: Widget to add.
-            greedy: True to expand the widget into the spare space.
+            is_greedy: True to expand the widget into the spare space.
         """
-        self._elastic[widget] = greedy
+        self._greedy_by_widget[widget] = is_greedy
         self.addWidget(widget)
 
     # -- overrides of QLayout
@@ -59,7 +59,7 @@ class Flow(QLayout):
         return True
 
     def heightForWidth(self, width: int) -> int:
-        return self._arrange(QRect(0, 0, width, 0), move=False)
+        return self._arrange(QRect(0, 0, width, 0), should_move=False)
 
     def sizeHint(self) -> QSize:
         items = [*self._visible_items()]
@@ -75,7 +75,7 @@ class Flow(QLayout):
 
     def setGeometry(self, rect: QRect) -> None:
         super().setGeometry(rect)
-        self._arrange(rect, move=True)
+        self._arrange(rect, should_move=True)
 
     # -- arrangement
     # ------------------------------------------------------------------------------------------
@@ -84,8 +84,8 @@ class Flow(QLayout):
         return (item for item in self._items if not item.isEmpty())
 
     def _with_margins(self, size: QSize) -> QSize:
-        edge = self.contentsMargins()
-        return size + QSize(edge.left() + edge.right(), edge.top() + edge.bottom())
+        margins = self.contentsMargins()
+        return size + QSize(margins.left() + margins.right(), margins.top() + margins.bottom())
 
     def _preferred_width(self, item: QLayoutItem) -> int:
         widget = item.widget()
@@ -94,22 +94,23 @@ class Flow(QLayout):
         return item.sizeHint().width()
 
     def _minimum_width(self, item: QLayoutItem) -> int:
-        bends = self._is_elastic(item) or item.hasHeightForWidth()
-        return item.minimumSize().width() if bends else item.minimumSize().expandedTo(item.sizeHint()).width()
+        can_shrink = self._is_elastic(item) or item.hasHeightForWidth()
+        min_size = item.minimumSize()
+        return min_size.width() if can_shrink else min_size.expandedTo(item.sizeHint()).width()
 
     def _maximum_width(self, item: QLayoutItem, room: int) -> int:
         widget = item.widget()
-        greedy = widget is not None and self._elastic.get(widget, False)
-        return room if greedy else self._preferred_width(item)
+        is_greedy = widget is not None and self._greedy_by_widget.get(widget, False)
+        return room if is_greedy else self._preferred_width(item)
 
     def _is_elastic(self, item: QLayoutItem) -> bool:
         widget = item.widget()
-        return widget in self._elastic
+        return widget in self._greedy_by_widget
 
-    def _arrange(self, rect: QRect, *, move: bool) -> int:
-        # Returns the height; places the items only if `move`.
-        edge = self.contentsMargins()
-        room = rect.marginsRemoved(edge)
+    def _arrange(self, rect: QRect, *, should_move: bool) -> int:
+        # Returns the height; places the items only if `should_move`.
+        margins = self.contentsMargins()
+        room = rect.marginsRemoved(margins)
         items = [*self._visible_items()]
         rows = [self._one_row(items, room.width())] if items else []
         if rows and not rows[0]:
@@ -118,17 +119,17 @@ class Flow(QLayout):
         for row in rows:
             row_height = max(_height_for_width(item, width) for item, _rect, width in row)
             for item, left, width in row:
-                if move:
+                if should_move:
                     height = min(row_height, _height_for_width(item, width))
                     item.setGeometry(
                         QRect(room.left() + left, top + (row_height - height) // 2, width, height)
                     )
             top += row_height + self._row_gap
         used_height = top - room.top() - (self._row_gap if rows else 0)
-        return used_height + edge.top() + edge.bottom()
+        return used_height + margins.top() + margins.bottom()
 
     def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
-        # Rows of (item, left, width); empty if the items do not fit.
+        # Returns the row as (item, left, width); empty if the items don't fit.
         widths = [
             item.minimumSize().width() if self._is_elastic(item) else self._preferred_width(item)
             for item in items
@@ -138,11 +139,11 @@ class Flow(QLayout):
             return []
         for index, item in enumerate(items):
             if self._is_elastic(item):
-                more = max(0, min(spare, self._maximum_width(item, room) - widths[index]))
-                widths[index] += more
-                spare -= more
-        pushed = self._items[self._push :] if self._push >= 0 else []
-        first = next((index for index, item in enumerate(items) if item in pushed), len(items))
+                extra = max(0, min(spare, self._maximum_width(item, room) - widths[index]))
+                widths[index] += extra
+                spare -= extra
+        pushed_items = self._items[self._push_index :] if self._push_index >= 0 else []
+        first = next((index for index, item in enumerate(items) if item in pushed_items), len(items))
         row, left = [], 0
         for index, (item, width) in enumerate(zip(items, widths, strict=True)):
             left += spare if index == first else 0
@@ -156,10 +157,10 @@ class Flow(QLayout):
         left = room + 1
         for item in items:
             width = min(room, self._maximum_width(item, room))
-            rest = room - left
-            if width > rest >= self._minimum_width(item):
-                width = rest
-            if width > rest:
+            remaining_width = room - left
+            if width > remaining_width >= self._minimum_width(item):
+                width = remaining_width
+            if width > remaining_width:
                 rows.append([])
                 left = 0
             rows[-1].append((item, left, width))

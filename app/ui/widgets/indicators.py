@@ -70,7 +70,7 @@ class Chip(QWidget):
         # high).
         super().__init__(parent)
         self._theme = theme
-        self._large = large
+        self._is_large = large
         self._text, self._status, self._icon = "", "", icon
         self._is_icon_only = False
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
@@ -108,26 +108,26 @@ class Chip(QWidget):
         self.updateGeometry()
         self.update()
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Show only the icon if `icon_only`, with the text as tooltip, else the icon and the text."""
-        if icon_only != self._is_icon_only:
-            self._is_icon_only = icon_only
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Show only the icon if `is_icon_only`, with the text as tooltip, else the icon and the text."""
+        if is_icon_only != self._is_icon_only:
+            self._is_icon_only = is_icon_only
             self.updateGeometry()
             self.update()
 
     def full_width(self) -> int:
         """Return the width in px with icon and text."""
-        width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
+        width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._is_large else 0)
         return round(width + (self._icon_side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
     def _icon_name(self) -> str:
         return self._theme.status(self._status).icon if self._icon is None else self._icon
 
     def _icon_side(self) -> float:
-        return self._theme.scaled(self._theme.size("icon", "small") + (1 if self._large else 0))
+        return self._theme.scaled(self._theme.size("icon", "small") + (1 if self._is_large else 0))
 
     def _font(self) -> QFont:
-        font = self._theme.font("body" if self._large else "small")
+        font = self._theme.font("body" if self._is_large else "small")
         font.setWeight(font.Weight.Medium)
         return font
 
@@ -136,7 +136,7 @@ class Chip(QWidget):
         return max(self._preferred_height(), round(self._icon_side()) + CHIP_PADDING)
 
     def _preferred_height(self) -> int:
-        min_height = CHIP_HEIGHT + (4 if self._large else 0)
+        min_height = CHIP_HEIGHT + (4 if self._is_large else 0)
         return max(min_height, round(paint.height_of(self._font())) + 6)
 
     def sizeHint(self) -> QSize:
@@ -162,12 +162,12 @@ class Chip(QWidget):
         status = theme.status(self._status)
         painter = QPainter(self)
         rect = QRectF(self.rect())
-        edge = theme.colour("controlBorder") if theme.high_contrast else None
+        edge = theme.colour("controlBorder") if theme.is_high_contrast else None
         tint = status.tint or "sunken"
         paint.box(painter, rect, rect.height() / 2, theme.colour(tint), edge)
         text_roles = {"off": "textSecondary", "running": "text"}
         text_colour = theme.colour(text_roles.get(self._status, status.colour))
-        left = float(CHIP_PADDING + (1 if self._large else 0))
+        left = float(CHIP_PADDING + (1 if self._is_large else 0))
         name = self._icon_name()
         if name:
             side = self._icon_side()
@@ -293,8 +293,10 @@ class StatusItem(QWidget):
         painter = QPainter(self)
         theme = self._theme
         rect = QRectF(self.rect())
-        loud = self._status in {"warn", "error"}
-        status_colour = theme.colour(theme.status(self._status).colour) if self._status and loud else None
+        is_prominent = self._status in {"warn", "error"}
+        status_colour = (
+            theme.colour(theme.status(self._status).colour) if self._status and is_prominent else None
+        )
         if self._icon:
             colour = status_colour or theme.colour(
                 theme.status(self._status).colour if self._status else "textSecondary"

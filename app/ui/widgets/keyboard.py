@@ -39,11 +39,11 @@ def is_keyboard_navigation() -> bool:
     return bool(application is not None and application.property(_NAVIGATION_PROPERTY))
 
 
-def set_keyboard_navigation(leads: bool) -> None:
+def set_keyboard_navigation(is_navigation: bool) -> None:
     """Set whether the last input was keyboard navigation, and not a mouse button."""
     application = QApplication.instance()
     if application is not None:
-        application.setProperty(_NAVIGATION_PROPERTY, leads)
+        application.setProperty(_NAVIGATION_PROPERTY, is_navigation)
 
 
 def next_in_focus_chain(widget: QWidget, *, forward: bool = True) -> QWidget:
@@ -76,8 +76,8 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
     """
     step = next_in_focus_chain(begin, forward=forward)
     while step is not begin and isValid(step):
-        takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
-        if takes and step.isVisible() and step.isEnabled() and widget.isAncestorOf(step):
+        accepts_tab = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
+        if accepts_tab and step.isVisible() and step.isEnabled() and widget.isAncestorOf(step):
             yield step
         step = next_in_focus_chain(step, forward=forward)
 

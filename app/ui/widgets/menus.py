@@ -1,4 +1,4 @@
-"""Menus with round corners, for the menu bar, panels and text fields.
+"""Menus with rounded corners, for the menu bar, panels and text fields.
 
 Where the system composites windows (Wayland, macOS, Windows) the corners are transparent. Under X11,
 where a compositor may be missing and the corners would be black, a mask clips the window.
@@ -34,14 +34,14 @@ from app.ui.widgets.mnemonics import key_of, mnemonic_positions, strip_mnemonic
 from app.ui.widgets.paint import RIGHT, box, text_line, width_of
 
 MASKED_PLATFORMS = frozenset({"xcb"})
-MARK, MAX_MARK, TEXT_LEFT = 15, 22, 33
+MARK_SIZE, MAX_MARK_SIZE, TEXT_LEFT = 15, 22, 33
 SCROLLER_HEIGHT = 22  # px, as in the style sheet
-GUESSED_ROLE = QAction.MenuRole.TextHeuristicRole
+HEURISTIC_ROLE = QAction.MenuRole.TextHeuristicRole
 MIN_WIDTH = 160  # px; narrower menus are unreadable and better placed over Stop
 
 
 def set_round_corners(widget: QWidget) -> None:
-    """Set the window flags of a popup for round corners; call this before the popup is first shown."""
+    """Set the window flags of a popup for rounded corners; call this before the popup is first shown."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
     widget.setWindowFlag(
         Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in MASKED_PLATFORMS
@@ -51,7 +51,7 @@ def set_round_corners(widget: QWidget) -> None:
 
 
 def clip_corners(widget: QWidget, radius: float) -> None:
-    """Clip a popup to round corners, on platforms that may have no compositor.
+    """Clip a popup to rounded corners, on platforms that may have no compositor.
 
     Args:
         widget: Popup.
@@ -62,7 +62,7 @@ def clip_corners(widget: QWidget, radius: float) -> None:
 
 
 def round_region(size: QSize, radius: float) -> QRegion:
-    """Return the region of a rectangle with round corners."""
+    """Return the region of a rectangle with rounded corners."""
     path = QPainterPath()
     path.addRoundedRect(QRectF(0, 0, size.width(), size.height()), radius, radius)
     return QRegion(path.toFillPolygon().toPolygon())
@@ -76,13 +76,14 @@ def geometry_beside_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     """
     if not menu.intersects(stop):
         return menu
-    left, low, narrow = menu.translated(stop.left() - menu.right() - 1, 0), QRect(menu), QRect(menu)
-    low.moveTop(stop.bottom() + 1)
-    narrow.setLeft(screen.left())
-    narrow.setRight(stop.left() - 1)
-    if narrow.width() < MIN_WIDTH:
-        narrow = menu
-    return next((rect for rect in (left, low) if screen.contains(rect)), narrow)
+    moved_left = menu.translated(stop.left() - menu.right() - 1, 0)
+    moved_down, narrowed = QRect(menu), QRect(menu)
+    moved_down.moveTop(stop.bottom() + 1)
+    narrowed.setLeft(screen.left())
+    narrowed.setRight(stop.left() - 1)
+    if narrowed.width() < MIN_WIDTH:
+        narrowed = menu
+    return next((rect for rect in (moved_left, moved_down) if screen.contains(rect)), narrowed)
 
 
 def stop_button_at(position: QPoint) -> QAbstractButton | None:
@@ -92,9 +93,9 @@ def stop_button_at(position: QPoint) -> QAbstractButton | None:
     if any(window.windowType() == Qt.WindowType.Popup for window in candidates):
         return None
     for window in candidates:
-        under = window.childAt(window.mapFromGlobal(position))
-        if isinstance(under, StopButton) or (isinstance(under, Button) and under.kind == "stop"):
-            return under
+        widget = window.childAt(window.mapFromGlobal(position))
+        if isinstance(widget, StopButton) or (isinstance(widget, Button) and widget.kind == "stop"):
+            return widget
     return None
 
 
@@ -119,7 +120,7 @@ class Menu(QMenu):
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
         super().__init__(title, parent)
         self._theme = theme
-        self._by_keys = False
+        self._is_opened_by_keyboard = False
         self.menuAction().setMenuRole(QAction.MenuRole.NoRole)
         set_round_corners(self)
 
@@ -130,7 +131,7 @@ class Menu(QMenu):
         to the application menu.
         """
         action = event.action()
-        if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED_ROLE:
+        if event.type() == QEvent.Type.ActionAdded and action.menuRole() == HEURISTIC_ROLE:
             action.setMenuRole(QAction.MenuRole.NoRole)
         super().actionEvent(event)
 
@@ -142,27 +143,27 @@ class Menu(QMenu):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Activate an entry when its mnemonic letter is pressed."""
-        self._by_keys = True
+        self._is_opened_by_keyboard = True
         self.update()
         modifiers = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
-        pressed = "" if modifiers else key_of(event.text())
-        for action, position in self.mnemonics().items() if pressed else ():
+        key = "" if modifiers else key_of(event.text())
+        for action, position in self.mnemonics().items() if key else ():
             if (
                 position >= 0
-                and key_of(strip_mnemonic(action.text())[position]) == pressed
+                and key_of(strip_mnemonic(action.text())[position]) == key
                 and action.isEnabled()
             ):
                 self.setActiveAction(action)
                 if action.menu() is None:
-                    nothing = Qt.KeyboardModifier.NoModifier
-                    super().keyPressEvent(QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, nothing))
+                    no_modifiers = Qt.KeyboardModifier.NoModifier
+                    super().keyPressEvent(QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, no_modifiers))
                 return
         super().keyPressEvent(event)
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         modifiers = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
-        self._by_keys = bool(modifiers) or is_keyboard_navigation()
+        self._is_opened_by_keyboard = bool(modifiers) or is_keyboard_navigation()
         clip_corners(self, self._theme.radius("panel"))
         self._avoid_stop()
 
@@ -200,20 +201,20 @@ class Menu(QMenu):
         visible_actions = [action for action in self.actions() if action.isVisible()]
         above, below = self._hidden_ends(visible_actions)
         contents = rect.adjusted(1, 1 + above * SCROLLER_HEIGHT, -1, -1 - below * SCROLLER_HEIGHT)
-        for hidden, icon, top in (
+        for is_hidden, icon, top in (
             (above, "chevron-up", 1),
             (below, "chevron-down", rect.height() - SCROLLER_HEIGHT),
         ):
-            if hidden:
+            if is_hidden:
                 icon_rect = QRectF((rect.width() - 14) / 2, top + (SCROLLER_HEIGHT - 14) / 2, 14, 14)
                 paint_icon(painter, icon_rect, icon, theme.colour("textSecondary"))
         painter.setClipRect(contents)
-        letters = self.mnemonics()
+        mnemonic_positions_by_action = self.mnemonics()
         for action in visible_actions:
             action_rect = QRectF(self.actionGeometry(action))
             action_rect.setRight(min(action_rect.right(), rect.right() - 6))
             if action_rect.intersects(contents):
-                self._paint_action(painter, action_rect, action, letters.get(action, -1))
+                self._paint_action(painter, action_rect, action, mnemonic_positions_by_action.get(action, -1))
         painter.end()
 
     def _hidden_ends(self, visible_actions: list[QAction]) -> tuple[bool, bool]:
@@ -226,8 +227,8 @@ class Menu(QMenu):
     def _paint_underline(self, painter: QPainter, text_rect: QRectF, text: str, letter: int) -> None:
         font = self.font()
         left, width = width_of(font, text[:letter]), width_of(font, text[letter])
-        low = text_rect.center().y() + QFontMetricsF(font).ascent() / 2 + 1
-        painter.fillRect(QRectF(text_rect.left() + left, round(low), width, 1), painter.pen().color())
+        underline_y = text_rect.center().y() + QFontMetricsF(font).ascent() / 2 + 1
+        painter.fillRect(QRectF(text_rect.left() + left, round(underline_y), width, 1), painter.pen().color())
 
     def _paint_action(self, painter: QPainter, action_rect: QRectF, action: QAction, letter: int) -> None:
         theme = self._theme
@@ -239,9 +240,9 @@ class Menu(QMenu):
             return
         if action is self.activeAction() and action.isEnabled():
             box(painter, action_rect, theme.radius("small"), theme.colour("hover"))
-        side = min(theme.scaled(MARK), MAX_MARK)
+        side = min(theme.scaled(MARK_SIZE), MAX_MARK_SIZE)
         mark = QRectF(
-            action_rect.left() + 9 - (side - MARK) / 4, action_rect.center().y() - side / 2, side, side
+            action_rect.left() + 9 - (side - MARK_SIZE) / 4, action_rect.center().y() - side / 2, side, side
         )
         if action.isChecked():
             paint_icon(painter, mark, "check", theme.colour("accentText"))
@@ -257,7 +258,7 @@ class Menu(QMenu):
         if text_width + 12 + width_of(self.font(), key) > text_rect.width():
             key = ""  # in a narrow menu the text takes precedence; shortcuts are listed on F1
         text_line(painter, text_rect, text, self.font(), colour)
-        if self._by_keys and letter >= 0 and text_width <= text_rect.width():
+        if self._is_opened_by_keyboard and letter >= 0 and text_width <= text_rect.width():
             self._paint_underline(painter, text_rect, text, letter)
         if action.menu() is not None:
             chevron = QRectF(text_rect.right() - 12, action_rect.center().y() - 7, 14, 14)

@@ -35,7 +35,7 @@ def box(
     border: QColor | None = None,
     width: float = 1.0,
 ) -> None:
-    """Paint a box with round corners.
+    """Paint a box with rounded corners.
 
     Args:
         painter: Painter.
@@ -63,20 +63,20 @@ def hairline(painter: QPainter, rect: QRectF, edge: Qt.Edge, colour: QColor) -> 
     The width is the same at every position, even with a fractional device pixel ratio.
     """
     ratio = painter.device().devicePixelRatioF()
-    thin = max(1, int(ratio)) / ratio
+    line_width = max(1, int(ratio)) / ratio
     line = QRectF(rect)
     if edge == Qt.Edge.TopEdge:
-        line.setHeight(thin)
+        line.setHeight(line_width)
     elif edge == Qt.Edge.BottomEdge:
-        line.setTop(rect.bottom() - thin)
+        line.setTop(rect.bottom() - line_width)
     elif edge == Qt.Edge.LeftEdge:
-        line.setWidth(thin)
+        line.setWidth(line_width)
     else:
-        line.setLeft(rect.right() - thin)
-    smooth = painter.testRenderHint(QPainter.RenderHint.Antialiasing)
+        line.setLeft(rect.right() - line_width)
+    is_antialiased = painter.testRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.fillRect(line, colour)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing, smooth)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, is_antialiased)
 
 
 def text_line(
@@ -146,9 +146,9 @@ def set_elision_tooltip(widget: QWidget, text: str) -> None:
     has_own_tooltip = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
     if has_own_tooltip:
         return
-    short = widget.width() < widget.sizeHint().width() - 1
-    widget.setProperty("shortened", short)
-    widget.setToolTip(plain.tip(text if short else ""))
+    is_elided = widget.width() < widget.sizeHint().width() - 1
+    widget.setProperty("shortened", is_elided)
+    widget.setToolTip(plain.tip(text if is_elided else ""))
 
 
 def announce(widget: QWidget, text: str) -> None:

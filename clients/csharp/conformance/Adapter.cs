@@ -90,7 +90,7 @@ internal static class Adapter
                 _node.Close();
                 break;
             default:
-                throw new NotSupportedException("this adapter does not know '" + (string)request["do"] + "'");
+                throw new NotSupportedException("unknown request '" + (string)request["do"] + "'");
         }
         return answer;
     }

@@ -6,12 +6,12 @@ namespace Nep
 {
     /// <summary>Starts the background threads of the library and waits for them when the process exits.</summary>
     /// <remarks>
-    /// Mono 6.8 aborts the process when a background thread throws an exception while the runtime shuts down: a reader whose
-    /// socket has just been closed does that.
+    /// Mono 6.8 aborts the process if a background thread throws an exception while the runtime shuts down, as a reader does
+    /// whose socket is closed.
     /// </remarks>
     internal static class BackgroundThread
     {
-        /// <summary>Stack of threads that run only code of the library.</summary>
+        /// <summary>Stack size of threads that run no callbacks.</summary>
         public const int SmallStackBytes = 256 * 1024;
 
         private static readonly List<Thread> Running = new List<Thread>();
@@ -29,7 +29,7 @@ namespace Nep
             return thread;
         }
 
-        /// <summary>Wait until all threads have ended; false when the time is over first.</summary>
+        /// <summary>Wait until all threads have ended; return false after the timeout.</summary>
         public static bool JoinAll(int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
@@ -41,7 +41,7 @@ namespace Nep
             bool allEnded = true;
             foreach (Thread each in threads)
             {
-                bool isOwn = each == Thread.CurrentThread; // a callback may end the process
+                bool isOwn = each == Thread.CurrentThread; // a callback may exit the process
                 allEnded &= isOwn || each.Join(deadline.LeftMs);
             }
             return allEnded;

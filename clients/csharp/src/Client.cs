@@ -6,7 +6,7 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>Calls one service. Created by <see cref="Node.CreateClient"/>. Thread-safe; any number of calls at once.</summary>
+    /// <summary>Client of one service, created by <see cref="Node.CreateClient"/>. Thread-safe; calls may overlap.</summary>
     /// <example><code>Sum answer = client.Call&lt;Sum&gt;(new { a = 2, b = 3 }, TimeSpan.FromSeconds(5));</code></example>
     public sealed class Client : IDisposable
     {
@@ -21,26 +21,26 @@ namespace Nep
             _codec = codec;
         }
 
-        /// <summary>Call the service and wait for its answer.</summary>
-        /// <typeparam name="TAnswer">Type of the answer, as for <see cref="Message.As{T}"/>.</typeparam>
+        /// <summary>Call the service and wait for its reply.</summary>
+        /// <typeparam name="TAnswer">Type of the reply, as for <see cref="Message.As{T}"/>.</typeparam>
         /// <param name="request">Request, as for <see cref="Publisher.Publish"/>.</param>
-        /// <param name="timeout">Longest wait for a server and its answer; <see cref="Timeout.InfiniteTimeSpan"/> waits for ever.</param>
-        /// <exception cref="NoServerException">No server was reached in time; nothing was sent.</exception>
-        /// <exception cref="ServiceTimeoutException">It was sent, and no answer came in time.</exception>
-        /// <exception cref="ServerGoneException">The server ended during the call.</exception>
-        /// <exception cref="ServiceException">The server's callback failed.</exception>
-        /// <exception cref="RequestRefusedException">The server did not carry it out.</exception>
-        /// <exception cref="PayloadException">The request can't be sent, or the answer can't be read.</exception>
+        /// <param name="timeout">Maximum time to wait for a server and its reply; <see cref="Timeout.InfiniteTimeSpan"/> waits without a limit.</param>
+        /// <exception cref="NoServerException">No server was reached before the timeout; nothing was sent.</exception>
+        /// <exception cref="ServiceTimeoutException">The call was sent, and no reply arrived before the timeout.</exception>
+        /// <exception cref="ServerGoneException">The server exited during the call.</exception>
+        /// <exception cref="ServiceException">The server's callback threw an exception.</exception>
+        /// <exception cref="RequestRefusedException">The server rejected the call.</exception>
+        /// <exception cref="PayloadException">The request can't be encoded, or the reply can't be decoded.</exception>
         public TAnswer Call<TAnswer>(object request, TimeSpan timeout)
         {
             return Call<TAnswer>(request, timeout, CancellationToken.None);
         }
 
         /// <summary>Call the service without blocking the caller. See <see cref="Call{TAnswer}(object, TimeSpan)"/>.</summary>
-        /// <typeparam name="TAnswer">Type of the answer.</typeparam>
+        /// <typeparam name="TAnswer">Type of the reply.</typeparam>
         /// <param name="request">Request.</param>
-        /// <param name="timeout">Longest wait for a server and its answer.</param>
-        /// <param name="cancellation">Ends the wait; the server may carry it out all the same.</param>
+        /// <param name="timeout">Maximum time to wait for a server and its reply.</param>
+        /// <param name="cancellation">Ends the wait; the server may still execute the call.</param>
         public async Task<TAnswer> CallAsync<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation = default(CancellationToken))
         {
             using (cancellation.Register(_socket.Wake))
@@ -50,7 +50,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Close; waiting calls end with <see cref="ObjectDisposedException"/>.</summary>
+        /// <summary>Close the client; pending calls throw <see cref="ObjectDisposedException"/>.</summary>
         public void Dispose()
         {
             _node.Close(_socket);
@@ -61,7 +61,7 @@ namespace Nep
             byte[] payload = _codec.Encode(request);
             if (payload.Length > ServiceHeader.MaxPayloadBytes)
             {
-                throw new PayloadException("A request has at most 64 MB.");
+                throw new PayloadException("The request is larger than 64 MB.");
             }
             OutgoingCall call = _socket.Call(_codec.Number, payload, Node.TimeoutMs(timeout), cancellation);
             if (call.Kind != ServiceHeader.Answer)
@@ -71,7 +71,7 @@ namespace Nep
             Codec codec = Codec.Numbered(call.Codec);
             if (codec == null)
             {
-                throw new PayloadException("The answer has an unknown codec.");
+                throw new PayloadException("The reply has an unknown codec.");
             }
             return codec.Decode<TAnswer>(call.Payload);
         }

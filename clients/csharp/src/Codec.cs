@@ -4,7 +4,7 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>Payloads to and from bytes.</summary>
+    /// <summary>Encoder and decoder of payloads.</summary>
     internal sealed class Codec
     {
         private static readonly string[] CodecNames = { "", "json", "string", "bytes", "msgpack", "image" };
@@ -26,27 +26,27 @@ namespace Nep
             return CodecNames[number];
         }
 
-        /// <summary>The codec of a message type: types without one of their own are carried as JSON.</summary>
+        /// <summary>Return the codec of a message type; types without a codec are encoded as JSON.</summary>
         public static Codec For(string type)
         {
             int number = type == "images" ? 5 : Array.IndexOf(CodecNames, type);
             return new Codec((byte)(number < 1 ? 1 : number));
         }
 
-        /// <summary>The codec of a call or answer; null when it has none.</summary>
+        /// <summary>Return the codec of a call or reply; null if the number is unknown.</summary>
         public static Codec Numbered(int number)
         {
             return number >= 1 && number <= 4 ? new Codec((byte)number) : null;
         }
 
-        /// <exception cref="PayloadException">It can't be decoded, or is of another type.</exception>
+        /// <exception cref="PayloadException">The payload can't be decoded, or has another type.</exception>
         public T Decode<T>(byte[] payload)
         {
             var header = new Header { Codec = Number };
             return new Message(new WireMessage { Header = header, Payload = new ArraySegment<byte>(payload) }, Name, null).As<T>();
         }
 
-        /// <exception cref="PayloadException">The payload has no form in this codec.</exception>
+        /// <exception cref="PayloadException">The payload can't be encoded.</exception>
         public byte[] Encode(object payload)
         {
             switch (Number)
@@ -68,9 +68,9 @@ namespace Nep
                     var bytes = payload as byte[];
                     if (bytes == null)
                     {
-                        throw new PayloadException("A topic of type '" + Name + "' carries byte[].");
+                        throw new PayloadException("A topic of type '" + Name + "' requires byte[].");
                     }
-                    return (byte[])bytes.Clone(); // the caller may go on using its array
+                    return (byte[])bytes.Clone(); // the caller may reuse its array
             }
         }
 
@@ -78,7 +78,7 @@ namespace Nep
         {
             if (text == null)
             {
-                throw new PayloadException("A topic of type 'string' carries text.");
+                throw new PayloadException("A topic of type 'string' requires a string.");
             }
             return Encoding.UTF8.GetBytes(text);
         }
@@ -90,14 +90,14 @@ namespace Nep
             {
                 text = Json.Serializer.Serialize(payload);
             }
-            catch (Exception exception) // each library has its own
+            catch (Exception exception) // depends on the serializer
             {
                 throw new PayloadException("The payload can't be converted to JSON: " + exception.Message, exception);
             }
             return CheckedJson(text);
         }
 
-        /// <summary>JSON text that exists already as bytes.</summary>
+        /// <summary>Encode and check JSON text.</summary>
         public static byte[] CheckedJson(string text)
         {
             byte[] bytes = Encoding.UTF8.GetBytes(text);

@@ -4,20 +4,20 @@ using System.Threading;
 
 namespace Nep
 {
-    /// <summary>End of a wait that began when this was created.</summary>
+    /// <summary>Deadline of a wait that starts when the instance is created.</summary>
     internal struct Deadline
     {
         private readonly Stopwatch _watch;
         private readonly int _timeoutMs;
 
-        /// <param name="timeoutMs">Milliseconds from now; negative: never.</param>
+        /// <param name="timeoutMs">Milliseconds from now; negative for no deadline.</param>
         public Deadline(int timeoutMs)
         {
             _watch = Stopwatch.StartNew();
             _timeoutMs = timeoutMs;
         }
 
-        /// <summary>Milliseconds until the end, 0 when it is over, <see cref="Timeout.Infinite"/> when there is none.</summary>
+        /// <summary>Remaining milliseconds, 0 after the deadline, <see cref="Timeout.Infinite"/> without one.</summary>
         public int LeftMs
         {
             get { return _timeoutMs < 0 ? Timeout.Infinite : (int)Math.Max(0, _timeoutMs - _watch.ElapsedMilliseconds); }
@@ -28,7 +28,7 @@ namespace Nep
             get { return LeftMs == 0; }
         }
 
-        /// <summary>Release a lock that the caller holds and wait until it is pulsed or the time is over.</summary>
+        /// <summary>Release a lock held by the caller and wait until it is pulsed or the deadline has passed.</summary>
         public void Wait(object heldLock)
         {
             int leftMs = LeftMs;

@@ -2,24 +2,24 @@ using System;
 
 namespace Nep
 {
-    /// <summary>Base class of the exceptions of this library.</summary>
+    /// <summary>Base class of the library's exceptions.</summary>
     public class NepException : Exception
     {
         /// <summary>Create an exception with a message.</summary>
-        /// <param name="message">What happened and what to do about it.</param>
+        /// <param name="message">Description of the problem and its solution.</param>
         public NepException(string message) : base(message)
         {
         }
 
         /// <summary>Create an exception with a message and its cause.</summary>
-        /// <param name="message">What happened and what to do about it.</param>
-        /// <param name="inner">Exception that led to this one.</param>
+        /// <param name="message">Description of the problem and its solution.</param>
+        /// <param name="inner">Cause of this exception.</param>
         public NepException(string message, Exception inner) : base(message, inner)
         {
         }
     }
 
-    /// <summary>No master answered within the timeout.</summary>
+    /// <summary>No master replied before the timeout.</summary>
     public sealed class MasterUnreachableException : NepException
     {
         internal MasterUnreachableException(string address, string message) : base(message)
@@ -27,11 +27,11 @@ namespace Nep
             Address = address;
         }
 
-        /// <summary>Address that was tried, as <c>HOST:PORT</c>.</summary>
+        /// <summary>Address of the master, as <c>HOST:PORT</c>.</summary>
         public string Address { get; private set; }
     }
 
-    /// <summary>The master refused a registration; the message has its reason.</summary>
+    /// <summary>The master or a server rejected a request; the message contains the reason.</summary>
     public sealed class RequestRefusedException : NepException
     {
         internal RequestRefusedException(string reason) : base(reason)
@@ -39,7 +39,7 @@ namespace Nep
         }
     }
 
-    /// <summary>A payload can't be converted to or from the codec of its topic.</summary>
+    /// <summary>A payload can't be encoded or decoded by the codec of its topic.</summary>
     public sealed class PayloadException : NepException
     {
         internal PayloadException(string message) : base(message)

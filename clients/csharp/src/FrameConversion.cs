@@ -1,9 +1,9 @@
 namespace Nep
 {
-    /// <summary>Coordinates between ROS (x forward, y left, z up, right-handed) and Unity (x right, y up, z forward, left-handed).</summary>
+    /// <summary>Conversion of coordinates between ROS (x forward, y left, z up, right-handed) and Unity (x right, y up, z forward, left-handed).</summary>
     /// <remarks>
-    /// Lengths stay in metres. Angular velocities are converted as the vector part of a rotation, by <see cref="RosToUnityRotation"/>
-    /// and <see cref="UnityToRosRotation"/> with any w.
+    /// Lengths remain in metres. Angular velocities are converted like the vector part of a rotation, with
+    /// <see cref="RosToUnityRotation"/> and <see cref="UnityToRosRotation"/>.
     /// </remarks>
     public static class FrameConversion
     {
@@ -35,7 +35,7 @@ namespace Nep
             rosZ = y;
         }
 
-        /// <summary>Convert a rotation (unit quaternion) from ROS to Unity; w stays.</summary>
+        /// <summary>Convert a rotation (unit quaternion) from ROS to Unity; w is unchanged.</summary>
         /// <param name="x">Vector part, forward.</param>
         /// <param name="y">Vector part, left.</param>
         /// <param name="z">Vector part, up.</param>
@@ -44,12 +44,12 @@ namespace Nep
         /// <param name="unityZ">Vector part, forward.</param>
         public static void RosToUnityRotation(double x, double y, double z, out double unityX, out double unityY, out double unityZ)
         {
-            unityX = y; // an axis changes its sign with the handedness
+            unityX = y; // changing the handedness inverts the axis
             unityY = -z;
             unityZ = -x;
         }
 
-        /// <summary>Convert a rotation (unit quaternion) from Unity to ROS; w stays.</summary>
+        /// <summary>Convert a rotation (unit quaternion) from Unity to ROS; w is unchanged.</summary>
         /// <param name="x">Vector part, right.</param>
         /// <param name="y">Vector part, up.</param>
         /// <param name="z">Vector part, forward.</param>

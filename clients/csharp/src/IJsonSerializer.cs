@@ -2,15 +2,15 @@ using System;
 
 namespace Nep
 {
-    /// <summary>Converts objects to and from JSON. Implementations must be thread-safe.</summary>
+    /// <summary>Converter between objects and JSON. Implementations must be thread-safe.</summary>
     /// <remarks>
-    /// Set <see cref="Json.Serializer"/> to use another library than Newtonsoft.Json, for instance one that generates its code
-    /// ahead of time.
+    /// Set <see cref="Json.Serializer"/> to use another library than Newtonsoft.Json, for example one that generates code ahead
+    /// of time.
     /// </remarks>
     public interface IJsonSerializer
     {
         /// <summary>Convert an object to JSON text. NaN and infinity become <c>null</c>.</summary>
-        /// <param name="value">Object, dictionary, list or plain value; may be null.</param>
+        /// <param name="value">Object, dictionary, list, plain value or null.</param>
         string Serialize(object value);
 
         /// <summary>Convert JSON text to an object.</summary>
@@ -19,12 +19,12 @@ namespace Nep
         object Deserialize(string json, Type type);
     }
 
-    /// <summary>JSON library that publishers and messages use.</summary>
+    /// <summary>JSON library used by publishers and messages.</summary>
     public static class Json
     {
         private static IJsonSerializer _serializer = new NewtonsoftJsonSerializer();
 
-        /// <summary>Serializer of this process. Default: Newtonsoft.Json.</summary>
+        /// <summary>Serializer used by the process. Default: Newtonsoft.Json.</summary>
         /// <exception cref="ArgumentNullException">The value is null.</exception>
         public static IJsonSerializer Serializer
         {
@@ -39,8 +39,8 @@ namespace Nep
             }
         }
 
-        /// <summary>Check what serializers accept silently: too many levels, an end that comes too early, nothing at all.</summary>
-        /// <exception cref="PayloadException">The bytes are not one JSON value with at most 64 levels.</exception>
+        /// <summary>Check for errors that serializers ignore: too deep nesting, truncated and empty JSON.</summary>
+        /// <exception cref="PayloadException">The JSON is empty, truncated, or nested more than 64 levels deep.</exception>
         internal static void Check(byte[] json, int offset, int count)
         {
             int level = 0;
@@ -62,7 +62,7 @@ namespace Nep
                 {
                     if (++level > Wire.MessagePackReader.MaxLevels)
                     {
-                        throw new PayloadException("The JSON has more than 64 levels of lists and objects.");
+                        throw new PayloadException("The JSON is nested more than 64 levels deep.");
                     }
                 }
                 else if (each == ']' || each == '}')
@@ -72,7 +72,7 @@ namespace Nep
             }
             if (level != 0 || isText || isEmpty)
             {
-                throw new PayloadException("The JSON ends too early.");
+                throw new PayloadException("The JSON is truncated.");
             }
         }
     }

@@ -3,15 +3,15 @@ using System.Collections.Generic;
 
 namespace Nep
 {
-    /// <summary>Size and kind of a JPEG or PNG file, turned as its EXIF orientation says.</summary>
+    /// <summary>Reader for the size and format of JPEG and PNG files; applies the EXIF orientation.</summary>
     internal static class ImageHeader
     {
-        private const int MaxExifBytes = 4096; // as far as other readers look for the orientation
+        private const int MaxExifBytes = 4096; // other readers don't search further, either
         private const int OrientationTag = 0x0112;
         private const int FirstTransposed = 5;
 
-        /// <summary>The extension of an image message: <c>shape</c> and <c>encoding</c>.</summary>
-        /// <exception cref="PayloadException">It is neither JPEG nor PNG.</exception>
+        /// <summary>Return the extension of an image message: <c>shape</c> and <c>encoding</c>.</summary>
+        /// <exception cref="PayloadException">The file is neither JPEG nor PNG.</exception>
         public static Dictionary<object, object> Describe(byte[] file)
         {
             bool isPng = file.Length > 25 && file[0] == 0x89 && file[1] == 'P' && file[2] == 'N' && file[3] == 'G';
@@ -19,7 +19,7 @@ namespace Nep
             List<object> shape = isPng ? DescribePng(file, ref orientation) : DescribeJpeg(file, ref orientation);
             if (shape == null)
             {
-                throw new PayloadException("An image is a JPEG or PNG file.");
+                throw new PayloadException("The image is neither a JPEG nor a PNG file.");
             }
             if (orientation >= FirstTransposed)
             {
@@ -52,7 +52,7 @@ namespace Nep
             while (file.Length > 3 && file[0] == 0xFF && file[1] == 0xD8 && at + 9 < file.Length && file[at] == 0xFF)
             {
                 int marker = file[at + 1];
-                if (marker == 0xDA) // the pixels
+                if (marker == 0xDA) // start of the pixels
                 {
                     break;
                 }

@@ -1,14 +1,14 @@
-#define TRACE // without it compilers leave out calls of Trace, as Unity and plain mcs do
+#define TRACE // otherwise compilers omit calls of Trace, as Unity and mcs do by default
 
 using System;
 using System.Diagnostics;
 
 namespace Nep
 {
-    /// <summary>Warnings for the program's trace listeners (<see cref="Trace.Listeners"/>).</summary>
+    /// <summary>Log that writes warnings to the program's trace listeners (<see cref="Trace.Listeners"/>).</summary>
     internal static class Log
     {
-        /// <summary>Receives warnings instead of the trace listeners, in any thread; null for these.</summary>
+        /// <summary>Function that receives warnings, in any thread, instead of the trace listeners; null to use these.</summary>
         public static volatile Action<string> Sink;
 
         public static void Warning(string text)

@@ -5,7 +5,7 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>A received message. Immutable; decoded when its value is asked for.</summary>
+    /// <summary>Received message. Immutable; decoded when its value is read.</summary>
     public sealed class Message
     {
         private readonly WireMessage _wire;
@@ -13,9 +13,9 @@ namespace Nep
         private readonly ulong _receivedNs;
         private byte[] _payload;
 
-        /// <param name="wire">The message as it was read.</param>
-        /// <param name="messageType">Type that its publisher declared.</param>
-        /// <param name="clock">Clock of its publisher, or null.</param>
+        /// <param name="wire">Message of the wire.</param>
+        /// <param name="messageType">Type declared by the publisher.</param>
+        /// <param name="clock">Clock of the publisher, or null.</param>
         internal Message(WireMessage wire, string messageType, Session.PublisherClock clock)
         {
             _wire = wire;
@@ -24,42 +24,42 @@ namespace Nep
             MessageType = messageType;
         }
 
-        /// <summary>Topic that it was published on.</summary>
+        /// <summary>Topic on which the message was published.</summary>
         public string Topic
         {
             get { return _wire.Topic; }
         }
 
-        /// <summary>Type that its publisher declared, such as <c>json</c> or <c>sensor_msgs/Image</c>.</summary>
+        /// <summary>Type declared by the publisher, such as <c>json</c> or <c>sensor_msgs/Image</c>.</summary>
         public string MessageType { get; private set; }
 
-        /// <summary>How the payload is encoded: <c>json</c>, <c>string</c>, <c>bytes</c>, <c>msgpack</c> or <c>image</c>.</summary>
+        /// <summary>Codec of the payload: <c>json</c>, <c>string</c>, <c>bytes</c>, <c>msgpack</c> or <c>image</c>.</summary>
         public string Codec
         {
             get { return Nep.Codec.NameOf(_wire.Header.Codec); }
         }
 
-        /// <summary>Number of the message; its publisher counts from 1 without gaps.</summary>
+        /// <summary>Sequence number, counted from 1 by the publisher.</summary>
         public ulong Sequence
         {
             get { return _wire.Header.Seq; }
         }
 
-        /// <summary>When it was published, by the publisher's clock, in nanoseconds since 1970 (UTC).</summary>
+        /// <summary>Time of publication by the publisher's clock, in nanoseconds since 1970 (UTC).</summary>
         public ulong StampNanoseconds
         {
             get { return _wire.Header.StampNs; }
         }
 
-        /// <summary>When it was published, by the publisher's clock (UTC), to 100 ns.</summary>
+        /// <summary>Time of publication by the publisher's clock (UTC), with a resolution of 100 ns.</summary>
         public DateTime Stamp
         {
             get { return Session.Clock.ToDateTime(_wire.Header.StampNs); }
         }
 
         /// <summary>
-        /// Time from its publication until it was received. Between two computers it is corrected by how their clocks differ, as far
-        /// as <see cref="LatencyUncertainty"/> says; so it may be a little below zero.
+        /// Time from publication to reception. Between two computers it is corrected by the difference of their clocks, with the
+        /// uncertainty <see cref="LatencyUncertainty"/>, so it may be slightly negative.
         /// </summary>
         public TimeSpan Latency
         {
@@ -73,8 +73,8 @@ namespace Nep
         }
 
         /// <summary>
-        /// How far <see cref="Latency"/> may be wrong to either side: zero for publishers on this computer, null while nobody has
-        /// compared the two clocks; then it is not corrected.
+        /// Maximum error of <see cref="Latency"/>: zero for publishers on this computer, null while the difference of the clocks is
+        /// unknown and the latency is not corrected.
         /// </summary>
         public TimeSpan? LatencyUncertainty
         {
@@ -91,25 +91,25 @@ namespace Nep
             get { return _wire.Header.Publisher; }
         }
 
-        /// <summary>Whether its publisher sends it to later subscribers as well.</summary>
+        /// <summary>True if the publisher keeps the message for late subscribers.</summary>
         public bool IsLatched
         {
             get { return (_wire.Header.Flags & Header.Latched) != 0; }
         }
 
-        /// <summary>Bytes of the payload.</summary>
+        /// <summary>Size of the payload in bytes.</summary>
         public int Size
         {
             get { return _wire.Payload.Count; }
         }
 
-        /// <summary>Data beside the payload, such as <c>shape</c> and <c>encoding</c> of an image; empty when there is none.</summary>
+        /// <summary>Named values sent with the payload, such as <c>shape</c> and <c>encoding</c> of an image; empty if there are none.</summary>
         public IDictionary<string, object> Extension
         {
             get { return _wire.Extension ?? new Dictionary<string, object>(); }
         }
 
-        /// <summary>The payload as it was received. Don't change it.</summary>
+        /// <summary>Received payload. Don't modify it.</summary>
         public byte[] Payload
         {
             get
@@ -133,14 +133,14 @@ namespace Nep
         }
 
         /// <summary>Text of a <c>string</c> or <c>json</c> message.</summary>
-        /// <exception cref="PayloadException">It has another codec or is no UTF-8.</exception>
+        /// <exception cref="PayloadException">The message has another codec, or isn't valid UTF-8.</exception>
         public string Text
         {
             get
             {
                 if (_wire.Header.Codec > 2)
                 {
-                    throw new PayloadException("A message of codec '" + Codec + "' is no text.");
+                    throw new PayloadException("A message with the codec '" + Codec + "' isn't text.");
                 }
                 try
                 {
@@ -148,14 +148,14 @@ namespace Nep
                 }
                 catch (DecoderFallbackException exception)
                 {
-                    throw new PayloadException("The text of the message is no UTF-8.", exception);
+                    throw new PayloadException("The text of the message is not valid UTF-8.", exception);
                 }
             }
         }
 
-        /// <summary>Convert a <c>json</c> message to an object of a class.</summary>
+        /// <summary>Convert a <c>json</c> message to an object.</summary>
         /// <typeparam name="T">Class with public properties or fields named as in the JSON, or a dictionary or list.</typeparam>
-        /// <exception cref="PayloadException">It is no JSON, is nested too deeply, or does not fit the type.</exception>
+        /// <exception cref="PayloadException">The JSON is invalid, nested too deep, or doesn't match the type.</exception>
         /// <example><code>Pose pose = message.As&lt;Pose&gt;();</code></example>
         public T As<T>()
         {
@@ -166,7 +166,7 @@ namespace Nep
                 {
                     return (T)value;
                 }
-                throw new PayloadException("A message of codec '" + Codec + "' can't be converted to " + typeof(T).Name + ".");
+                throw new PayloadException("A message with the codec '" + Codec + "' can't be converted to " + typeof(T).Name + ".");
             }
             Json.Check(_wire.Payload.Array, _wire.Payload.Offset, _wire.Payload.Count);
             string text = Text;
@@ -174,17 +174,17 @@ namespace Nep
             {
                 return (T)Json.Serializer.Deserialize(text, typeof(T));
             }
-            catch (Exception exception) // each library has its own
+            catch (Exception exception) // depends on the serializer
             {
                 throw new PayloadException("The JSON can't be converted to " + typeof(T).Name + ": " + exception.Message, exception);
             }
         }
 
         /// <summary>
-        /// Decoded payload: what the JSON serializer makes of <c>json</c>, a string, byte[], or plain values of <c>msgpack</c>
+        /// Decoded payload: the result of the JSON serializer for <c>json</c>, a string, byte[], or plain values for <c>msgpack</c>
         /// (long, ulong, double, bool, string, byte[], DateTime, List&lt;object&gt;, Dictionary&lt;object, object&gt;).
         /// </summary>
-        /// <exception cref="PayloadException">It can't be decoded.</exception>
+        /// <exception cref="PayloadException">The payload can't be decoded.</exception>
         public object Value
         {
             get
@@ -202,7 +202,7 @@ namespace Nep
                         }
                         catch (FormatException exception)
                         {
-                            throw new PayloadException("The message is no msgpack: " + exception.Message, exception);
+                            throw new PayloadException("The message is not valid msgpack: " + exception.Message, exception);
                         }
                     default:
                         return Payload;

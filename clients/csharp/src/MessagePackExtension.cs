@@ -1,11 +1,11 @@
 namespace Nep
 {
-    /// <summary>A msgpack extension of a type that has no .NET type of its own.</summary>
+    /// <summary>Value of a msgpack extension type without a corresponding .NET type.</summary>
     public sealed class MessagePackExtension
     {
         /// <summary>Create an extension value.</summary>
-        /// <param name="type">Application's type number, -128 to 127; -1 is msgpack's timestamp.</param>
-        /// <param name="data">Its bytes.</param>
+        /// <param name="type">Type number, -128 to 127; -1 is the timestamp of msgpack.</param>
+        /// <param name="data">Content of the extension.</param>
         public MessagePackExtension(sbyte type, byte[] data)
         {
             Type = type;
@@ -15,7 +15,7 @@ namespace Nep
         /// <summary>Type number.</summary>
         public sbyte Type { get; private set; }
 
-        /// <summary>Bytes.</summary>
+        /// <summary>Content of the extension.</summary>
         public byte[] Data { get; private set; }
     }
 }

@@ -5,7 +5,7 @@ using Newtonsoft.Json;
 
 namespace Nep
 {
-    /// <summary>Serializer that uses Newtonsoft.Json. Dates stay text; NaN and infinity become <c>null</c>.</summary>
+    /// <summary>Serializer that uses Newtonsoft.Json. Dates are not converted; NaN and infinity become <c>null</c>.</summary>
     public sealed class NewtonsoftJsonSerializer : IJsonSerializer
     {
         private readonly JsonSerializer _serializer;
@@ -15,8 +15,8 @@ namespace Nep
         {
         }
 
-        /// <summary>Create a serializer with other settings, such as converters.</summary>
-        /// <param name="settings">Settings; must not be changed afterwards.</param>
+        /// <summary>Create a serializer with custom settings, such as converters.</summary>
+        /// <param name="settings">Settings, which must not be changed afterwards.</param>
         public NewtonsoftJsonSerializer(JsonSerializerSettings settings)
         {
             _serializer = JsonSerializer.Create(settings);
@@ -41,13 +41,13 @@ namespace Nep
                 object value = _serializer.Deserialize(reader, type);
                 if (reader.Read())
                 {
-                    throw new JsonReaderException("something follows the JSON value");
+                    throw new JsonReaderException("the JSON value is followed by other text");
                 }
                 return value;
             }
         }
 
-        /// <summary>Writes null for the numbers that JSON lacks.</summary>
+        /// <summary>Writer that replaces NaN and infinity, which JSON lacks, by null.</summary>
         private sealed class FiniteJsonWriter : JsonTextWriter
         {
             public FiniteJsonWriter(TextWriter writer) : base(writer)

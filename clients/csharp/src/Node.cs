@@ -8,10 +8,10 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>A program's membership in a NEP network. Thread-safe.</summary>
+    /// <summary>Participant in a NEP network. Thread-safe.</summary>
     /// <remarks>
-    /// All threads of a node are background threads. A node that is still open when the process exits is closed then, so that
-    /// what was published is delivered.
+    /// All threads of a node are background threads. Nodes that are open when the process exits are closed, so that published
+    /// messages are delivered.
     /// </remarks>
     public sealed partial class Node : IDisposable
     {
@@ -34,20 +34,20 @@ namespace Nep
 
         /// <summary>Create a node. It registers with the master when its first publisher or subscriber is created.</summary>
         /// <param name="name">Name in the graph, 1 to 200 bytes of UTF-8 without control characters.</param>
-        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        /// <exception cref="ArgumentException">The name is invalid.</exception>
         public Node(string name) : this(name, new NodeOptions())
         {
         }
 
         /// <summary>Create a node with options.</summary>
         /// <param name="name">Name in the graph, 1 to 200 bytes of UTF-8 without control characters.</param>
-        /// <param name="options">Options; must not be changed afterwards.</param>
-        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        /// <param name="options">Options, which must not be changed afterwards.</param>
+        /// <exception cref="ArgumentException">The name is invalid.</exception>
         public Node(string name, NodeOptions options)
         {
             if (!Names.IsNodeName(name))
             {
-                throw new ArgumentException("A node's name has 1 to 200 bytes and no control characters.", "name");
+                throw new ArgumentException("The name of a node must have 1 to 200 bytes and no control characters.", "name");
             }
             _options = options;
             string key = Ids.NewKey();
@@ -72,7 +72,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Raised in the thread of a callback that threw an exception.</summary>
+        /// <summary>Raised when a callback has thrown an exception, in the thread of the callback.</summary>
         public event EventHandler<UnhandledExceptionEventArgs> CallbackFailed;
 
         /// <summary>Name in the graph.</summary>
@@ -83,18 +83,18 @@ namespace Nep
 
         /// <summary>Create a publisher. Its first message reaches every subscriber that was created before.</summary>
         /// <param name="topic">Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
-        /// <param name="type"><c>json</c>, <c>string</c>, <c>bytes</c>, <c>msgpack</c>, <c>image</c>, or the name of a type that is carried as JSON.</param>
+        /// <param name="type"><c>json</c>, <c>string</c>, <c>bytes</c>, <c>msgpack</c>, <c>image</c>, or the name of a type that is encoded as JSON.</param>
         /// <param name="options">Options, or null for the defaults.</param>
-        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
-        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        /// <exception cref="ArgumentException">The topic is invalid.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
+        /// <exception cref="ObjectDisposedException">The node is closed.</exception>
         public Publisher CreatePublisher(string topic, string type = "json", PublisherOptions options = null)
         {
             CheckTopic(topic);
             options = options ?? new PublisherOptions();
             if (options.History < 0 || options.History > 10000)
             {
-                throw new ArgumentException("A publisher keeps 0 to 10 000 messages.", "options");
+                throw new ArgumentException("The history must be 0 to 10 000 messages.", "options");
             }
             Codec codec = Codec.For(type);
             PublisherRecord record = PublisherRecordOf(topic, type, codec.Name);
@@ -110,23 +110,23 @@ namespace Nep
             return new Publisher(this, socket, codec, missing.ConvertAll(each => each.NodeName));
         }
 
-        /// <summary>Create a subscriber. It receives the next message of every publisher that is registered.</summary>
+        /// <summary>Create a subscriber. It receives the next message of every registered publisher.</summary>
         /// <param name="topic">
-        /// Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>; with a level <c>*</c> (any one level) or
-        /// <c>**</c> (any number of levels) all topics that match, such as <c>robot/*/camera</c>.
+        /// Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>; or a pattern with levels <c>*</c> (any one
+        /// level) or <c>**</c> (any number of levels), such as <c>robot/*/camera</c>.
         /// </param>
-        /// <param name="type">Type that is expected; what a message holds is told by the message.</param>
+        /// <param name="type">Expected type. Messages are decoded by their own codec.</param>
         /// <param name="options">Options, or null for the defaults.</param>
-        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
-        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        /// <exception cref="ArgumentException">The topic is invalid.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
+        /// <exception cref="ObjectDisposedException">The node is closed.</exception>
         public Subscriber CreateSubscriber(string topic, string type = "json", SubscriberOptions options = null)
         {
             CheckTopic(topic);
             options = options ?? new SubscriberOptions();
             if (options.MaxMessages < 1 || options.MaxBytes < 1)
             {
-                throw new ArgumentException("A subscriber keeps at least one message.", "options");
+                throw new ArgumentException("The inbox must hold at least one message.", "options");
             }
             SubscriberRecord record = SubscriberRecordOf(topic, type);
             record.IsPattern = options.Wildcards && TopicPattern.IsPattern(topic);
@@ -141,12 +141,12 @@ namespace Nep
 
         /// <summary>Call a function with each message of a topic.</summary>
         /// <param name="topic">Topic, as for <see cref="CreateSubscriber"/>.</param>
-        /// <param name="callback">Function; an exception of it is reported by <see cref="CallbackFailed"/> and changes nothing else.</param>
-        /// <param name="type">Type that is expected.</param>
-        /// <param name="options">Options, or null for the defaults; <see cref="SubscriberOptions.Callbacks"/> says in which thread it is called.</param>
-        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
-        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        /// <param name="callback">Function to call; its exceptions raise <see cref="CallbackFailed"/>.</param>
+        /// <param name="type">Expected type.</param>
+        /// <param name="options">Options, or null for the defaults; <see cref="SubscriberOptions.Callbacks"/> selects the thread of the callback.</param>
+        /// <exception cref="ArgumentException">The topic is invalid.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
+        /// <exception cref="ObjectDisposedException">The node is closed.</exception>
         public Subscription Subscribe(string topic, Action<Message> callback, string type = "json", SubscriberOptions options = null)
         {
             if (callback == null)
@@ -162,21 +162,21 @@ namespace Nep
             return made;
         }
 
-        /// <summary>Answer the calls of a service.</summary>
-        /// <typeparam name="TRequest">Type of requests, as for <see cref="Message.As{T}"/>; <c>object</c> takes any.</typeparam>
-        /// <typeparam name="TAnswer">Type of answers.</typeparam>
-        /// <param name="service">Name, 1 to 188 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
-        /// <param name="callback">Called in a background thread of the server; an exception of it is raised at the client.</param>
-        /// <param name="threads">How many calls are answered at the same time, at least 1.</param>
-        /// <exception cref="ArgumentException">The name is not allowed.</exception>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
-        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        /// <summary>Handle the calls of a service.</summary>
+        /// <typeparam name="TRequest">Type of requests, as for <see cref="Message.As{T}"/>; <c>object</c> accepts all.</typeparam>
+        /// <typeparam name="TAnswer">Type of replies.</typeparam>
+        /// <param name="service">Name of the service, 1 to 188 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
+        /// <param name="callback">Called in a background thread of the server; its exceptions are passed to the client.</param>
+        /// <param name="threads">Number of threads that handle calls, at least 1.</param>
+        /// <exception cref="ArgumentException">The name is invalid.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
+        /// <exception cref="ObjectDisposedException">The node is closed.</exception>
         public Server CreateServer<TRequest, TAnswer>(string service, Func<TRequest, TAnswer> callback, int threads = 1)
         {
             CheckTopic(ServicePrefix + service);
             if (callback == null || threads < 1)
             {
-                throw new ArgumentException("A server has a callback and at least one thread.");
+                throw new ArgumentException("A server needs a callback and at least one thread.");
             }
             MasterSession session = SessionOf(null);
             var socket = new ServerSocket(PublisherRecordOf(ServicePrefix + service, "service", "service"));
@@ -184,12 +184,12 @@ namespace Nep
             return new Server(this, socket, (payload, codec) => Answer(callback, payload, codec), threads);
         }
 
-        /// <summary>Create a client of a service. Its server need not be there yet.</summary>
-        /// <param name="service">Name, as for <see cref="CreateServer{TRequest, TAnswer}"/>.</param>
+        /// <summary>Create a client of a service; no server needs to exist yet.</summary>
+        /// <param name="service">Name of the service, as for <see cref="CreateServer{TRequest, TAnswer}"/>.</param>
         /// <param name="type"><c>json</c> or <c>msgpack</c>.</param>
-        /// <exception cref="ArgumentException">The name is not allowed.</exception>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
-        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        /// <exception cref="ArgumentException">The name is invalid.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
+        /// <exception cref="ObjectDisposedException">The node is closed.</exception>
         public Client CreateClient(string service, string type = "json")
         {
             CheckTopic(ServicePrefix + service);
@@ -200,9 +200,9 @@ namespace Nep
             return new Client(this, socket, codec);
         }
 
-        /// <summary>Run waiting callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
-        /// <param name="budget">No further callback is begun after this time.</param>
-        /// <returns>Number of callbacks that ran.</returns>
+        /// <summary>Run pending callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
+        /// <param name="budget">Time after which no further callback is started.</param>
+        /// <returns>Number of callbacks that were called.</returns>
         public int Update(TimeSpan budget)
         {
             Stopwatch watch = Stopwatch.StartNew();
@@ -216,7 +216,7 @@ namespace Nep
             while (hasMore)
             {
                 hasMore = false;
-                foreach (Subscription each in subscriptions) // in turn, so that a busy topic does not hold up the others
+                foreach (Subscription each in subscriptions) // in turn, so that a busy topic doesn't block the others
                 {
                     if (count > 0 && watch.Elapsed >= budget)
                     {
@@ -232,7 +232,7 @@ namespace Nep
             return count;
         }
 
-        /// <summary>Close with all publishers and subscribers; takes <see cref="NodeOptions.CloseTimeout"/> at most, plus 0.3 s.</summary>
+        /// <summary>Close the node with all its publishers and subscribers, in at most <see cref="NodeOptions.CloseTimeout"/> plus 0.3 s.</summary>
         public void Close()
         {
             List<MasterSession> sessions;
@@ -350,7 +350,7 @@ namespace Nep
         {
             if (!Names.IsTopic(topic))
             {
-                throw new ArgumentException("A topic has 1 to 200 bytes without white space, control characters or '{'.", "topic");
+                throw new ArgumentException("A topic must have 1 to 200 bytes without white space, control characters or '{'.", "topic");
             }
         }
 
@@ -365,7 +365,7 @@ namespace Nep
             {
                 return Dns.GetHostName();
             }
-            catch (Exception) // some platforms of Unity have none
+            catch (Exception) // not available on some platforms of Unity
             {
                 return "unknown";
             }
@@ -377,7 +377,7 @@ namespace Nep
             {
                 return Process.GetCurrentProcess().Id;
             }
-            catch (Exception) // IL2CPP has no processes
+            catch (Exception) // not available with IL2CPP
             {
                 return null;
             }
@@ -395,14 +395,14 @@ namespace Nep
             return new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type };
         }
 
-        /// <summary>Bind a publisher or a server and register it; returns the subscribers to wait for. It is closed when that fails.</summary>
+        /// <summary>Bind a publisher or a server and register it, or close it on failure; return the expected subscribers.</summary>
         private List<ExpectedSubscriber> Register(ISessionPublisher socket, MasterSession session)
         {
             try
             {
                 if (!socket.Move(session.Hosts()))
                 {
-                    throw new NepException("No port could be opened for '" + socket.Record.Topic + "'.");
+                    throw new NepException("No port could be bound for '" + socket.Record.Topic + "'.");
                 }
                 List<ExpectedSubscriber> expected = session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout));
                 Keep(_publishers, socket, session);
@@ -415,7 +415,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Register a subscriber or a client. It is closed when that fails.</summary>
+        /// <summary>Register a subscriber or a client, or close it on failure.</summary>
         private void Register(ISessionSubscriber socket, MasterSession session)
         {
             try
@@ -436,13 +436,13 @@ namespace Nep
             {
                 if (_isClosed)
                 {
-                    throw new ObjectDisposedException("Node"); // it was closed meanwhile, without this
+                    throw new ObjectDisposedException("Node"); // closed meanwhile
                 }
                 owned[made] = session;
             }
         }
 
-        /// <summary>Remove an object that is about to be closed; false if it was removed before.</summary>
+        /// <summary>Remove an object before it is closed; return false if it was removed before.</summary>
         private bool TryRemove<T>(Dictionary<T, MasterSession> owned, T closing, out MasterSession session)
         {
             lock (_lock)

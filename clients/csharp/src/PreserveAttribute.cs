@@ -2,10 +2,10 @@ using System;
 
 namespace Nep
 {
-    /// <summary>Keeps Unity's linker from removing code that Newtonsoft.Json finds by reflection.</summary>
+    /// <summary>Attribute that keeps Unity's linker from removing code that Newtonsoft.Json uses by reflection.</summary>
     /// <remarks>
-    /// The linker obeys any attribute of this name. A <c>link.xml</c> would be ignored in a package that is installed from a
-    /// tarball or a registry.
+    /// The linker recognizes any attribute with this name. It ignores a <c>link.xml</c> in packages installed from a tarball or a
+    /// registry.
     /// </remarks>
     [AttributeUsage(AttributeTargets.Assembly)]
     internal sealed class PreserveAttribute : Attribute

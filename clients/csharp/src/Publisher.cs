@@ -5,7 +5,7 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>Publishes messages on one topic. Created by <see cref="Node.CreatePublisher(string, string, PublisherOptions)"/>. Thread-safe.</summary>
+    /// <summary>Publisher of one topic, created by <see cref="Node.CreatePublisher(string, string, PublisherOptions)"/>. Thread-safe.</summary>
     /// <example>
     /// <code>
     /// using (var node = new Node("sender"))
@@ -29,13 +29,13 @@ namespace Nep
             UnconnectedSubscribers = missing;
         }
 
-        /// <summary>Topic.</summary>
+        /// <summary>Name of the topic.</summary>
         public string Topic
         {
             get { return _socket.Record.Topic; }
         }
 
-        /// <summary>Type that it was created with, such as <c>json</c>.</summary>
+        /// <summary>Type under which the topic is registered, such as <c>json</c>.</summary>
         public string Type
         {
             get { return _socket.Record.MsgType; }
@@ -47,28 +47,28 @@ namespace Nep
             get { return (long)_socket.LastSeq; }
         }
 
-        /// <summary>Number of subscribers that are connected.</summary>
+        /// <summary>Number of connected subscribers.</summary>
         public int SubscriberCount
         {
             get { return _socket.SubscriberCount; }
         }
 
-        /// <summary>Messages times subscribers that were not sent because too much was under way to a slow subscriber.</summary>
+        /// <summary>Number of messages not sent to a subscriber because too many bytes were in flight, summed over all subscribers.</summary>
         public long Dropped
         {
             get { return _socket.Dropped; }
         }
 
-        /// <summary>Names of nodes that subscribed and did not connect within 0.5 s when the publisher was created.</summary>
+        /// <summary>Names of subscribed nodes that did not connect within 0.5 s when the publisher was created.</summary>
         public IList<string> UnconnectedSubscribers { get; private set; }
 
-        /// <summary>Publish a payload. Returns at once; a subscriber that is too slow loses messages and counts them.</summary>
+        /// <summary>Publish a message. Returns immediately; messages for a subscriber that is too slow are dropped and counted.</summary>
         /// <param name="payload">
-        /// For <c>json</c> any object that the JSON serializer converts; for <c>string</c> a string; for <c>bytes</c> and <c>image</c> a byte[];
+        /// For <c>json</c> any object that the JSON serializer supports; for <c>string</c> a string; for <c>bytes</c> and <c>image</c> a byte[];
         /// for <c>msgpack</c> plain values, lists and dictionaries.
         /// </param>
-        /// <exception cref="PayloadException">The payload has no form in the topic's codec. Nothing is sent.</exception>
-        /// <exception cref="ObjectDisposedException">The publisher was closed.</exception>
+        /// <exception cref="PayloadException">The payload can't be encoded; nothing is sent.</exception>
+        /// <exception cref="ObjectDisposedException">The publisher is closed.</exception>
         public void Publish(object payload)
         {
             if (_codec.Number == 5)
@@ -89,34 +89,34 @@ namespace Nep
             _socket.Send(encoded, null);
         }
 
-        /// <summary>Publish JSON text that exists already. The caller answers for its being JSON.</summary>
-        /// <param name="json">JSON text with at most 64 levels of lists and objects.</param>
-        /// <exception cref="PayloadException">The topic has another codec, or the text is nested too deeply.</exception>
-        /// <exception cref="ObjectDisposedException">The publisher was closed.</exception>
+        /// <summary>Publish existing JSON text. The text is not validated completely.</summary>
+        /// <param name="json">JSON text, nested at most 64 levels deep.</param>
+        /// <exception cref="PayloadException">The topic has another codec, or the text is truncated or nested too deep.</exception>
+        /// <exception cref="ObjectDisposedException">The publisher is closed.</exception>
         public void PublishJson(string json)
         {
             if (_codec.Number != 1)
             {
-                throw new PayloadException("A topic of type '" + _codec.Name + "' carries no JSON.");
+                throw new PayloadException("A topic of type '" + _codec.Name + "' doesn't accept JSON.");
             }
             _socket.Send(Codec.CheckedJson(json), null);
         }
 
         /// <summary>Publish a JPEG or PNG file on a topic of type <c>image</c>.</summary>
-        /// <param name="file">Bytes of the file. They are copied.</param>
-        /// <exception cref="PayloadException">The topic has another type, or it is neither JPEG nor PNG.</exception>
-        /// <exception cref="ObjectDisposedException">The publisher was closed.</exception>
+        /// <param name="file">Bytes of the file, which are copied.</param>
+        /// <exception cref="PayloadException">The topic has another type, or the file is neither JPEG nor PNG.</exception>
+        /// <exception cref="ObjectDisposedException">The publisher is closed.</exception>
         public void PublishImage(byte[] file)
         {
             if (_codec.Number != 5)
             {
-                throw new PayloadException("A topic of type '" + _codec.Name + "' carries no images.");
+                throw new PayloadException("A topic of type '" + _codec.Name + "' doesn't accept images.");
             }
             byte[] extension = MessagePackWriter.Write(ImageHeader.Describe(file));
             _socket.Send(_codec.Encode(file), extension);
         }
 
-        /// <summary>Close: subscribers receive what was published, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
+        /// <summary>Close the publisher after subscribers have received all messages, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
         public void Close()
         {
             _node.Close(_socket);

@@ -5,7 +5,7 @@ using Nep.Wire;
 
 namespace Nep
 {
-    /// <summary>Answers the calls of one service. Created by <see cref="Node.CreateServer{TRequest, TAnswer}"/>.</summary>
+    /// <summary>Server of one service, created by <see cref="Node.CreateServer{TRequest, TAnswer}"/>.</summary>
     public sealed class Server : IDisposable
     {
         private readonly Node _node;
@@ -29,7 +29,7 @@ namespace Nep
             get { return _socket.Record.Topic.Substring(Node.ServicePrefix.Length); }
         }
 
-        /// <summary>Number of calls that were answered, also with an error.</summary>
+        /// <summary>Number of calls that were answered, including those that failed.</summary>
         public long Calls
         {
             get { return _socket.Calls; }
@@ -41,13 +41,13 @@ namespace Nep
             get { return _socket.Errors; }
         }
 
-        /// <summary>Number of calls that were not carried out: malformed, too many, or while closing.</summary>
+        /// <summary>Number of rejected calls: malformed ones, or those received while the server was busy or closing.</summary>
         public long Refused
         {
             get { return _socket.Refused; }
         }
 
-        /// <summary>Close: refuses waiting calls and lets running callbacks answer, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
+        /// <summary>Close the server: reject pending calls and wait for running callbacks, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
         public void Dispose()
         {
             _node.Close(_socket);
@@ -68,7 +68,7 @@ namespace Nep
                     kind = ServiceHeader.Refused;
                     payload = ServiceFailure.Encode("", exception.Message);
                 }
-                catch (Exception exception) // it is the client's to handle
+                catch (Exception exception) // passed to the client
                 {
                     kind = ServiceHeader.Error;
                     payload = ServiceFailure.Encode(exception.GetType().Name, exception.Message);

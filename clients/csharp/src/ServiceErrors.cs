@@ -1,6 +1,6 @@
 namespace Nep
 {
-    /// <summary>No server of the service was reached in time; nothing was sent.</summary>
+    /// <summary>No server of the service was reached before the timeout; nothing was sent.</summary>
     public sealed class NoServerException : NepException
     {
         internal NoServerException(string service) : base("No server of '" + service + "' was reached in time. Is its program running?")
@@ -8,23 +8,23 @@ namespace Nep
         }
     }
 
-    /// <summary>A call was sent and no answer came in time; it may still be carried out.</summary>
+    /// <summary>A call was sent, and no reply arrived before the timeout; it may still be executed.</summary>
     public sealed class ServiceTimeoutException : NepException
     {
-        internal ServiceTimeoutException(string service) : base("'" + service + "' did not answer in time.")
+        internal ServiceTimeoutException(string service) : base("'" + service + "' did not reply in time; it may still execute the call.")
         {
         }
     }
 
-    /// <summary>The server ended during a call; nobody knows whether it was carried out.</summary>
+    /// <summary>The server exited during a call, which may or may not have been executed.</summary>
     public sealed class ServerGoneException : NepException
     {
-        internal ServerGoneException(string service) : base("The server of '" + service + "' ended during the call.")
+        internal ServerGoneException(string service) : base("The server of '" + service + "' exited during the call.")
         {
         }
     }
 
-    /// <summary>The server's callback failed.</summary>
+    /// <summary>The server's callback threw an exception.</summary>
     public sealed class ServiceException : NepException
     {
         internal ServiceException(string kind, string reason) : base(reason)

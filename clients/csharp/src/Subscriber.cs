@@ -5,7 +5,7 @@ using Nep.Session;
 
 namespace Nep
 {
-    /// <summary>Receives the messages of one topic. Created by <see cref="Node.CreateSubscriber(string, string, SubscriberOptions)"/>. Thread-safe.</summary>
+    /// <summary>Subscriber of one topic, created by <see cref="Node.CreateSubscriber(string, string, SubscriberOptions)"/>. Thread-safe.</summary>
     /// <example>
     /// <code>
     /// using (var node = new Node("receiver"))
@@ -30,19 +30,19 @@ namespace Nep
             _socket = socket;
         }
 
-        /// <summary>Topic, or the pattern of topics.</summary>
+        /// <summary>Name of the topic, or the pattern.</summary>
         public string Topic
         {
             get { return _socket.Record.Topic; }
         }
 
-        /// <summary>Number of messages that arrived and were not dropped.</summary>
+        /// <summary>Number of received messages that were not dropped.</summary>
         public long Received
         {
             get { return _socket.Received; }
         }
 
-        /// <summary>Number of messages that were sent and did not arrive, or were dropped because they were not read in time.</summary>
+        /// <summary>Number of messages that were sent and not received, or dropped because the inbox was full.</summary>
         public long Lost
         {
             get { return _socket.Lost; }
@@ -60,16 +60,16 @@ namespace Nep
         }
 
         /// <summary>Wait for the next message.</summary>
-        /// <returns>The message, or null when the subscriber was closed.</returns>
+        /// <returns>The message, or null if the subscriber was closed.</returns>
         public Message Receive()
         {
             return _socket.Inbox.Take(-1);
         }
 
-        /// <summary>Wait for the next message, for a limited time.</summary>
-        /// <param name="timeout">Longest wait; <see cref="TimeSpan.Zero"/> does not wait, <see cref="Timeout.InfiniteTimeSpan"/> waits for ever.</param>
+        /// <summary>Wait for the next message with a timeout.</summary>
+        /// <param name="timeout">Maximum time to wait; <see cref="TimeSpan.Zero"/> doesn't wait, <see cref="Timeout.InfiniteTimeSpan"/> waits without a limit.</param>
         /// <param name="message">The message, or null.</param>
-        /// <returns>Whether there was one.</returns>
+        /// <returns>True if a message was received.</returns>
         public bool TryReceive(TimeSpan timeout, out Message message)
         {
             message = _socket.Inbox.Take(Node.TimeoutMs(timeout));
@@ -78,14 +78,14 @@ namespace Nep
 
         /// <summary>Wait for the next message without blocking the caller.</summary>
         /// <param name="cancellation">Ends the wait.</param>
-        /// <returns>The message; null when the subscriber was closed.</returns>
-        /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
+        /// <returns>The message, or null if the subscriber was closed.</returns>
+        /// <exception cref="OperationCanceledException">The wait was canceled.</exception>
         public Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
         {
             return _socket.Inbox.TakeAsync(cancellation);
         }
 
-        /// <summary>Close; a waiting <see cref="Receive"/> returns null.</summary>
+        /// <summary>Close the subscriber; a waiting <see cref="Receive"/> returns null.</summary>
         public void Close()
         {
             _node.Close(_socket);

@@ -2,7 +2,7 @@ using System;
 
 namespace Nep
 {
-    /// <summary>A subscriber whose messages go to a callback. Created by <see cref="Node.Subscribe(string, Action{Message}, string, SubscriberOptions)"/>.</summary>
+    /// <summary>Subscriber with a callback, created by <see cref="Node.Subscribe(string, Action{Message}, string, SubscriberOptions)"/>.</summary>
     public sealed class Subscription : IDisposable
     {
         private readonly Node _node;
@@ -21,17 +21,17 @@ namespace Nep
             }
         }
 
-        /// <summary>The subscriber behind it, with its counters.</summary>
+        /// <summary>Subscriber, with its counters.</summary>
         public Subscriber Subscriber { get; private set; }
 
-        /// <summary>Close; the callback is not called for messages that still wait.</summary>
+        /// <summary>Close the subscription; queued messages are discarded.</summary>
         public void Dispose()
         {
             _node.Forget(this);
             Subscriber.Close();
         }
 
-        /// <summary>Call the callback for one waiting message; false when there is none, or a thread does it.</summary>
+        /// <summary>Call the callback for one queued message; return false if there is none, or if a thread calls it.</summary>
         internal bool RunOne()
         {
             Message message = _hasThread ? null : Subscriber.Socket.Inbox.Take(0);
@@ -57,7 +57,7 @@ namespace Nep
             {
                 _callback(message);
             }
-            catch (Exception exception) // the next message comes all the same
+            catch (Exception exception) // continues with the next message
             {
                 _node.OnCallbackError(exception);
             }

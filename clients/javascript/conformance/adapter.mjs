@@ -27,7 +27,7 @@ function write(value) {
   process.stdout.write(`${JSON.stringify(value)}\n`);
 }
 
-/** Returns a decoded payload as JSON value; undefined if not representable. */
+/** Returns a decoded payload as a JSON value; undefined if not representable. */
 function jsonForm(message) {
   if (message.codec === "bytes" || message.codec === "image") return undefined;
   try {

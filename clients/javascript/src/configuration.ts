@@ -54,11 +54,11 @@ export function directConfiguration(
   options: DirectOptions,
 ): DirectConfiguration {
   const known = mode === undefined ? "connect" : MODES.find((each) => each === mode);
-  if (!known) throw new NepError(`"${mode}" is no mode. Use ${MODES.join(", ")}.`);
+  if (!known) throw new NepError(`Invalid mode "${mode}". Use ${MODES.join(", ")}.`);
   const number = Number(port);
   if (!Number.isInteger(number) || number < 1 || number > 65535)
-    throw new NepError(`"${port}" is no port. Use a number from 1 to 65535.`);
-  if (!/^[\w.-]+$/.test(ip)) throw new NepError(`"${ip}" is no address of a computer.`);
+    throw new NepError(`Invalid port "${port}". Use a number from 1 to 65535.`);
+  if (!/^[\w.-]+$/.test(ip)) throw new NepError(`Invalid address "${ip}".`);
   return {
     kind: "direct",
     ip,

@@ -35,7 +35,7 @@ export class DecodeError extends NepError {}
 export class MasterUnreachableError extends NepError {
   /** @param address Host and port of the master. */
   constructor(readonly address: string) {
-    super(`No master answers at ${address}. Start one with "nep master", or set NEP_MASTER to its address.`);
+    super(`No master is reachable at ${address}. Start one with "nep master", or set NEP_MASTER to its address.`);
   }
 }
 

@@ -320,7 +320,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   private async patiently<R>(session: MasterSession, waitS: number | undefined, registered: Promise<R>): Promise<R> {
     const warnAfter = (): void =>
       this.warn(
-        `No master answers at ${session.address}; waiting for one. Start it with "nep master", or set NEP_MASTER to its address.`,
+        `No master is reachable at ${session.address}; waiting for one. Start it with "nep master", or set NEP_MASTER to its address.`,
       );
     const timer = waitS === undefined ? setTimeout(warnAfter, MASTER_WAIT_S * 1000) : undefined;
     try {
@@ -437,7 +437,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     void this.close();
   }
 
-  // ---- inside
+  // ---- internal
 
   private hold(): Hold {
     return this.holders.size > 0 ? "long" : "none";
@@ -467,7 +467,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     if (given === undefined || "kind" in given) return given;
     if (given.network === "broker") return this.hybrid(given.master_ip);
     if (given.network === "direct") return this.direct(given.ip, given.port);
-    throw new NepError(`There is no network "${given.network}". Use node.hybrid(ip) or node.direct(ip, port, mode).`);
+    throw new NepError(`Unknown network "${given.network}". Use node.hybrid(ip) or node.direct(ip, port, mode).`);
   }
 
   private nextNumber(): number {

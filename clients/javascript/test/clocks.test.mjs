@@ -1,4 +1,4 @@
-// Comparing clocks: with clocks that a test moves.
+// Tests of clock comparison, with simulated clocks.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { SAME_CLOCK, toldDifference } from "../dist/messages/clocks.js";
@@ -12,7 +12,7 @@ import { computerId } from "../dist/system/computer.js";
 const MS = 1_000_000n;
 const S = 1000n * MS;
 
-/** Two computers: `samples` are of the one, whose clock is `apartNs` ahead of the master's. */
+/** Two simulated computers; the clock of the one with `samples` is `apartNs` ahead of the master's. */
 class Pair {
   steadyNs = 5n * S;
 
@@ -36,7 +36,7 @@ class Pair {
     return this.samples.add(sent, receivedNs, receivedNs);
   }
 
-  /** Checks that the truth lies within what is known; returns the uncertainty. */
+  /** Checks that the true offset is within the uncertainty; returns the uncertainty. */
   check() {
     const [offsetNs, uncertaintyNs] = this.samples.offset();
     const error = offsetNs + this.apartNs;
@@ -45,7 +45,7 @@ class Pair {
   }
 }
 
-test("the truth lies within the uncertainty, which the quickest of eight renewals decides", () => {
+test("the true offset is within the uncertainty of the fastest of eight renewals", () => {
   for (const apartNs of [0n, 3n * S, -(2n ** 60n)]) {
     const pair = new Pair(apartNs);
     assert.deepEqual(pair.samples.offset(), []);
@@ -58,11 +58,11 @@ test("the truth lies within the uncertainty, which the quickest of eight renewal
     for (let n = 0; n < 8; n++) pair.renew(100n * MS, 0n);
     assert.ok(pair.check() >= 50n * MS);
     pair.steadyNs += 10n ** 6n * S;
-    assert.deepEqual(pair.samples.offset(), [], "drift has made it useless");
+    assert.deepEqual(pair.samples.offset(), [], "too uncertain because of drift");
   }
 });
 
-test("clocks that are set are compared anew", () => {
+test("samples are discarded when a clock is set", () => {
   const pair = new Pair(0n);
   pair.renew(MS, MS);
   pair.apartNs = 60n * S;
@@ -70,14 +70,14 @@ test("clocks that are set are compared anew", () => {
   pair.renew(MS, MS);
   pair.check();
   const sent = pair.samples.now();
-  assert.ok(pair.samples.add(sent, pair.masterNs - 3600n * S, pair.masterNs - 3600n * S), "the master's was set");
+  assert.ok(pair.samples.add(sent, pair.masterNs - 3600n * S, pair.masterNs - 3600n * S), "the master's clock was set");
   pair.apartNs = 60n * S;
   assert.equal(pair.samples.offset()[0], -3660n * S);
-  assert.ok(!pair.samples.add(pair.samples.now(), 5n, 4n), "answered before it was received");
-  assert.ok(!pair.samples.add(pair.samples.now(), 0n, S), "longer than the renewal took");
+  assert.ok(!pair.samples.add(pair.samples.now(), 5n, 4n), "reply before reception");
+  assert.ok(!pair.samples.add(pair.samples.now(), 0n, S), "longer than the round trip");
 });
 
-test("the latency of messages is corrected by the difference to their computer's clock", () => {
+test("message latency is corrected by the clock difference of the publisher's computer", () => {
   const sources = new Sources();
   const publisher = { id: 5n, topic: "t", endpoints: [], history: 0, nodeId: "n", nodeName: "name" };
   const { clock } = sources.listed({ ...publisher, computer: "elsewhere", endpoint: "tcp://10.0.0.1:1" });
@@ -96,7 +96,7 @@ test("the latency of messages is corrected by the difference to their computer's
     assert.equal(toldDifference(told), undefined);
 });
 
-test("this computer's time is that of Date.now()", () => {
+test("nowNs agrees with Date.now()", () => {
   for (let n = 0; n < 1000; n++) {
     const [before, now, after] = [Date.now(), nowNs(), Date.now()];
     assert.ok(Number(now / MS) >= before - 1 && Number(now / MS) <= after + 1);

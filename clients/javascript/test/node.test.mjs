@@ -95,7 +95,7 @@ test("payloads that can't be encoded are counted and reported", hasMaster, async
   assert.throws(() => node.subscribe("late"), nep.NepError);
 });
 
-test("calls are answered, refused and time out", hasMaster, async (t) => {
+test("calls are answered, rejected or time out", hasMaster, async (t) => {
   const node = opened(t, "calling");
   await node.serve("/twice", async (n) => 2 * n);
   await node.serve("/slow", () => new Promise((resolve) => setTimeout(resolve, 200, "late")));
@@ -126,7 +126,7 @@ test("without a master, calls time out and a warning is emitted", async (t) => {
   assert.throws(() => new Node("a\nb"), nep.BadNameError);
 });
 
-test("a direct subscriber hears a publisher whose port another program's socket had before", { timeout: 30_000 }, async (t) => {
+test("a direct subscriber connects to a publisher whose port was used by another program's socket", { timeout: 30_000 }, async (t) => {
   const pull = new Pull();
   await pull.bind("tcp://127.0.0.1:*");
   const endpoint = pull.lastEndpoint;

@@ -1,4 +1,4 @@
-// Counting, bounds and forms of messages, without a master.
+// Tests of counters, bounds and message forms, without a master.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Subscriber } from "zeromq";
@@ -21,7 +21,7 @@ test("gaps, echoes and byes count as lost", () => {
   const sources = new Sources();
   for (const seq of [3n, 4n, 7n]) assert.ok(sources.arrived(ID, seq, false));
   assert.deepEqual([sources.received, sources.lost], [3, 2]);
-  assert.ok(!sources.arrived(ID, 7n, true), "a latched message that was received before");
+  assert.ok(!sources.arrived(ID, 7n, true), "duplicate latched message");
   assert.ok(sources.reached(ID, 9n));
   assert.deepEqual([sources.received, sources.lost], [3, 4]);
 });
@@ -37,7 +37,7 @@ test("missing messages of the last renewal are lost until they arrive", () => {
   sources.arrived(ID, 3n, false);
   assert.deepEqual([sources.received, sources.lost], [3, 0]);
   sources.promised(99n, 5n);
-  assert.equal(sources.lost, 0, "the first seq of an unknown publisher is unknown");
+  assert.equal(sources.lost, 0, "unknown publisher without a first seq");
 });
 
 test("a jump of seq is rejected once, then accepted as a restart", () => {
@@ -48,7 +48,7 @@ test("a jump of seq is rejected once, then accepted as a restart", () => {
   assert.deepEqual([sources.received, sources.lost], [2, 0]);
 });
 
-test("unlisted publishers are forgotten beyond a thousand", () => {
+test("the oldest of more than a thousand unlisted publishers are evicted", () => {
   const sources = new Sources();
   for (let id = 1n; id <= 1500n; id++) sources.arrived(id, 1n, false);
   assert.equal(sources.byId.size, 1000);
@@ -71,11 +71,11 @@ test("losses of a new publisher count from seq 1", () => {
   sources.arrived(ID, 1n, false);
   assert.deepEqual([sources.received, sources.lost], [1, 0]);
   sources = ofNewPublisher();
-  assert.ok(!sources.reached(ID, 2n ** 32n + 1n), "an impossible first seq");
+  assert.ok(!sources.reached(ID, 2n ** 32n + 1n), "implausible first seq");
   assert.equal(sources.lost, 0);
   sources.arrived(9n, 100n, false);
   sources.expectAllOf(9n);
-  assert.deepEqual([sources.received, sources.lost], [1, 0], "a publisher that was heard before");
+  assert.deepEqual([sources.received, sources.lost], [1, 0], "publisher with previous messages");
 });
 
 test("losses of an unreachable new publisher grow with each renewal", () => {
@@ -85,17 +85,17 @@ test("losses of an unreachable new publisher grow with each renewal", () => {
   sources.promised(ID, 250n);
   assert.equal(sources.lost, 100);
   sources.arrived(ID, 100n, false);
-  assert.deepEqual([sources.received, sources.lost], [1, 99], "it was only late");
+  assert.deepEqual([sources.received, sources.lost], [1, 99], "late, not lost");
   sources.settle(ID);
   assert.equal(sources.lost, 249);
 });
 
-test("the history of a new publisher is received although it was promised before", () => {
+test("the history of a new publisher is received after the master has reported its seqs", () => {
   const sources = ofNewPublisher(3);
   sources.promised(ID, 9n);
   sources.promised(ID, 9n);
   assert.equal(sources.lost, 9);
-  assert.ok(sources.isEarly(ID), "its history brings this message again");
+  assert.ok(sources.isEarly(ID), "repeated by the history");
   for (const seq of [8n, 9n, 10n]) assert.ok(sources.arrived(ID, seq, true));
   assert.deepEqual([sources.received, sources.lost], [3, 7]);
 });
@@ -114,7 +114,7 @@ test("a send window closes at its limit and opens after acknowledgements", () =>
   window.read(BigInt(seq), 0n);
   assert.equal(window.underWay, 0);
   window.sent(seq + 1, 2 * STEP_BYTES);
-  assert.ok(!window.hasRoom(STEP_BYTES), "the bound that it asked for is 24 MiB");
+  assert.ok(!window.hasRoom(STEP_BYTES), "the requested bound is 24 MiB");
 });
 
 test("the inbox drops its oldest messages", () => {
@@ -180,7 +180,7 @@ test("the form of messages depends on the subscribers", () => {
   assert.ok(!subscriptions.isHeard);
 });
 
-/** Returns a publisher's transport, and a ZeroMQ socket that it has greeted. */
+/** Returns the transport of a publisher, and a ZeroMQ socket that has received its echo. */
 async function connected(t, codecNumber) {
   const spec = { id: ID, topic: "t", codecNumber, latched: false, history: 0, batch: true };
   const transport = new XpubTransport(

@@ -19,7 +19,7 @@ after(async () => {
 });
 let lastName = 0;
 
-/** Returns a robot whose stop and actions end when the test says so, with a publisher and subscriber on its topics. */
+/** Returns a robot with a manual clock, and functions that publish its commands and record its replies. */
 async function bench(changes = {}) {
   const name = `Arm ${++lastName}`;
   const answers = [];
@@ -82,7 +82,7 @@ async function bench(changes = {}) {
   };
 }
 
-test("stop is carried out before queued commands, which do not run after it", hasMaster, async () => {
+test("stop is executed before queued commands, which do not run afterwards", hasMaster, async () => {
   const { robot, done, send, invoke, final, of } = await bench();
   for (let n = 0; n < 300; n++) invoke(`w${n}`, "wave");
   send({ id: "s", op: "stop" });
@@ -111,7 +111,7 @@ test("stop is answered when the stop function has returned", hasMaster, async ()
   await closed;
 });
 
-test("a failed stop, or one that an action survives, is answered with a reason", hasMaster, async () => {
+test("the reply to a stop contains the reason if it failed or an action is still running", hasMaster, async () => {
   const failing = await bench({
     stop() {
       throw new Failed("the brake is stuck");
@@ -137,7 +137,7 @@ test("a failed stop, or one that an action survives, is answered with a reason",
   await closed;
 });
 
-test("commands that are too large or too deep are refused, and a large stop stops", hasMaster, async () => {
+test("commands that are too large or too deep are rejected, and a large stop is executed", hasMaster, async () => {
   const { robot, invoke, final } = await bench();
   invoke("large", "say", { words: "x".repeat(65_000) });
   assert.match((await final("large")).error, /the limit is 64 kB/);
@@ -203,8 +203,8 @@ test("invalid declarations are rejected", () => {
     });
   make({});
   assert.throws(() => make({ text: "wave %side" }), /%side/);
-  assert.throws(() => make({ parameters: { times: { type: "integer", maximum: 3, default: 4 } } }), /default is wrong/);
+  assert.throws(() => make({ parameters: { times: { type: "integer", maximum: 3, default: 4 } } }), /invalid default/);
   assert.throws(() => make({ parameters: { by: { type: "number", unit: "degrees" } } }), /write "deg"/);
-  assert.throws(() => make({}, { sensors: { state: { type: "number" } } }), /two things/);
-  assert.throws(() => make({}, { model: "my arm" }), /no name/);
+  assert.throws(() => make({}, { sensors: { state: { type: "number" } } }), /used twice or reserved/);
+  assert.throws(() => make({}, { model: "my arm" }), /Invalid name/);
 });

@@ -75,7 +75,7 @@ test("batches are decoded and encoded as in the vectors", () => {
   }
 });
 
-test("each of the malformed messages is refused with its code", () => {
+test("each malformed message is rejected with its code", () => {
   for (const [code, ...parts] of vectors("malformed")) {
     assert.equal(
       codeOf(() => readParts(parts.map(bytes))),
@@ -111,7 +111,7 @@ test("notices are decoded and encoded as in the vectors", () => {
   for (const { name, parts, means } of vectors("notices")) {
     const [first, head, payload] = parts.map(bytes);
     assert.equal(String(parseHello(first).subscriber), means.subscriber, name);
-    if (payload) continue; // a message like any other
+    if (payload) continue; // an ordinary message
     const { codec, flags, seq, stamp_ns, publisher, generation } = means;
     const written = packHeader({
       codec,
@@ -233,7 +233,7 @@ test("patterns match whole levels", () => {
   assert.deepEqual(["a*b", "/a/*", "**"].map(isPattern), [false, true, true]);
 });
 
-test("payloads survive their codec", () => {
+test("payloads are unchanged after encoding and decoding", () => {
   const payloads = {
     json: { a: [1, "ü", null] },
     string: "grüß",
@@ -345,7 +345,7 @@ test("lists of numbers have the JSON of JSON.stringify", () => {
   assert.deepEqual(decode(first, {}), JSON.parse(JSON.stringify(own)), "a message that waits is not overwritten by the next one");
 });
 
-test("received bytes are published again without a copy, and a program's own bytes with one", () => {
+test("received bytes are republished without a copy, other bytes are copied", () => {
   for (const [type, large] of [["bytes", Buffer.alloc(100_000)], ["image", Buffer.alloc(100_000, "\xff\xd8\xff", "latin1")]]) {
     const { encode, decode } = codecFor(type);
     const { data, extension } = encode(large);

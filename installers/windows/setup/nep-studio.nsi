@@ -1,11 +1,11 @@
-; The setup program of NEP Studio: per user, no administrator, 64 bit. `installers.windows.setup` gives what is
-; in ${...} and writes entries.nsh and association.nsh.
+; Installer of NEP Studio for the current user, without administrator rights, 64 bit. `installers.windows.nsis`
+; defines the constants in ${...} and generates entries.nsh and association.nsh.
 ;
-;   /S        ask nothing; exit code 0 done, 2 not possible (no room, ...), 3 NEP Studio is open
-;   /PATH     the command `nep` on this user's PATH
-;   /D=FOLDER another folder; last, without quotes
+;   /S        silent; exit code 0 for success, 2 for a failure (no disk space, ...), 3 if NEP Studio is open
+;   /PATH     add the command `nep` to the user's PATH
+;   /D=FOLDER install to another folder; must be last and without quotes
 ;
-; Silent, what would have been said goes to the standard output and to %TEMP%\NEP-Studio-setup.txt.
+; In silent mode, messages are written to the standard output and to %TEMP%\NEP-Studio-setup.txt.
 
 Name "NEP Studio"
 OutFile "${OUTPUT}"
@@ -34,13 +34,13 @@ VIAddVersionKey /LANG=0 "LegalCopyright" "${COPYRIGHT}"
 !include "WinMessages.nsh"
 
 !define UNINSTALL_KEY "Software\Microsoft\Windows\CurrentVersion\Uninstall\NEP Studio"
-!define EXIT_IMPOSSIBLE 2
+!define EXIT_FAILED 2
 !define EXIT_OPEN 3
 !define ON_PATH 1
 
 Var NewFolder
 Var OldFolder
-Var KeepWork
+Var KeepData
 Var IsMoved
 
 !include "entries.nsh"
@@ -68,9 +68,9 @@ Var IsMoved
 !include "words.nsh"
 !insertmacro MUI_RESERVEFILE_LANGDLL
 
-; ---- saying things, and leaving ----------------------------------------------------------------------
+; ---- messages and checks ------------------------------------------------------------------------------
 
-!macro Say text
+!macro ShowMessage text
   ${If} ${Silent}
     System::Call 'kernel32::GetStdHandle(i -11) p .r8'
     ${If} $8 P<> 0
@@ -88,25 +88,25 @@ Var IsMoved
 
 !macro Functions UN
 
-; $0 is 1 while a program of Studio runs from $INSTDIR: Windows lets nobody write into a program that runs.
-Function ${UN}AskWhetherOpen
+; Sets $0 to 1 if a program of Studio is running from $INSTDIR: Windows denies writing to running programs.
+Function ${UN}CheckOpen
   StrCpy $0 0
-  !insertmacro ForEachProgram AskOneProgram
+  !insertmacro ForEachProgram CheckProgram
 FunctionEnd
 
-; Comes back only when Studio is closed.
+; Waits until Studio is closed; quits in silent mode or if the user cancels.
 Function ${UN}WaitUntilClosed
-  Call ${UN}AskWhetherOpen
+  Call ${UN}CheckOpen
   ${While} $0 = 1
     ${If} ${Silent}
-      !insertmacro Say "$(StudioIsOpen)"
+      !insertmacro ShowMessage "$(StudioIsOpen)"
       SetErrorLevel ${EXIT_OPEN}
       Quit
     ${EndIf}
     MessageBox MB_RETRYCANCEL|MB_ICONEXCLAMATION "$(StudioIsOpen)" IDRETRY +3
     SetErrorLevel ${EXIT_OPEN}
     Quit
-    Call ${UN}AskWhetherOpen
+    Call ${UN}CheckOpen
   ${EndWhile}
 FunctionEnd
 
@@ -114,7 +114,7 @@ FunctionEnd
 
 !macroend
 
-!macro AskOneProgram name
+!macro CheckProgram name
   ${If} ${FileExists} "$INSTDIR\${name}"
     ClearErrors
     FileOpen $1 "$INSTDIR\${name}" a
@@ -129,7 +129,7 @@ FunctionEnd
 !insertmacro Functions ""
 !insertmacro Functions "un."
 
-; ---- installing --------------------------------------------------------------------------------------
+; ---- installation -------------------------------------------------------------------------------------
 
 !macro MoveOut name
   ${If} $IsMoved = 1
@@ -144,7 +144,7 @@ FunctionEnd
   ${EndIf}
 !macroend
 
-; What is old goes back to its place; what is new and in its place goes first.
+; Moves an old file back to $INSTDIR; a new file in its place is moved out first.
 !macro MoveBack name
   ${If} ${FileExists} "$OldFolder\${name}"
     ${If} ${FileExists} "$INSTDIR\${name}"
@@ -160,8 +160,8 @@ FunctionEnd
   Call Move
 !macroend
 
-; Renames $R0 to $R1; $IsMoved is 0 when it can't. A virus scanner holds new files for a moment: ten seconds are
-; given to it. (NSIS' own mark of errors would not do: who asks for it clears it.)
+; Renames $R0 to $R1; sets $IsMoved to 0 on failure. Retries for ten seconds, because virus scanners briefly lock new
+; files. (The error flag of NSIS can't replace $IsMoved, because it is cleared when it is read.)
 Function Move
   StrCpy $R2 0
   ${Do}
@@ -176,19 +176,19 @@ Function Move
   StrCpy $IsMoved 0
 FunctionEnd
 
-; A new version is unpacked beside the old one and takes its place by renaming, which needs no room: with a full
-; disk, or when something can't be moved, the old version stays whole.
+; A new version is unpacked next to the old one and replaces it by renaming, which needs no disk space. If the disk is
+; full or a file can't be moved, the old version stays intact.
 Section "!NEP Studio" SectionStudio
   SectionIn RO
   StrCpy $NewFolder "$INSTDIR\new~"
   StrCpy $OldFolder "$INSTDIR\old~"
   Call WaitUntilClosed
-  Call FinishEarlierUpdate
-  Call AskForRoom
+  Call RepairInterruptedUpdate
+  Call CheckDiskSpace
   SetOutPath $NewFolder
   !insertmacro UnpackEntries
   WriteUninstaller "$NewFolder\uninstall.exe"
-  ; A current folder can't be renamed.
+  ; The current folder can't be renamed.
   SetOutPath $TEMP
 
   CreateDirectory $OldFolder
@@ -198,8 +198,8 @@ Section "!NEP Studio" SectionStudio
   ${If} $IsMoved = 0
     !insertmacro ForEachEntry MoveBack
     RMDir $OldFolder
-    !insertmacro Say "$(CannotReplace)"
-    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    !insertmacro ShowMessage "$(CannotReplace)"
+    SetErrorLevel ${EXIT_FAILED}
     Abort
   ${EndIf}
   RMDir /r $NewFolder
@@ -213,7 +213,7 @@ Section "!NEP Studio" SectionStudio
 SectionEnd
 
 Section /o "$(PathTitle)" SectionPath
-  ; In the hidden section below, which also takes it away again.
+  ; Handled by the hidden section below, which also removes the entry.
 SectionEnd
 
 Section "-Path"
@@ -230,27 +230,27 @@ SectionEnd
   !insertmacro MUI_DESCRIPTION_TEXT ${SectionPath} "$(PathDescription)"
 !insertmacro MUI_FUNCTION_DESCRIPTION_END
 
-; An update that was cut off (power, a killed setup) leaves the old version in old~: it is put back first.
-Function FinishEarlierUpdate
+; An interrupted update (power failure, terminated installer) leaves the old version in old~; restore it first.
+Function RepairInterruptedUpdate
   RMDir /r $NewFolder
   CreateDirectory $NewFolder
   StrCpy $IsMoved 1
   !insertmacro ForEachEntry MoveBack
   RMDir /r $NewFolder
   ${If} $IsMoved = 0
-    !insertmacro Say "$(CannotReplace)"
-    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    !insertmacro ShowMessage "$(CannotReplace)"
+    SetErrorLevel ${EXIT_FAILED}
     Abort
   ${EndIf}
   RMDir /r $OldFolder
 FunctionEnd
 
-Function AskForRoom
+Function CheckDiskSpace
   ClearErrors
   CreateDirectory "$INSTDIR\new~"
   ${If} ${Errors}
-    !insertmacro Say "$(NoFolder)"
-    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    !insertmacro ShowMessage "$(NoFolder)"
+    SetErrorLevel ${EXIT_FAILED}
     Abort
   ${EndIf}
   System::Call 'kernel32::GetDiskFreeSpaceExW(w "$INSTDIR", *l .r1, p 0, p 0) i .r0'
@@ -259,8 +259,8 @@ Function AskForRoom
     Pop $1
     ${If} $1 L< ${NEEDED_MB}
       StrCpy $2 ${NEEDED_MB}
-      !insertmacro Say "$(NoRoom)"
-      SetErrorLevel ${EXIT_IMPOSSIBLE}
+      !insertmacro ShowMessage "$(NotEnoughSpace)"
+      SetErrorLevel ${EXIT_FAILED}
       Abort
     ${EndIf}
   ${EndIf}
@@ -283,8 +283,8 @@ Function .onInit
   System::Call 'kernel32::CreateMutexW(p 0, i 1, w "NEP Studio Setup") p .r1 ?e'
   Pop $0
   ${If} $0 = 183 ; ERROR_ALREADY_EXISTS
-    !insertmacro Say "$(SetupRunsAlready)"
-    SetErrorLevel ${EXIT_IMPOSSIBLE}
+    !insertmacro ShowMessage "$(SetupIsRunning)"
+    SetErrorLevel ${EXIT_FAILED}
     Quit
   ${EndIf}
   ${GetParameters} $1
@@ -293,7 +293,7 @@ Function .onInit
   ${IfNot} ${Errors}
     !insertmacro SelectSection ${SectionPath}
   ${EndIf}
-  ; An update keeps what was chosen before.
+  ; An update keeps the previous choice.
   ReadRegDWORD $0 HKCU "Software\NEP Studio" "OnPath"
   ${If} $0 = ${ON_PATH}
     !insertmacro SelectSection ${SectionPath}
@@ -305,16 +305,16 @@ Function .onInstFailed
   SetOutPath $TEMP
   RMDir /r "$INSTDIR\new~"
   RMDir "$INSTDIR"
-  !insertmacro Say "$(NotInstalled)"
+  !insertmacro ShowMessage "$(NotInstalled)"
 FunctionEnd
 
-; ---- removing ----------------------------------------------------------------------------------------
+; ---- uninstallation -----------------------------------------------------------------------------------
 
 Function un.onInit
   Call un.WaitUntilClosed
-  StrCpy $KeepWork 1
-  MessageBox MB_YESNO|MB_ICONQUESTION "$(KeepYourWork)" /SD IDYES IDYES +2
-  StrCpy $KeepWork 0
+  StrCpy $KeepData 1
+  MessageBox MB_YESNO|MB_ICONQUESTION "$(KeepUserData)" /SD IDYES IDYES +2
+  StrCpy $KeepData 0
 FunctionEnd
 
 !macro Remove name
@@ -335,15 +335,15 @@ Section "Uninstall"
   ${EndIf}
   Delete "$SMPROGRAMS\NEP Studio.lnk"
   !insertmacro Dissociate
-  ; Only what the setup has put there: the folder may be one that holds other things.
+  ; Only files of the installer: the folder may contain others.
   !insertmacro ForEachEntry Remove
   RMDir /r "$INSTDIR\new~"
   RMDir /r "$OldFolder"
   RMDir "$INSTDIR"
-  RMDir "$LOCALAPPDATA\Programs" ; when it is empty
+  RMDir "$LOCALAPPDATA\Programs" ; only if empty
   DeleteRegKey HKCU "${UNINSTALL_KEY}"
   DeleteRegKey HKCU "Software\NEP Studio"
-  ${If} $KeepWork = 0
+  ${If} $KeepData = 0
     RMDir /r "$LOCALAPPDATA\nep-studio"
   ${EndIf}
   System::Call 'shell32::SHChangeNotify(i 0x08000000, i 0, p 0, p 0)'

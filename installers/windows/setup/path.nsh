@@ -1,5 +1,5 @@
-; The command `nep` on the user's PATH. The value may be longer than NSIS can hold in a variable (1024
-; characters), and must not lose its kind (REG_EXPAND_SZ): so it is changed in memory of its own.
+; Adds the folder of `nep` to the user's PATH and removes it. The value may be longer than a variable of NSIS (1024
+; characters) and must keep its type (REG_EXPAND_SZ), so it is edited in allocated memory.
 
 !define HKEY_CURRENT_USER_NUMBER -2147483647
 !define REG_EXPAND_SZ_NUMBER 2
@@ -7,7 +7,7 @@
 
 !macro PathFunctions UN
 
-; $3 the open key, $4 the memory with ";" value ";", $5 its kind; $3 is 0 when the key can't be opened.
+; Sets $3 to the open key (0 if it can't be opened), $4 to the memory with the value between two ";", and $5 to its type.
 Function ${UN}ReadPath
   StrCpy $4 0
   System::Call 'advapi32::RegOpenKeyExW(p ${HKEY_CURRENT_USER_NUMBER}, w "Environment", i 0, \
@@ -22,7 +22,7 @@ Function ${UN}ReadPath
     StrCpy $2 0
     StrCpy $5 ${REG_EXPAND_SZ_NUMBER}
   ${EndIf}
-  ; Room for what is there, for ";FOLDER;" and for the ends, all of it zero.
+  ; Zeroed memory for the value, ";FOLDER;" and the terminators.
   IntOp $1 $2 + 4096
   System::Call 'kernel32::GlobalAlloc(i 0x40, p r1) p .r4'
   IntPtrOp $6 $4 + 2
@@ -33,11 +33,11 @@ Function ${UN}ReadPath
   System::Call 'kernel32::lstrcatW(p r4, w ";")'
 FunctionEnd
 
-; The memory becomes the value again, without the ";" that was put before and behind it; $3 is closed.
+; Writes the value from memory, without the surrounding ";", and closes $3.
 Function ${UN}WritePath
   System::Call 'kernel32::lstrlenW(p r4) i .r1'
   IntPtrOp $6 $4 + 2
-  ${If} $1 <= 2 ; nothing is left of it
+  ${If} $1 <= 2 ; the value is empty
     System::Call 'advapi32::RegDeleteValueW(p r3, w "Path")'
   ${Else}
     IntOp $2 $1 - 1
@@ -47,7 +47,7 @@ Function ${UN}WritePath
     System::Call 'advapi32::RegSetValueExW(p r3, w "Path", i 0, i r5, p r6, i r2)'
   ${EndIf}
   Call ${UN}ClosePath
-  ; Programs that are started from now on see it.
+  ; Newly started programs use the new value.
   SendMessage ${HWND_BROADCAST} ${WM_SETTINGCHANGE} 0 "STR:Environment" /TIMEOUT=5000
 FunctionEnd
 
@@ -86,7 +86,7 @@ Function AddToPath
   System::Call 'shlwapi::StrStrIW(p r4, w ";$INSTDIR;") p .r7'
   ${If} $7 P= 0
     System::Call 'kernel32::lstrlenW(p r4) i .r1'
-    ${If} $1 = 2 ; it was empty: ";;"
+    ${If} $1 = 2 ; the value was empty: ";;"
       System::Call 'kernel32::lstrcpyW(p r4, w ";")'
     ${EndIf}
     System::Call 'kernel32::lstrcatW(p r4, w "$INSTDIR;")'

@@ -1,4 +1,4 @@
-; Texts of the setup in each of its languages. "$1" and "$2" are numbers.
+; Texts of the installer in all languages. "$1" and "$2" are numbers.
 
 LangString StudioDescription ${LANG_ENGLISH} "The window, the virtual robot and everything they need."
 LangString StudioDescription ${LANG_SPANISH} "La ventana, el robot virtual y todo lo que necesitan."
@@ -10,25 +10,25 @@ LangString PathTitle ${LANG_SPANISH} "El comando nep en terminales"
 LangString PathTitle ${LANG_FRENCH} "La commande nep dans les terminaux"
 LangString PathTitle ${LANG_JAPANESE} "ターミナルのnepコマンド"
 
-LangString PathDescription ${LANG_ENGLISH} "For people who type commands: adds NEP Studio's folder to your PATH."
-LangString PathDescription ${LANG_SPANISH} "Para quien escribe comandos: agrega la carpeta de NEP Studio a tu PATH."
-LangString PathDescription ${LANG_FRENCH} "Pour ceux qui tapent des commandes : ajoute le dossier de NEP Studio à votre PATH."
-LangString PathDescription ${LANG_JAPANESE} "コマンドを入力する人向け: NEP StudioのフォルダーをPATHに追加します。"
+LangString PathDescription ${LANG_ENGLISH} "Adds NEP Studio's folder to your PATH."
+LangString PathDescription ${LANG_SPANISH} "Agrega la carpeta de NEP Studio a tu PATH."
+LangString PathDescription ${LANG_FRENCH} "Ajoute le dossier de NEP Studio à votre PATH."
+LangString PathDescription ${LANG_JAPANESE} "NEP StudioのフォルダーをPATHに追加します。"
 
 LangString StudioIsOpen ${LANG_ENGLISH} "NEP Studio is open. Save your work and close it, then try again. Nothing was changed."
 LangString StudioIsOpen ${LANG_SPANISH} "NEP Studio está abierto. Guarda tu trabajo y ciérralo; después inténtalo otra vez. No se cambió nada."
 LangString StudioIsOpen ${LANG_FRENCH} "NEP Studio est ouvert. Enregistrez votre travail et fermez-le, puis réessayez. Rien n’a été modifié."
 LangString StudioIsOpen ${LANG_JAPANESE} "NEP Studioが開いています。作業を保存して閉じてから、もう一度実行してください。何も変更されていません。"
 
-LangString SetupRunsAlready ${LANG_ENGLISH} "Setup is already running. Look for its other window."
-LangString SetupRunsAlready ${LANG_SPANISH} "Este instalador ya está en marcha: busca su otra ventana."
-LangString SetupRunsAlready ${LANG_FRENCH} "L’installation est déjà en cours. Cherchez son autre fenêtre."
-LangString SetupRunsAlready ${LANG_JAPANESE} "セットアップはすでに実行中です。別のウィンドウを確認してください。"
+LangString SetupIsRunning ${LANG_ENGLISH} "Setup is already running. Look for its other window."
+LangString SetupIsRunning ${LANG_SPANISH} "Este instalador ya está en marcha: busca su otra ventana."
+LangString SetupIsRunning ${LANG_FRENCH} "L’installation est déjà en cours. Cherchez son autre fenêtre."
+LangString SetupIsRunning ${LANG_JAPANESE} "セットアップはすでに実行中です。別のウィンドウを確認してください。"
 
-LangString NoRoom ${LANG_ENGLISH} "There is not enough space on the disk: NEP Studio needs $2 MB, and $1 MB are free. Free some space and try again."
-LangString NoRoom ${LANG_SPANISH} "No hay suficiente espacio en el disco: NEP Studio necesita $2 MB y hay $1 MB libres. Libera espacio e inténtalo otra vez."
-LangString NoRoom ${LANG_FRENCH} "Espace disque insuffisant : NEP Studio a besoin de $2 Mo et $1 Mo sont libres. Libérez de l’espace et réessayez."
-LangString NoRoom ${LANG_JAPANESE} "ディスクの空き容量が足りません。NEP Studioには$2 MB必要ですが、空きは$1 MBです。空きを増やしてからもう一度実行してください。"
+LangString NotEnoughSpace ${LANG_ENGLISH} "There is not enough disk space: NEP Studio needs $2 MB, but only $1 MB are free. Free some space and try again."
+LangString NotEnoughSpace ${LANG_SPANISH} "No hay suficiente espacio en el disco: NEP Studio necesita $2 MB y hay $1 MB libres. Libera espacio e inténtalo otra vez."
+LangString NotEnoughSpace ${LANG_FRENCH} "Espace disque insuffisant : NEP Studio a besoin de $2 Mo et $1 Mo sont libres. Libérez de l’espace et réessayez."
+LangString NotEnoughSpace ${LANG_JAPANESE} "ディスクの空き容量が足りません。NEP Studioには$2 MB必要ですが、空きは$1 MBです。空きを増やしてからもう一度実行してください。"
 
 LangString NoFolder ${LANG_ENGLISH} "Setup can't write to this folder: $INSTDIR. Choose another one."
 LangString NoFolder ${LANG_SPANISH} "No puedes escribir en esta carpeta: $INSTDIR. Elige otra."
@@ -45,7 +45,7 @@ LangString NotInstalled ${LANG_SPANISH} "NEP Studio ${VERSION} no se instaló. S
 LangString NotInstalled ${LANG_FRENCH} "NEP Studio ${VERSION} n’a pas été installé. Une version déjà installée et votre travail sont inchangés."
 LangString NotInstalled ${LANG_JAPANESE} "NEP Studio ${VERSION}はインストールされませんでした。以前のバージョンと作業内容はそのままです。"
 
-LangString KeepYourWork ${LANG_ENGLISH} "Keep your settings, and the backups of behaviours that NEP Studio made for you?$\r$\n$\r$\nFiles that you saved yourself stay in any case."
-LangString KeepYourWork ${LANG_SPANISH} "¿Conservar tus ajustes y las copias de comportamientos que NEP Studio guardó para ti?$\r$\n$\r$\nLos archivos que guardaste tú se quedan en cualquier caso."
-LangString KeepYourWork ${LANG_FRENCH} "Conserver vos paramètres et les copies de secours des comportements créées par NEP Studio ?$\r$\n$\r$\nLes fichiers que vous avez enregistrés vous-même restent dans tous les cas."
-LangString KeepYourWork ${LANG_JAPANESE} "設定と、NEP Studioが作成したふるまいのバックアップを残しますか？$\r$\n$\r$\n自分で保存したファイルは、どちらの場合も残ります。"
+LangString KeepUserData ${LANG_ENGLISH} "Keep your settings and the backups of behaviours that NEP Studio created?$\r$\n$\r$\nFiles that you saved yourself are kept in any case."
+LangString KeepUserData ${LANG_SPANISH} "¿Conservar tus ajustes y las copias de comportamientos que NEP Studio guardó para ti?$\r$\n$\r$\nLos archivos que guardaste tú se quedan en cualquier caso."
+LangString KeepUserData ${LANG_FRENCH} "Conserver vos paramètres et les copies de secours des comportements créées par NEP Studio ?$\r$\n$\r$\nLes fichiers que vous avez enregistrés vous-même restent dans tous les cas."
+LangString KeepUserData ${LANG_JAPANESE} "設定と、NEP Studioが作成したふるまいのバックアップを残しますか？$\r$\n$\r$\n自分で保存したファイルは、どちらの場合も残ります。"

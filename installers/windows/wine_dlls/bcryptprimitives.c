@@ -1,4 +1,4 @@
-/* For Wine 8, which has no bcryptprimitives.dll: programs in Rust (iceoryx2) take their random numbers from it. */
+/* Stub for Wine 8, which lacks bcryptprimitives.dll. Rust programs (iceoryx2) use it for random numbers. */
 #include <windows.h>
 #include <ntsecapi.h>
 

@@ -185,8 +185,8 @@ class MemorySubscriber(WakingSubscriber):
         super().__init__(transport.changed)
         self._transport = transport
         self.hub = hub
-        batch = 0 if spec.sink is None else _BATCH_BYTES
-        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
+        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
+        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
         self.ready: deque[Message] = deque()
         self.spec = spec
         self.received = self.lost = self.refused = 0
@@ -239,9 +239,9 @@ class MemorySubscriber(WakingSubscriber):
             self.is_closed = True
             self.hub.patterns = tuple(each for each in self.hub.patterns if each is not self)
             subscribers = self.hub.subscribers.pop(self.spec.topic, ())
-            others = tuple(each for each in subscribers if each is not self)
-            if others:
-                self.hub.subscribers[self.spec.topic] = others
+            remaining = tuple(each for each in subscribers if each is not self)
+            if remaining:
+                self.hub.subscribers[self.spec.topic] = remaining
             self._transport.discard(self)
             self.hub.apply(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
@@ -256,7 +256,7 @@ class MemoryTransport:
     def __init__(self, node: NodeRecord) -> None:
         self.node = node
         self.changed = threading.Condition()
-        self._wakes = 0
+        self._wake_count = 0
         self._load = CpuLoad()
         self._publishers: tuple[MemoryPublisher, ...] = ()
         self._subscribers: tuple[MemorySubscriber, ...] = ()
@@ -327,19 +327,21 @@ class MemoryTransport:
     ) -> None:
         """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, MemorySubscriber)]
-        before = self._wakes
+        before = self._wake_count
         with wake_on_call(calls, self.wake) as is_empty:
             if is_empty:
                 with self.changed:
                     self.changed.wait_for(
-                        lambda: self._wakes != before or any(len(each.inbox) for each in own_subscribers),
+                        lambda: (
+                            self._wake_count != before or any(len(each.inbox) for each in own_subscribers)
+                        ),
                         timeout_s,
                     )
 
     def wake(self) -> None:
         """End all waits in progress."""
         with self.changed:
-            self._wakes += 1
+            self._wake_count += 1
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
@@ -351,15 +353,18 @@ class MemoryTransport:
 
         The members are the node's publishers, subscribers, servers and clients.
         """
-        outs = [each for each in self._publishers if each.hub is hub and not each.is_closed]
-        ins = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
+        publishers = [each for each in self._publishers if each.hub is hub and not each.is_closed]
+        subscribers = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
         return requests.Renew(
             self.node.id,
             hub.graph.epoch,
             hub.graph.revision,
-            (*(each.counts() for each in outs), *self._services.server_counts(hub)),
+            (*(each.counts() for each in publishers), *self._services.server_counts(hub)),
             (
-                *(SubscriberCount(i.spec.id, i.received, i.lost, i.problem) for i in ins),
+                *(
+                    SubscriberCount(each.spec.id, each.received, each.lost, each.problem)
+                    for each in subscribers
+                ),
                 *self._services.client_counts(hub),
             ),
             self._load.ratio(),

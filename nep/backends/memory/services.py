@@ -107,18 +107,18 @@ class MemoryServer:
         reply = limit_reply_size(reply)
         self.stats.add(reply)
         with self.hub.lock:
-            is_waited_for = call.client.remove_locked(call)
-            call.client.replied += is_waited_for
-            call.client.late += not is_waited_for
-        if is_waited_for:
+            is_pending = call.client.remove_locked(call)
+            call.client.replied += is_pending
+            call.client.late += not is_pending
+        if is_pending:
             data = reply.data if isinstance(reply.data, bytes) else bytes(reply.data)
             call.run_callback(reply._replace(data=data))
-        return is_waited_for
+        return is_pending
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports."""
-        tally = self.stats
-        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+        stats = self.stats
+        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 
     def begin_close(self) -> None:
         """Unregister the server and reject its queued calls."""
@@ -195,14 +195,14 @@ class MemoryClient:
         server: MemoryServer | None,
     ) -> OpenCall:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        copied = data if isinstance(data, bytes) else bytes(data)
+        request = data if isinstance(data, bytes) else bytes(data)
         with self.hub.lock:
             if self.is_closed:
                 raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(copied))
-            call = _Call(next(self._numbers), self, copied, timeout_s, deadline, callback)
+            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(request))
+            call = _Call(next(self._numbers), self, request, timeout_s, deadline, callback)
             self._calls[call.number] = call
-            self._bytes += len(copied)
+            self._bytes += len(request)
             server = server or next(iter(self.hub.servers.get(self.spec.service, ())), None)
             if server is not None:
                 server.enqueue(call)
@@ -253,13 +253,13 @@ class MemoryClient:
     def expire(self, now: float) -> float:
         """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
         with self.hub.lock:
-            late = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
-            self.failed += len(late)
-            due = min((each.deadline for each in self._calls.values()), default=math.inf)
-        for call in late:
-            kind = NoServerError if call.server is None else ServiceTimeoutError
-            call.run_callback(kind(self.spec.service, call.timeout_s or 0.0))
-        return due
+            expired = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
+            self.failed += len(expired)
+            next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
+        for call in expired:
+            error_class = NoServerError if call.server is None else ServiceTimeoutError
+            call.run_callback(error_class(self.spec.service, call.timeout_s or 0.0))
+        return next_deadline
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
@@ -276,9 +276,9 @@ class MemoryClient:
             if self.is_closed:
                 return
             self.is_closed = True
-            others = tuple(each for each in self.hub.clients[self.spec.service] if each is not self)
-            self.hub.clients[self.spec.service] = others
-            if not others:
+            remaining = tuple(each for each in self.hub.clients[self.spec.service] if each is not self)
+            self.hub.clients[self.spec.service] = remaining
+            if not remaining:
                 del self.hub.clients[self.spec.service]
             self._deadlines.remove_client(self)
             in_flight, self._calls = self.calls, {}
@@ -300,21 +300,21 @@ class MemoryServices:
 
     Args:
         node: Record of the node.
-        joined: Returns a context manager that yields the hub for a configuration with its lock held.
+        joined_hub: Returns a context manager that yields the hub for a configuration with its lock held.
     """
 
     def __init__(
-        self, node: NodeRecord, joined: Callable[[Configuration], AbstractContextManager[ServiceHub]]
+        self, node: NodeRecord, joined_hub: Callable[[Configuration], AbstractContextManager[ServiceHub]]
     ) -> None:
         self._node = node
-        self._joined = joined
+        self._joined_hub = joined_hub
         self._deadlines = Deadlines(node.name)
         self._servers: tuple[MemoryServer, ...] = ()
         self._clients: tuple[MemoryClient, ...] = ()
 
     def create_server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server and send it the calls that are waiting for one."""
-        with self._joined(spec.configuration) as hub:
+        with self._joined_hub(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
             )
@@ -328,7 +328,7 @@ class MemoryServices:
 
     def create_client(self, spec: ClientSpec) -> MemoryClient:
         """Register a client."""
-        with self._joined(spec.configuration) as hub:
+        with self._joined_hub(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             hub.apply(requests.AddSubscriber(self._node, record))
             client = MemoryClient(self._node.id, hub, spec, self._deadlines)

@@ -121,8 +121,8 @@ class NanomsgClient(ClientCalls[_Call]):
     def _send_and_receive(self, call: _Call) -> Outcome | None:
         # Returns None if the context was closed; the call already has its outcome then.
         nng = load_pynng()
-        left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
-        parts = self._framing.encode_call(call.number, self.spec.codec.number, left_s, call.data)
+        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        parts = self._framing.encode_call(call.number, self.spec.codec.number, remaining_s, call.data)
         try:
             call.context.send(join_parts(self._framing, parts))  # blocks until a server is connected
             call.is_sent, call.data = True, b""  # the context outlives the timeout: release the payload
@@ -139,12 +139,12 @@ class NanomsgClient(ClientCalls[_Call]):
 
     def _finish(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
-            is_waited_for = self._remove_locked(call)
+            is_pending = self._remove_locked(call)
             is_late = self._late_calls.pop(call.number, None) is not None and not isinstance(
                 outcome, NepError
             )
             self.late += is_late
-        if is_waited_for:
+        if is_pending:
             self._run_callback(call, outcome)
 
     def cancel(self, call: OpenCall) -> None:
@@ -157,35 +157,36 @@ class NanomsgClient(ClientCalls[_Call]):
             self._abandon(existing)
 
     def _abandon(self, call: _Call) -> None:
-        # Waits for the late reply of a call that is no longer in flight. Call without the lock.
+        # Keeps the context of a sent call to count its late reply, within `_MAX_LATE_CALLS`; closes other
+        # contexts. Call without the lock.
         with self._lock:
             if call.is_sent:
                 self._late_calls[call.number] = call
-            too_many = len(self._late_calls) > _MAX_LATE_CALLS
-            closed = (
+            has_too_many_late_calls = len(self._late_calls) > _MAX_LATE_CALLS
+            call_to_close = (
                 self._late_calls.pop(next(iter(self._late_calls)))
-                if too_many
+                if has_too_many_late_calls
                 else None
                 if call.is_sent
                 else call
             )
-        if closed is not None:
-            close_context(closed.context)
+        if call_to_close is not None:
+            close_context(call_to_close.context)
 
     def expire(self, now: float) -> float:
         """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
         with self._lock:
-            late = [
+            expired = [
                 each
                 for each in tuple(self._calls.values())
                 if each.deadline <= now and self._remove_locked(each)
             ]
-            due = min((each.deadline for each in self._calls.values()), default=math.inf)
-        for call in late:
+            next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
+        for call in expired:
             self._abandon(call)
-            kind = ServiceTimeoutError if call.is_sent else NoServerError
-            self._run_callback(call, kind(self.spec.service, call.timeout_s or 0.0))
-        return due
+            error_class = ServiceTimeoutError if call.is_sent else NoServerError
+            self._run_callback(call, error_class(self.spec.service, call.timeout_s or 0.0))
+        return next_deadline
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
         """Return an empty tuple, because services can't be listed without a master."""
@@ -200,11 +201,11 @@ class NanomsgClient(ClientCalls[_Call]):
                 return
             self.is_closed = True
             in_flight, self._calls = list(self._calls.values()), {}
-            abandoned, self._late_calls = list(self._late_calls.values()), {}
+            abandoned_calls, self._late_calls = list(self._late_calls.values()), {}
             threads = tuple(self._threads)
         self._deadlines.remove_client(self)
         self._on_close(self)
-        for call in abandoned:
+        for call in abandoned_calls:
             close_context(call.context)
         for call in in_flight:
             close_context(call.context)

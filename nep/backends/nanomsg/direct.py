@@ -161,11 +161,11 @@ class DirectPublisher:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            warns = len(frame) > _MAX_LIBNANOMSG_BYTES and not self._has_warned
-            self._has_warned = self._has_warned or warns
+            should_warn = len(frame) > _MAX_LIBNANOMSG_BYTES and not self._has_warned
+            self._has_warned = self._has_warned or should_warn
             self._sent_at = time.monotonic()
             self._socket.send(frame, block=False)
-        if warns:
+        if should_warn:
             _logger.warning(
                 _(
                     "a message on '{topic}' is {size} bytes; programs that use libnanomsg silently drop "
@@ -175,7 +175,7 @@ class DirectPublisher:
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
         """Return a state that pauses reading, because the socket receives nothing."""
-        return PollState(pause_reading=True)
+        return PollState(is_reading_paused=True)
 
     def close(self, timeout_s: float) -> None:
         """Flush for up to `timeout_s` seconds and close the publisher. Must be called only once."""
@@ -192,9 +192,9 @@ class DirectPublisher:
         Returns earlier at `deadline` (`time.monotonic`) or when all connections have closed. pynng doesn't
         report how much of the queue it has sent.
         """
-        until = min(deadline, self._sent_at + _LINGER_S)
+        flush_deadline = min(deadline, self._sent_at + _LINGER_S)
         with self._changed:
-            wait_until(self._changed, lambda: not self._pipes, until - time.monotonic())
+            wait_until(self._changed, lambda: not self._pipes, flush_deadline - time.monotonic())
 
     def release(self) -> None:
         """Close the socket. Call without the lock, because pynng waits for its running callbacks."""
@@ -229,7 +229,7 @@ class DirectSubSocket(UnbatchedReader):
         """True if a message can be read."""
         return self._sub.has_input
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message of the topic, or None if there is none. See `Readable.read`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:

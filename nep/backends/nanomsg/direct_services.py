@@ -75,12 +75,12 @@ class DirectServices:
         return self._create_server(spec, "Rep0", _framing(direct), attach_socket)
 
     def _create_server(
-        self, spec: ServerSpec, kind: str, framing: Framing, attached: Callable[[object], str]
+        self, spec: ServerSpec, kind: str, framing: Framing, attach_socket: Callable[[object], str]
     ) -> NanomsgServer:
         self._check_open()
         socket = new_socket(kind, send_timeout=_REPLY_TIMEOUT_MS, recv_max_size=_MAX_MESSAGE_BYTES)
         try:
-            server = NanomsgServer(socket, attached(socket), spec, framing, self._servers.discard)
+            server = NanomsgServer(socket, attach_socket(socket), spec, framing, self._servers.discard)
         except BaseException:
             socket.close()
             raise

@@ -15,15 +15,15 @@ from nep.protocol.wire import EXTENSION, HEADER_BYTES, LATCHED, hello_part, read
 _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCII)
 
 
-def format_endpoint(host: str, messages: int, hellos: int) -> str:
+def format_endpoint(host: str, message_port: int, hello_port: int) -> str:
     """Return the endpoint of a publisher.
 
     Args:
         host: IP address or host name.
-        messages: Port for messages.
-        hellos: Port for hellos.
+        message_port: Port for messages.
+        hello_port: Port for hellos.
     """
-    return f"nanomsg://{host}:{messages}/{hellos}"
+    return f"nanomsg://{host}:{message_port}/{hello_port}"
 
 
 def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
@@ -34,8 +34,8 @@ def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
     match = _ENDPOINT.fullmatch(endpoint)
     if match is None or not all(0 < int(port) < 65536 for port in match.groups()[1:]):
         return None
-    host, messages, hellos = match.groups()
-    return f"{host}:{messages}", f"{host}:{hellos}"
+    host, message_port, hello_port = match.groups()
+    return f"{host}:{message_port}", f"{host}:{hello_port}"
 
 
 def subscriber_topic_part(subscriber: int, topic: str) -> bytes:
@@ -43,12 +43,12 @@ def subscriber_topic_part(subscriber: int, topic: str) -> bytes:
     return hello_part(subscriber, topic) + b"\0"
 
 
-def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
+def split_message(message: bytes, prefix: bytes, *, is_alone: bool) -> list[bytes]:
     """Split a one-part message into the parts after its prefix.
 
     Args:
         message: Received message.
-        first: Prefix of the message: the topic, or the hello of one subscriber.
+        prefix: Prefix of the message: the topic, or the hello of one subscriber.
         is_alone: True if the message is addressed to one subscriber, as notices are.
 
     Returns:
@@ -57,13 +57,13 @@ def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes
     Raises:
         WireError: The header is malformed or declares more bytes than follow.
     """
-    rest = message[len(first) :]
-    header = read_header(rest[:HEADER_BYTES])
-    body = rest[HEADER_BYTES:]
+    tail = message[len(prefix) :]
+    header = read_header(tail[:HEADER_BYTES])
+    body = tail[HEADER_BYTES:]
     if is_alone and not body and not header.flags & LATCHED:
-        return [rest]
+        return [tail]
     if not header.flags & EXTENSION:
-        return [rest[:HEADER_BYTES], body]
+        return [tail[:HEADER_BYTES], body]
     if header.size > len(body):
         raise WireError(
             _("the header declares {size} bytes, but only {count} follow").format(
@@ -71,4 +71,4 @@ def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes
             ),
             len(message),
         )
-    return [rest[:HEADER_BYTES], body[: header.size], body[header.size :]]
+    return [tail[:HEADER_BYTES], body[: header.size], body[header.size :]]

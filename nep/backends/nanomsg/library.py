@@ -50,22 +50,22 @@ def load_pynng(load: Callable[[str], ModuleType] = importlib.import_module) -> A
             )
         )
     try:
-        loaded = load("pynng")
+        pynng = load("pynng")
     except (ImportError, OSError) as error:
         raise BackendUnavailableError(
             "nanomsg", _("install it with 'pip install nep-studio[nanomsg]'")
         ) from error
     _defer_exit_handler()
-    return loaded
+    return pynng
 
 
 def _defer_exit_handler() -> None:
     # pynng's own exit handler would run before the nodes are closed.
     global _exit_handler  # noqa: PLW0603 - one per process
-    at_exit = getattr(sys.modules.get(_MODULE_NAME), "_pynng_atexit", None)
-    if at_exit is not None and _exit_handler is None:
-        _exit_handler = at_exit
-        call_after_nodes(at_exit)
+    exit_handler = getattr(sys.modules.get(_MODULE_NAME), "_pynng_atexit", None)
+    if exit_handler is not None and _exit_handler is None:
+        _exit_handler = exit_handler
+        call_after_nodes(exit_handler)
 
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
@@ -75,14 +75,14 @@ def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
         kind: Name of the class, such as "Pub0".
         options: Arguments of the constructor.
     """
-    created = getattr(load_pynng(), kind)(**options)
-    _sockets.add(created)
-    return created
+    socket = getattr(load_pynng(), kind)(**options)
+    _sockets.add(socket)
+    return socket
 
 
-def prevent_finalization(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
+def prevent_finalization(instance: Any) -> None:  # noqa: ANN401 - pynng is not typed
     """Prevent an object from ever being finalized, even at exit."""
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))
 
 
 def _forked() -> None:
@@ -92,10 +92,10 @@ def _forked() -> None:
     _inherited_libraries.add("pynng")
     for socket in _sockets:
         prevent_finalization(socket)  # the finalizer would close it
-    at_exit = getattr(sys.modules[_MODULE_NAME], "_pynng_atexit", None)
-    if at_exit is not None:
-        atexit.unregister(at_exit)
-        cancel_after_nodes(at_exit)
+    exit_handler = getattr(sys.modules[_MODULE_NAME], "_pynng_atexit", None)
+    if exit_handler is not None:
+        atexit.unregister(exit_handler)
+        cancel_after_nodes(exit_handler)
 
 
 call_in_child(_forked)
@@ -111,23 +111,23 @@ def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
     return int(str(listener.local_address).rpartition(":")[2])
 
 
-def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not typed
+def listen(socket: Any, address: str, owner: str) -> Any:  # noqa: ANN401 - not typed
     """Listen at `HOST:PORT` and return the listener. Port 0 selects a port not used by the original NEP.
 
     Args:
-        owner: Socket of pynng.
+        socket: Socket of pynng.
         address: Address as `HOST:PORT`.
-        what: Owner of the socket, for error messages.
+        owner: Owner of the socket, for error messages.
 
     Raises:
         AddressInUseError: The address can't be bound.
         TooManyFilesError: The process is out of file descriptors.
     """
     nng = load_pynng()
-    check_free_descriptors(FDS_PER_SOCKET, what)
+    check_free_descriptors(FDS_PER_SOCKET, owner)
     for _try in range(_PORT_ATTEMPTS):
         try:
-            listener = owner.listen(f"tcp://{address}")
+            listener = socket.listen(f"tcp://{address}")
         except nng.AddressInUse as error:
             raise AddressInUseError(address) from error
         except nng.NNGException as error:

@@ -63,8 +63,9 @@ class NanomsgPublisher(HandshakePublisher):
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        queue = max(queue_length(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
-        self._message_socket: Any = new_socket("Pub0", send_buffer_size=queue)
+        # the history is sent in one burst
+        send_queue_length = max(queue_length(spec.codec.name), 2 * spec.history)
+        self._message_socket: Any = new_socket("Pub0", send_buffer_size=send_queue_length)
         self._hello_socket: Any = new_socket(
             "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=MAX_SUBSCRIPTION_BYTES
         )
@@ -173,10 +174,10 @@ class NanomsgPublisher(HandshakePublisher):
                 self._update_connection_locked(*self._events.popleft())
             while not self._is_released:
                 try:
-                    received = self._hello_socket.recv(block=False)
+                    frame = self._hello_socket.recv(block=False)
                 except self._try_again_error:
                     break
-                self._process_hello_locked(received)
+                self._process_hello_locked(frame)
         return PollState()
 
     def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
@@ -198,13 +199,13 @@ class NanomsgPublisher(HandshakePublisher):
             self._counts_at_hello.pop(subscriber, None)
             self._changed.notify_all()
 
-    def _process_hello_locked(self, received: bytes) -> None:
-        address, _space, part = received.partition(b" ")
+    def _process_hello_locked(self, frame: bytes) -> None:
+        address, _space, part = frame.partition(b" ")
         hello = parse_hello(part)
         if hello is not None and len(self._hellos) >= _MAX_HELLOS:
             self._discard_unconnected_hellos_locked()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MAX_HELLOS:
-            if self._rejections.add(f"an invalid hello of {len(received)} bytes"):
+            if self._rejections.add(f"an invalid hello of {len(frame)} bytes"):
                 _logger.info("'%s' received %s", self.spec.topic, self._rejections.recent_message())
             return
         remote = address.decode("ascii", "replace")
@@ -214,9 +215,11 @@ class NanomsgPublisher(HandshakePublisher):
 
     def _discard_unconnected_hellos_locked(self) -> None:
         # Discards hellos whose connection was never established or is closed. Call with the lock held.
-        connected = set(self._pipes.values())
+        connected_addresses = set(self._pipes.values())
         self._hellos = {
-            remote: subscriber for remote, subscriber in self._hellos.items() if remote in connected
+            address: subscriber
+            for address, subscriber in self._hellos.items()
+            if address in connected_addresses
         }
 
     def _complete_handshake_locked(self, address: str) -> None:
@@ -261,17 +264,17 @@ class NanomsgPublisher(HandshakePublisher):
                     self._changed, lambda: not self._counts_at_hello, min(remaining_s, _BYE_RETRY_S)
                 ):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
-            undelivered = [
+            undelivered_counts = [
                 max(self.count - seen_count, len(self._history))
                 for seen_count in self._counts_at_hello.values()
             ]
-            if any(undelivered):
+            if any(undelivered_counts):
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
                     self.spec.topic,
-                    sum(map(bool, undelivered)),
-                    max(undelivered),
+                    sum(map(bool, undelivered_counts)),
+                    max(undelivered_counts),
                 )
             self._counts_at_hello.clear()
 

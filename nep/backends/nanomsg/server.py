@@ -92,7 +92,7 @@ class NanomsgServer:
         self._on_close = on_close
         self._rejections = RejectionCounter()
         self._lock = threading.Lock()
-        self._answered_at = 0.0
+        self._replied_at = 0.0
         self._contexts: set[Any] = set()
         """Contexts that wait for a call, or whose call is not answered yet."""
         self._disconnected = threading.Event()
@@ -137,20 +137,20 @@ class NanomsgServer:
 
     def _reply_function(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
         def reply_to_call(reply: Reply) -> bool:
-            checked = limit_reply_size(reply)
-            self.stats.add(checked)
+            limited_reply = limit_reply_size(reply)
+            self.stats.add(limited_reply)
             with self._lock:
                 if self.is_closed:
                     return False
-                self._answered_at = time.monotonic()
+                self._replied_at = time.monotonic()
             try:
-                context.send(join_parts(self._framing, self._framing.encode_reply(number, checked)))
+                context.send(join_parts(self._framing, self._framing.encode_reply(number, limited_reply)))
             except (load_pynng().NNGException, TypeError) as error:  # the client has stopped waiting
                 _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False
             finally:
                 with self._lock:
-                    self._answered_at = time.monotonic()
+                    self._replied_at = time.monotonic()
                     is_open = context in self._contexts
                     self._contexts.discard(context)
                 if is_open:
@@ -172,7 +172,7 @@ class NanomsgServer:
                 return
             self.is_closed = True
         self._on_close(self)
-        remaining_s = min(timeout_s, self._answered_at + _LINGER_S - time.monotonic())
+        remaining_s = min(timeout_s, self._replied_at + _LINGER_S - time.monotonic())
         if remaining_s > 0.0 and self._socket.pipes:
             self._disconnected.wait(remaining_s)
         with self._lock:

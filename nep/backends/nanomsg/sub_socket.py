@@ -54,9 +54,9 @@ class PollableSub:
 
     def enlarge_queue(self, history: int) -> None:
         """Enlarge the receive queue so that a history of `history` messages fits."""
-        room = 2 * min(history, MAX_HISTORY)
-        if room > self._queue_length:
-            self._queue_length = self.socket.recv_buffer_size = room
+        required_length = 2 * min(history, MAX_HISTORY)
+        if required_length > self._queue_length:
+            self._queue_length = self.socket.recv_buffer_size = required_length
 
     def recv(self, *, may_wait: bool) -> bytes | None:
         """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
@@ -93,7 +93,7 @@ class NanomsgSubSocket(UnbatchedReader):
         self.rejections = RejectionCounter()
         self._sub = PollableSub(codec_for(spec.msg_type).name)
         self.fd = self._sub.fd
-        self._name = spec.topic
+        self._topic_name = spec.topic
         self._topic = topic_part(spec.topic)
         self._own_topic = subscriber_topic_part(spec.id, spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
@@ -120,8 +120,10 @@ class NanomsgSubSocket(UnbatchedReader):
     @property
     def problem(self) -> str:
         """Reason why messages of a listed publisher can't be received; "" if there is none."""
-        failing = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
-        return next((each.problem for each in failing), "")
+        problem_sources = (
+            each for each in self.sources.by_id.values() if each.problem and not each.is_silent
+        )
+        return next((each.problem for each in problem_sources), "")
 
     @property
     def has_input(self) -> bool:
@@ -130,9 +132,9 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher, and disconnect from silent publishers that it replaces. Idempotent."""
-        for old in self.sources.replaced_publishers(remote):
-            self.sources.count_missing(old)
-            self.disconnect(old)
+        for replaced in self.sources.replaced_publishers(remote):
+            self.sources.count_missing(replaced)
+            self.disconnect(replaced)
         source = self.sources.add_listed(remote)
         self._sub.enlarge_queue(remote.publisher.history)
         source.is_silent = False
@@ -161,18 +163,18 @@ class NanomsgSubSocket(UnbatchedReader):
             why=reason or _("not an endpoint of 'nanomsg'"),
         )
         if self.rejections.add(source.problem):
-            _logger.warning("subscription to '%s': %s", self._name, source.problem)
+            _logger.warning("subscription to '%s': %s", self._topic_name, source.problem)
 
-    def _create_link(self, publisher: int, endpoint: str, address: str, hellos: str) -> str:
+    def _create_link(self, publisher: int, endpoint: str, address: str, hello_address: str) -> str:
         # The hello is sent once the connection is established. Returns the error, or "".
         nng = load_pynng()
         try:
-            check_free_descriptors(2 * FDS_PER_SOCKET, f"a subscriber of '{self._name}'")
+            check_free_descriptors(2 * FDS_PER_SOCKET, f"a subscriber of '{self._topic_name}'")
             # with a queue, sending never blocks pynng's threads
             link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE_LENGTH))
             self._links[publisher] = link
             self._hello_sockets[address] = link.hello_socket
-            link.hello_socket.dial(f"tcp://{hellos}", block=False)
+            link.hello_socket.dial(f"tcp://{hello_address}", block=False)
             link.dialer = self._sub.socket.dial(f"tcp://{address}", block=False)
         except (nng.NNGException, TooManyFilesError) as error:
             self._remove_link(publisher)
@@ -181,9 +183,9 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         # Called in a thread of pynng. Sends the hello with the local address of the connection.
-        greeter = self._hello_sockets.get(str(pipe.remote_address))
-        if greeter is not None:
-            greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
+        hello_socket = self._hello_sockets.get(str(pipe.remote_address))
+        if hello_socket is not None:
+            hello_socket.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
     def reconnect_remote(self) -> None:
         """Do nothing, because this back end connects only nodes of one computer."""
@@ -202,16 +204,16 @@ class NanomsgSubSocket(UnbatchedReader):
             self._hello_sockets.pop(link.address, None)
             link.close()
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = frame.startswith(self._own_topic)
-            first = self._own_topic if is_alone else self._topic
+            prefix = self._own_topic if is_alone else self._topic
             try:
-                message = self._parser.parse(first, split_message(frame, first, is_alone=is_alone))
+                message = self._parser.parse(prefix, split_message(frame, prefix, is_alone=is_alone))
             except WireError as error:
                 if self.rejections.add(error.reason):
-                    _logger.warning("malformed message on '%s': %s", self._name, error)
+                    _logger.warning("malformed message on '%s': %s", self._topic_name, error)
                 continue
             if message is not None:
                 return message

@@ -34,11 +34,11 @@ class _Survey:
     # Survey in progress; a thread receives the replies in its pynng context.
     number: int
     context: Any
-    left: int
+    remaining_replies: int
     callback: OutcomeCallback
     is_finished: bool = False
     thread: threading.Thread | None = field(default=None)
-    sending: threading.Lock = field(default_factory=threading.Lock)
+    send_lock: threading.Lock = field(default_factory=threading.Lock)
 
 
 class NanomsgSurveyor:
@@ -114,14 +114,14 @@ class NanomsgSurveyor:
             )
             self._surveys[survey.number] = survey
         # Without the lock: callbacks in pynng's threads acquire it, and sending may wait for them.
-        with survey.sending, contextlib.suppress(load_pynng().NNGException):  # already closed
+        with survey.send_lock, contextlib.suppress(load_pynng().NNGException):  # already closed
             survey.context.send(bytes(data))
             survey.thread.start()
         return [survey] * count
 
     def _receive_replies(self, survey: _Survey) -> None:
-        while survey.left and (data := receive(survey.context)) is not None:
-            survey.left -= 1
+        while survey.remaining_replies and (data := receive(survey.context)) is not None:
+            survey.remaining_replies -= 1
             if survey.is_finished:
                 return
             survey.callback(ORIGINAL.read_reply([b"", data]).reply)
@@ -136,7 +136,7 @@ class NanomsgSurveyor:
 
     def _finish(self, survey: _Survey) -> None:
         survey.is_finished = True
-        with survey.sending:  # nng aborts the process if a context is closed while it sends
+        with survey.send_lock:  # nng aborts the process if a context is closed while it sends
             close_context(survey.context)
         thread = survey.thread
         if thread is not None and thread.ident is not None and thread is not threading.current_thread():

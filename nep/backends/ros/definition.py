@@ -51,19 +51,19 @@ class _Reader:
     # Reads values sequentially. Raises `struct.error` at the end of the data.
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = memoryview(data)
-        self.at = 0
+        self.offset = 0
         self.messages_left = _MAX_EMPTY_MESSAGES + _MAX_DEPTH * len(self.data)
         """Remaining number of nested messages. Empty ones aren't limited by the size of the data."""
 
     @property
     def bytes_left(self) -> int:
-        return len(self.data) - self.at
+        return len(self.data) - self.offset
 
     def read(self, count: int) -> memoryview:
         if count > self.bytes_left:
             raise struct.error
-        self.at += count
-        return self.data[self.at - count : self.at]
+        self.offset += count
+        return self.data[self.offset - count : self.offset]
 
     def read_length(self) -> int:
         return int(_LENGTH.unpack(self.read(4))[0])
@@ -179,7 +179,7 @@ class _Parser:
         self._name = name
         self._texts = texts
         self._kinds_by_name: dict[str, FieldKind] = {}
-        self._count = 0
+        self._field_count = 0
         self.has_header = False
 
     def fields_of(self, name: str, depth: int) -> tuple[DefinitionField, ...]:
@@ -190,8 +190,8 @@ class _Parser:
             if not stripped or _CONSTANT.match(line.strip()):
                 continue
             match = _FIELD.fullmatch(stripped)
-            self._count += 1
-            if match is None or self._count > _MAX_FIELDS or match[4] in names:
+            self._field_count += 1
+            if match is None or self._field_count > _MAX_FIELDS or match[4] in names:
                 raise self._definition_error(stripped)
             names.add(match[4])
             if depth == 0 and not fields:
@@ -202,29 +202,29 @@ class _Parser:
             fields.append(DefinitionField(match[4], kind))
         return tuple(fields)
 
-    def _kind(self, parent_name: str, written: str, depth: int) -> FieldKind:
-        basic = _basic_kind(written)
-        if basic is not None:
-            return basic
-        name = self._resolve_name(parent_name, written)
+    def _kind(self, parent_name: str, type_name: str, depth: int) -> FieldKind:
+        basic_kind = _basic_kind(type_name)
+        if basic_kind is not None:
+            return basic_kind
+        name = self._resolve_name(parent_name, type_name)
         kind = self._kinds_by_name.get(name)
         if kind is None:
             if depth >= _MAX_DEPTH:
-                raise self._definition_error(written)
+                raise self._definition_error(type_name)
             kind = self._kinds_by_name[name] = _nested_kind(name, self.fields_of(name, depth + 1))
         return kind
 
-    def _resolve_name(self, parent_name: str, written: str) -> str:
-        if written in _HEADER_TYPES:
-            candidates = ["std_msgs/Header", written]
-        elif "/" in written:
-            candidates = [written]
+    def _resolve_name(self, parent_name: str, type_name: str) -> str:
+        if type_name in _HEADER_TYPES:
+            candidates = ["std_msgs/Header", type_name]
+        elif "/" in type_name:
+            candidates = [type_name]
         else:
-            candidates = [f"{parent_name.partition('/')[0]}/{written}"]
+            candidates = [f"{parent_name.partition('/')[0]}/{type_name}"]
         for candidate in candidates:
             if candidate in self._texts:
                 return candidate
-        raise self._definition_error(written)
+        raise self._definition_error(type_name)
 
     def _definition_error(self, part: str) -> NepError:
         return NepError(
@@ -234,7 +234,7 @@ class _Parser:
         )
 
 
-# ---- kinds of values
+# ---- field types
 
 
 def _basic_kind(name: str) -> FieldKind | None:
@@ -417,8 +417,8 @@ def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
                 return
             except (struct.error, OverflowError, TypeError, ValueError):
                 pass  # encode one by one to find the invalid item
-        for number, item in enumerate(values):
-            kind.write(item, f"{path}[{number}]", out)
+        for index, item in enumerate(values):
+            kind.write(item, f"{path}[{index}]", out)
 
     return write
 
@@ -491,7 +491,7 @@ def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str
     return values
 
 
-# ---- names
+# ---- values and errors
 
 
 def _to_integer(value: object) -> int | None:

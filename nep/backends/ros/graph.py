@@ -72,8 +72,8 @@ def graph_view(state: RosSystemState, local_nodes: list[LocalRosNode]) -> GraphV
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
         _apply_request(graph, AddPublisher(_node_record(name, uri), record))
     for topic, name in _remote_entries(state.subscribers, local_nodes, lambda each: each.subscribers):
-        subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, state.types.get(topic, "*"))
-        _apply_request(graph, AddSubscriber(_node_record(name, state.uris.get(name, "")), subscriber_count))
+        subscriber_record = SubscriberRecord(_stable_id(name, topic, "i"), topic, state.types.get(topic, "*"))
+        _apply_request(graph, AddSubscriber(_node_record(name, state.uris.get(name, "")), subscriber_record))
     for service, name in _remote_entries(state.services, local_nodes, lambda each: each.servers):
         node = _node_record(name, state.uris.get(name, ""))
         _apply_request(graph, _server_request(node, _stable_id(name, service, "s"), service))
@@ -89,9 +89,12 @@ def _remote_entries(
     rows_of: Callable[[LocalRosNode], Sequence[tuple[object, ...]]],
 ) -> Iterator[tuple[str, str]]:
     # Yields (topic or service, node name) of nodes other than this process's nep nodes.
-    mine = {(row[0], each.ros_name) for each in local_nodes for row in rows_of(each)}
+    own_entries = {(row[0], each.ros_name) for each in local_nodes for row in rows_of(each)}
     return (
-        (each, node) for each, nodes in nodes_by_name.items() for node in nodes if (each, node) not in mine
+        (each, node)
+        for each, nodes in nodes_by_name.items()
+        for node in nodes
+        if (each, node) not in own_entries
     )
 
 

@@ -43,7 +43,7 @@ class RosFinder(MetaPathFinder):
 
     def __init__(self, folders: Sequence[str]) -> None:
         self._folders = list(folders)
-        self.extra: set[str] = set()
+        self.extra_names: set[str] = set()
 
     def find_spec(
         self,
@@ -56,13 +56,13 @@ class RosFinder(MetaPathFinder):
         Python finds submodules through their package.
         """
         if path is not None or not (
-            name in _MODULE_NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)
+            name in _MODULE_NAMES or name in self.extra_names or name.endswith(_PACKAGE_SUFFIXES)
         ):
             return None
         return importlib.machinery.PathFinder.find_spec(name, self._folders)
 
 
-_finder = RosFinder([place for place in SEARCH_FOLDERS if Path(place).is_dir()])
+_finder = RosFinder([folder for folder in SEARCH_FOLDERS if Path(folder).is_dir()])
 
 
 def _forked() -> None:
@@ -71,9 +71,9 @@ def _forked() -> None:
     if core is None or not core.is_initialized():
         return
     _inherited_libraries.add("rospy")
-    at_exit = getattr(core, "_ros_atexit", None)
-    if at_exit is not None:
-        atexit.unregister(at_exit)  # it would unregister the parent's publishers and subscribers
+    exit_handler = getattr(core, "_ros_atexit", None)
+    if exit_handler is not None:
+        atexit.unregister(exit_handler)  # it would unregister the parent's publishers and subscribers
     topics = sys.modules["rospy.impl.registration"].get_topic_manager()
     for impl in [*topics.pubs.values(), *topics.subs.values()]:
         for connection in impl.connections:
@@ -169,7 +169,7 @@ def _installed_class(name: str, folder: str) -> object:
 def _has_folder(package: str, folder: str) -> bool:
     # Checks for files, without importing the package.
     if any(Path(location, package, folder, "__init__.py").is_file() for location in SEARCH_FOLDERS):
-        _finder.extra.add(package)
+        _finder.extra_names.add(package)
         return True
     try:
         spec = importlib.util.find_spec(package)

@@ -131,19 +131,19 @@ class RosMaster:
 
         Raises `RosMasterUnreachable` after `timeout_s` seconds; None waits forever.
         """
-        started = time.monotonic()
+        started_at = time.monotonic()
         pause = threading.Event()
         while True:
-            waited = time.monotonic() - started
+            waited_s = time.monotonic() - started_at
             request_timeout_s = (
-                _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited)
+                _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited_s)
             )
             try:
                 _call(self.uri, request_timeout_s, "getPid", _CALLER_ID)
                 return
             except _REQUEST_ERRORS as error:
-                waited = time.monotonic() - started
-                if timeout_s is not None and waited + _RETRY_S >= timeout_s:
+                waited_s = time.monotonic() - started_at
+                if timeout_s is not None and waited_s + _RETRY_S >= timeout_s:
                     raise RosMasterUnreachable(self.address, timeout_s) from error
             pause.wait(_RETRY_S)
 
@@ -195,14 +195,21 @@ class RosMaster:
         """Return a snapshot of the master, without the logger services of rospy."""
         state = self._request("getSystemState", timeout_s)
         publishers, subscribers, services = (
-            {str(each): tuple(names) for each, names in part} for part in state[:3]
+            {str(each): tuple(node_names) for each, node_names in part} for part in state[:3]
         )
-        served = {name: nodes for name, nodes in services.items() if not name.endswith(_ROSPY_SERVICES)}
-        types = {str(topic): str(kind) for topic, kind in self._request("getTopicTypes", timeout_s)}
-        names = {
-            name for part in (publishers, subscribers, served) for each in part.values() for name in each
+        nodes_by_service = {
+            name: nodes for name, nodes in services.items() if not name.endswith(_ROSPY_SERVICES)
         }
-        return RosSystemState(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
+        types = {str(topic): str(kind) for topic, kind in self._request("getTopicTypes", timeout_s)}
+        node_names = {
+            name
+            for part in (publishers, subscribers, nodes_by_service)
+            for each in part.values()
+            for name in each
+        }
+        return RosSystemState(
+            publishers, subscribers, nodes_by_service, types, self._uris(sorted(node_names), timeout_s)
+        )
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server, without the logger services of rospy."""

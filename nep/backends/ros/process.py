@@ -82,11 +82,11 @@ class RosProcess:
         self._types: dict[str, tuple[str, int]] = {}
         self._classes: dict[str, type] = {}
         self._seqs: Counter[str] = Counter()
-        self.subscribed: Counter[str] = Counter()
+        self.subscriber_counts: Counter[str] = Counter()
         """Number of nep subscribers in this process, by topic."""
-        self._published: dict[str, dict[int, Any]] = {}
+        self._publishers_by_topic: dict[str, dict[int, Any]] = {}
         self.handshakes = HandshakeLimiter()
-        self.at_shutdown: set[Callable[[], None]] = set()
+        self.shutdown_callbacks: set[Callable[[], None]] = set()
         """Functions called when rospy is shut down before the program ends."""
         self._ended = threading.Event()
         rospy.on_shutdown(self._on_rospy_shutdown)
@@ -113,7 +113,7 @@ class RosProcess:
         if not self._ended.is_set():
             self._ended.set()
             _logger.warning("%s", RosShutdownError())
-            for callback in list(self.at_shutdown):
+            for callback in list(self.shutdown_callbacks):
                 callback()
 
     def _monitor_master(self) -> None:
@@ -139,14 +139,14 @@ class RosProcess:
 
     # ---- publishers
 
-    def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy is not typed
+    def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue_length: int) -> Any:  # noqa: ANN401 - rospy is not typed
         """Create a publisher of rospy and return it.
 
         Args:
             topic: Full name of the topic.
             definition: Message type.
             is_latched: True to latch the newest message.
-            queue: Queue length per connection in messages.
+            queue_length: Queue length per connection in messages.
 
         Raises:
             NepError: The process already publishes another type on the topic.
@@ -160,13 +160,12 @@ class RosProcess:
                 raise NepError(
                     _(
                         "this program publishes '{known}' on '{topic}', and ROS allows only one type per "
-                        "topic "
-                        "in a program; publish '{name}' on another topic"
+                        "topic in a program; publish '{name}' on another topic"
                     ).format(known=topic_type, topic=topic, name=definition.name)
                 )
             publisher = self.rospy.Publisher(
                 topic, self._message_class(definition), subscriber_listener=self, tcp_nodelay=True,
-                latch=is_latched, queue_size=queue,
+                latch=is_latched, queue_size=queue_length,
             )  # fmt: skip
             self._types[topic] = definition.name, users + 1
         return publisher
@@ -174,12 +173,12 @@ class RosProcess:
     def add_publisher(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
         """Register a nep publisher that uses the rospy publisher returned by `advertise`."""
         with self._lock:
-            self._published.setdefault(topic, {})[id_] = publisher
+            self._publishers_by_topic.setdefault(topic, {})[id_] = publisher
 
     def remove_publisher(self, topic: str, id_: int) -> None:
         """Remove a closed publisher that `add_publisher` registered."""
         with self._lock:
-            self._published.get(topic, {}).pop(id_, None)
+            self._publishers_by_topic.get(topic, {}).pop(id_, None)
 
     def local_publisher_id(self, topic: str) -> int | None:
         """Return the id of this process's publisher on a topic; None if there isn't exactly one.
@@ -188,7 +187,7 @@ class RosProcess:
         have several publishers on the topic, or if the program itself also publishes on it.
         """
         with self._lock:
-            publishers = self._published.get(topic, {})
+            publishers = self._publishers_by_topic.get(topic, {})
             if len(publishers) != 1:
                 return None
             ((id_, publisher),) = publishers.items()
@@ -225,7 +224,7 @@ class RosProcess:
                 return unsent_count
             pause.wait(_POLL_S)
 
-    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueLimit) -> int:  # noqa: ANN401
+    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, limit: QueueLimit) -> int:  # noqa: ANN401
         """Publish a message body; return the number of older messages dropped from full queues.
 
         The header gets the next sequence number of its topic, as rospy would assign it.
@@ -235,12 +234,12 @@ class RosProcess:
             definition: Message type.
             topic: Full name of the topic.
             body: Encoded message.
-            room: Limit in bytes for the publisher's queues.
+            limit: Limit in bytes for the publisher's queues.
         """
         message = self._message_class(definition)()
         impl = publisher.impl
         with self._seq_lock:
-            dropped = room.make_room([] if impl is None else impl.connections, len(body))
+            dropped = limit.make_room([] if impl is None else impl.connections, len(body))
             if definition.has_header:
                 self._seqs[topic] += 1
                 body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
@@ -275,12 +274,12 @@ class RosProcess:
 
     # ---- services
 
-    def create_server(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
+    def create_server(self, service: str, service_class: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
         """Create a server of rospy and return it.
 
         Args:
             service: Full name of the service.
-            kind: Service class of rospy.
+            service_class: Service class of rospy.
             handler: Called with each request; returns the response.
 
         Raises:
@@ -291,20 +290,19 @@ class RosProcess:
                 raise NepError(
                     _(
                         "this program already serves '{service}', and ROS allows only one server of a "
-                        "service; "
-                        "close it first"
+                        "service; close it first"
                     ).format(service=service)
                 )
-            return self.rospy.Service(service, kind, handler)
+            return self.rospy.Service(service, service_class, handler)
 
     # ---- connections
 
-    def peer_subscribe(self, *_told: object) -> None:
+    def peer_subscribe(self, *_arguments: object) -> None:
         """Handle a new connection to a publisher. Called by rospy."""
         with self.changed:
             self.changed.notify_all()
 
-    def peer_unsubscribe(self, *_told: object) -> None:
+    def peer_unsubscribe(self, *_arguments: object) -> None:
         """Ignore a disconnected subscriber. Called by rospy."""
 
     def connected_nodes(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy is not typed
@@ -344,15 +342,15 @@ class RosProcess:
         return impl is None or self.name in {each.endpoint_id for each in impl.connections}
 
 
-def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
-    """Run `call` in a thread and wait for its end, up to `timeout_s` seconds but at least 0.2 s.
+def run_with_timeout(function: Callable[[], object], timeout_s: float) -> bool:
+    """Run `function` in a thread and wait for its end, up to `timeout_s` seconds but at least 0.2 s.
 
     Needed because rospy's requests to a master have no timeout.
 
     Returns:
         False on timeout, or if no thread can be started because Python is exiting.
     """
-    thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
+    thread = threading.Thread(target=function, name="nep-ros-unregister", daemon=True)
     try:
         thread.start()
     except RuntimeError:  # Python 3.12 starts no threads at exit; rospy itself unregisters everything then
@@ -364,11 +362,11 @@ def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
 def _has_unsent_data(connection: Any) -> bool:  # noqa: ANN401 - rospy is not typed
     # True unless the connection's thread waits for data: messages it has taken from the queue are visible
     # nowhere else.
-    data = getattr(connection, "_cond_data_available", None)
-    if data is None or connection.done:
+    condition = getattr(connection, "_cond_data_available", None)
+    if condition is None or connection.done:
         return False
-    with data:
-        return bool(connection._queue) or not data._waiters  # noqa: SLF001
+    with condition:
+        return bool(connection._queue) or not condition._waiters  # noqa: SLF001
 
 
 _process: RosProcess | None = None
@@ -406,16 +404,16 @@ def get_process(address: str, name: str, wait_s: float | None) -> RosProcess:
         if not _is_same_address(_process.master.address, address):
             raise NepError(
                 _(
-                    "this program is connected to the ROS master at '{known}', and ROS allows only one per "
-                    "program; use another program for '{address}'"
+                    "this program is connected to the ROS master at '{known}', and ROS allows only one "
+                    "master per program; use another program for '{address}'"
                 ).format(known=_process.master.address, address=address)
             )
         return _process
 
 
-def _is_same_address(one: str, other: str) -> bool:
-    is_local = is_loopback_address(one) and is_loopback_address(other)
-    return one == other or (is_local and one.rpartition(":")[2] == other.rpartition(":")[2])
+def _is_same_address(address: str, other: str) -> bool:
+    is_local = is_loopback_address(address) and is_loopback_address(other)
+    return address == other or (is_local and address.rpartition(":")[2] == other.rpartition(":")[2])
 
 
 def _set_own_address(master: str) -> None:
@@ -439,20 +437,20 @@ def _set_own_address(master: str) -> None:
 
 def _start_process(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy is not typed
     if rospy.core.is_initialized():  # the program has started rospy itself
-        existing = RosProcess(rospy, ros_master_address(rospy.core.rosgraph.get_master_uri()))
-        _defer_shutdown(existing)
-        return existing
+        process = RosProcess(rospy, ros_master_address(rospy.core.rosgraph.get_master_uri()))
+        _defer_shutdown(process)
+        return process
     os.environ["ROS_MASTER_URI"] = f"http://{address}"
     _set_own_address(address)
     node_name = _INVALID_CHARACTERS.sub("_", name).strip("_")
     node_name = node_name if node_name[:1].isalpha() else f"nep_{node_name}"
-    configure = rospy.core.configure_logging
+    configure_logging = rospy.core.configure_logging
     # it would replace the program's log configuration
     rospy.core.configure_logging = lambda *_args, **_keywords: None
     try:
         rospy.init_node(node_name[:100], anonymous=True, disable_signals=True)
     finally:
-        rospy.core.configure_logging = configure
+        rospy.core.configure_logging = configure_logging
     process = RosProcess(rospy, address)
     _defer_shutdown(process)
     for uri in (
@@ -466,9 +464,9 @@ def _start_process(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: 
 
 def _defer_shutdown(process: RosProcess) -> None:
     # rospy's own hook would run before nodes have flushed, and would wait for a hung master.
-    at_exit = getattr(process.rospy.core, "_ros_atexit", None)
-    if at_exit is not None:
-        atexit.unregister(at_exit)
+    exit_handler = getattr(process.rospy.core, "_ros_atexit", None)
+    if exit_handler is not None:
+        atexit.unregister(exit_handler)
 
     pid = os.getpid()
     call_after_nodes(lambda: process.shut_down() if os.getpid() == pid else None)

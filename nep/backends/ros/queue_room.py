@@ -15,7 +15,7 @@ class QueueLimit:
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self._max_bytes = max_bytes
-        self._unmeasured = 0
+        self._unmeasured_bytes = 0
 
     def make_room(self, connections: list[Any], size: int) -> int:
         """Make room for a message in the queues; return the number of dropped messages.
@@ -26,12 +26,12 @@ class QueueLimit:
             connections: rospy's connections of the publisher.
             size: Size of the new message in bytes.
         """
-        self._unmeasured += size
-        is_measured = self._unmeasured >= min(_MEASURE_INTERVAL_BYTES, self._max_bytes)
-        if is_measured:
-            self._unmeasured = 0
-        max_left = self._max_bytes - size if is_measured else None
-        return sum(_drop_oldest(each, max_left) for each in connections)
+        self._unmeasured_bytes += size
+        should_measure = self._unmeasured_bytes >= min(_MEASURE_INTERVAL_BYTES, self._max_bytes)
+        if should_measure:
+            self._unmeasured_bytes = 0
+        max_queued_bytes = self._max_bytes - size if should_measure else None
+        return sum(_drop_oldest(each, max_queued_bytes) for each in connections)
 
 
 def _drop_oldest(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401 - rospy is not typed
@@ -40,7 +40,7 @@ def _drop_oldest(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401
     if not queue_size:
         return 0
     with connection._lock:  # noqa: SLF001 - rospy has no API for it
-        queue: list[bytes] = connection._queue  # noqa: SLF001 - its thread removes all of it at once
+        queue: list[bytes] = connection._queue  # noqa: SLF001 - the connection's thread empties it at once
         drop_count = max(0, len(queue) - queue_size + 1)
         if max_bytes is not None and len(queue) > drop_count:
             total_bytes = sum(map(len, queue)) - sum(map(len, queue[:drop_count]))

@@ -23,7 +23,7 @@ from nep.protocol.service_wire import CallKind, error_reply
 _logger = logging.getLogger("nep")
 _REQUEST_TIMEOUT_S = 0.5
 _RETRY_S = 0.1
-_CONNECTED_TIMEOUT_S = 0.2
+_LOOKUP_TIMEOUT_S = 0.2
 
 OutcomeCallback = Callable[[Outcome], None]
 
@@ -45,12 +45,12 @@ class _Call:
 class RosClient(ClientCalls[_Call]):
     """Client with its calls in flight."""
 
-    def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
+    def __init__(self, process: RosProcess, spec: ClientSpec, on_close: Callable[[RosClient], None]) -> None:
         super().__init__(spec)
         self.process = process
         self.service = process.resolve_name(spec.service)
-        self._on_close = forget
-        self._waiting: list[_Call] = []
+        self._on_close = on_close
+        self._waiting_calls: list[_Call] = []
         self._is_discovering = False
         self._closed = threading.Event()
         self._threads: set[threading.Thread] = set()
@@ -58,9 +58,7 @@ class RosClient(ClientCalls[_Call]):
     @property
     def is_connected(self) -> bool:
         """True if the master lists a server."""
-        return not self.is_closed and bool(
-            self.process.master.service_uri(self.service, _CONNECTED_TIMEOUT_S)
-        )
+        return not self.is_closed and bool(self.process.master.service_uri(self.service, _LOOKUP_TIMEOUT_S))
 
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
@@ -81,7 +79,7 @@ class RosClient(ClientCalls[_Call]):
 
     def _queue_for_discovery_locked(self, call: _Call) -> None:
         # Call with the lock held.
-        self._waiting.append(call)
+        self._waiting_calls.append(call)
         if not self._is_discovering:
             self._is_discovering = True
             self._start_thread_locked(self._discover)
@@ -99,23 +97,23 @@ class RosClient(ClientCalls[_Call]):
             uri = self.process.master.service_uri(self.service, _REQUEST_TIMEOUT_S)
             now = time.monotonic()
             with self._lock:
-                waiting = [each for each in self._waiting if each.number in self._calls]
-                late = [] if uri else [each for each in waiting if each.deadline <= now]
-                ready = waiting if uri else []
-                self._waiting = [] if uri else [each for each in waiting if each.deadline > now]
-                for call in ready[1:]:
+                waiting_calls = [each for each in self._waiting_calls if each.number in self._calls]
+                expired_calls = [] if uri else [each for each in waiting_calls if each.deadline <= now]
+                ready_calls = waiting_calls if uri else []
+                self._waiting_calls = [] if uri else [each for each in waiting_calls if each.deadline > now]
+                for call in ready_calls[1:]:
                     self._start_thread_locked(self._run, call, uri)
-                is_done = not self._waiting or self.is_closed
+                is_done = not self._waiting_calls or self.is_closed
                 if is_done:
                     self._is_discovering = False
-                due = min((each.deadline for each in self._waiting), default=math.inf)
-            for call in late:
+                next_deadline = min((each.deadline for each in self._waiting_calls), default=math.inf)
+            for call in expired_calls:
                 self._finish(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
-            if ready:
-                self._run(ready[0], uri)
+            if ready_calls:
+                self._run(ready_calls[0], uri)
             if is_done:
                 return
-            self._closed.wait(max(0.0, min(_RETRY_S, due - time.monotonic())))
+            self._closed.wait(max(0.0, min(_RETRY_S, next_deadline - time.monotonic())))
 
     # ---- calling, in one thread per call
 
@@ -151,37 +149,37 @@ class RosClient(ClientCalls[_Call]):
     def _finish(self, call: _Call, outcome: Outcome) -> None:
         is_answered = not isinstance(outcome, NepError)
         with self._lock:
-            is_waited_for = self._remove_locked(call)
-            self._answered += is_waited_for and is_answered
-            self._failed += is_waited_for and not is_answered
-        if is_waited_for:
+            is_pending = self._remove_locked(call)
+            self._answered += is_pending and is_answered
+            self._failed += is_pending and not is_answered
+        if is_pending:
             self._run_callback(call, outcome)
 
     def _call_server(self, call: _Call, connection: ServiceConnection) -> Outcome:
-        kind = self._type_of(connection)
+        service_type = self._type_of(connection)
         with self._lock:
             if call.number not in self._calls:
-                return self._closed_error()  # discarded
+                return self._closed_error()  # cancelled or closed
             call.connection = connection
         try:
-            is_carried_out, response = connection.call(
-                kind.encode_call(self.spec.codec, call.data, call.timeout_s)
+            has_succeeded, response = connection.call(
+                service_type.encode_call(self.spec.codec, call.data, call.timeout_s)
             )
         except TimeoutError:
             return ServiceTimeoutError(self.spec.service, call.timeout_s or 0.0)
         except OSError:
             return ServerGoneError(self.spec.service)
-        if is_carried_out:
-            return kind.decode_reply(response, self.spec.codec)
-        if kind is NEP_CALL:  # servers of this type report errors differently
+        if has_succeeded:
+            return service_type.decode_reply(response, self.spec.codec)
+        if service_type is NEP_CALL:  # servers of this type report errors differently
             return ServerGoneError(self.spec.service)
         return error_reply(CallKind.ERROR, "ServiceException", response.decode("utf-8", "replace"))
 
     def _type_of(self, connection: ServiceConnection) -> ServiceType:
-        kind = installed_service(connection.header["type"])
-        if connection.header.get("md5sum", "*") not in {"*", kind.md5sum}:
-            raise version_error(kind.name)
-        return kind
+        service_type = installed_service(connection.header["type"])
+        if connection.header.get("md5sum", "*") not in {"*", service_type.md5sum}:
+            raise version_error(service_type.name)
+        return service_type
 
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""

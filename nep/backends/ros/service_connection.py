@@ -38,12 +38,12 @@ class HandshakeLimiter:
         self._counts: Counter[str] = Counter()
 
     @contextlib.contextmanager
-    def acquire(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
+    def acquire(self, uri: str, is_cancelled: Callable[[], bool], deadline: float) -> Iterator[None]:
         """Wait until a handshake with a server may start, and count it within the context.
 
         Args:
             uri: Address of the server.
-            is_over: Returns True if the call has been cancelled.
+            is_cancelled: Returns True if the call is no longer in flight.
             deadline: Time (`time.monotonic`) at which to stop waiting.
 
         Raises:
@@ -55,7 +55,7 @@ class HandshakeLimiter:
                 remaining_s = deadline - time.monotonic()
                 if remaining_s <= 0.0:
                     raise TimeoutError
-                if is_over():
+                if is_cancelled():
                     raise ServiceConnectionError(_("the call was cancelled or timed out"))
                 self._changed.wait(min(_CHECK_INTERVAL_S, remaining_s))
             self._counts[uri] += 1
@@ -70,7 +70,7 @@ class HandshakeLimiter:
 
 
 class ServiceConnection:
-    """Connection to a ROS service, which is opened by the constructor within 5 seconds.
+    """Connection to a ROS service. The constructor opens it within 5 seconds.
 
     The constructor and `call` raise `TimeoutError` at the deadline, and `OSError` if the connection fails.
 
@@ -103,8 +103,8 @@ class ServiceConnection:
         return self._deadline - time.monotonic()
 
     def _handshake(self, fields: dict[str, str]) -> dict[str, str]:
-        packed = [f"{key}={value}".encode() for key, value in fields.items()]
-        self._send(b"".join(_LENGTH.pack(len(each)) + each for each in packed))
+        encoded_fields = [f"{key}={value}".encode() for key, value in fields.items()]
+        self._send(b"".join(_LENGTH.pack(len(each)) + each for each in encoded_fields))
         data = self._receive_sized(_MAX_HEADER_BYTES)
         header: dict[str, str] = {}
         offset = 0
@@ -122,16 +122,16 @@ class ServiceConnection:
     def call(self, body: bytes) -> tuple[bool, bytes]:
         """Send a request; return (True, response) or (False, error message)."""
         self._send(body)
-        is_carried_out = self._receive_exactly(1) != b"\0"
-        return is_carried_out, self._receive_sized(MAX_PAYLOAD_BYTES + 2**20)
+        has_succeeded = self._receive_exactly(1) != b"\0"
+        return has_succeeded, self._receive_sized(MAX_PAYLOAD_BYTES + 2**20)
 
     def _send(self, data: bytes) -> None:
         self._set_timeout()
         self._socket.sendall(_LENGTH.pack(len(data)) + data)
 
-    def _receive_sized(self, max_size: int) -> bytes:
+    def _receive_sized(self, max_bytes: int) -> bytes:
         (size,) = _LENGTH.unpack(self._receive_exactly(4))
-        if size > max_size:
+        if size > max_bytes:
             raise ServiceConnectionError(_("the message is too large"))
         return self._receive_exactly(size)
 

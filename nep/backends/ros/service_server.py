@@ -25,7 +25,7 @@ from nep.protocol.service_wire import CallKind, Reply, error_reply, read_error_r
 
 
 class _PendingReply:
-    # Thread of rospy that waits for the reply to its call.
+    # Reply for which a thread of rospy waits.
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -49,19 +49,19 @@ class _PendingReply:
 class RosServer:
     """Server with a call queue."""
 
-    def __init__(self, process: RosProcess, spec: ServerSpec, forget: Callable[[RosServer], None]) -> None:
+    def __init__(self, process: RosProcess, spec: ServerSpec, on_close: Callable[[RosServer], None]) -> None:
         self.spec = spec
         self.process = process
         self.service = process.resolve_name(spec.service)
         self.calls = CallQueue()
         self.stats = ServerStats()
         self.is_closed = False
-        self._forget = forget
+        self._on_close = on_close
         self._type = service_type_for(spec.msg_type)
         self._changed = threading.Condition(threading.Lock())
         self._pending_replies: set[_PendingReply] = set()
-        self._unregistering: threading.Thread | None = None
-        process.at_shutdown.add(self._on_rospy_shutdown)
+        self._unregister_thread: threading.Thread | None = None
+        process.shutdown_callbacks.add(self._on_rospy_shutdown)
         self._response = _message_class(process.rospy, f"{self._type.name}Response", self._type)
         self._rospy_service: Any = process.create_server(self.service, _service_class(process.rospy,
         self._type,
@@ -121,18 +121,18 @@ class RosServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics shown in the graph."""
-        tally = self.stats
-        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+        stats = self.stats
+        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 
     def begin_close(self) -> None:
         """Unregister the server and reject its queued calls."""
         with self._changed:
-            if self._unregistering is not None:
+            if self._unregister_thread is not None:
                 return
             thread = threading.Thread(target=self._unregister, name="nep-ros-unregister", daemon=True)
             with contextlib.suppress(RuntimeError):  # see `process.run_with_timeout`
                 thread.start()
-                self._unregistering = thread
+                self._unregister_thread = thread
         for call in self.calls.close():
             call.reply(rejection_reply(self.spec.service, is_closed=True))
 
@@ -150,15 +150,15 @@ class RosServer:
         """Close the server; pending replies are sent for up to `timeout_s` seconds."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
-        if self._unregistering is not None:
-            self._unregistering.join(max(0.0, timeout_s))
+        if self._unregister_thread is not None:
+            self._unregister_thread.join(max(0.0, timeout_s))
         with self._changed:
             self._changed.wait_for(lambda: not self._pending_replies, max(0.0, deadline - time.monotonic()))
             self.is_closed = True
             for pending_reply in self._pending_replies:
                 pending_reply.set_result(None, _("the server is closing"))
-        self.process.at_shutdown.discard(self._on_rospy_shutdown)
-        self._forget(self)
+        self.process.shutdown_callbacks.discard(self._on_rospy_shutdown)
+        self._on_close(self)
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process."""

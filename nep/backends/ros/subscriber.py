@@ -47,19 +47,19 @@ class RospyOwner(Protocol):
 @dataclass
 class _Source:
     # Publisher, as described by its connection. `seq` is that of its newest header. `publisher` is its id;
-    # None with `is_own` for a publisher of this process.
+    # None if unknown, and for a publisher of this process (`is_local`).
     unpacker: Unpacker | None
     kind: MessageKind | None
     problem: str = ""
     seq: int = 0
-    last: object = None
+    last_message: object = None
     publisher: int | None = None
     is_local: bool = False
 
 
 def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
-    # An AnyMsg has the bytes; others are serialized again, if the program itself subscribed to the topic
-    # before.
+    # An AnyMsg contains the bytes. If the program itself has subscribed to the topic before, rospy passes
+    # decoded messages instead, which are serialized again.
     data = getattr(message, "_buff", None)
     if isinstance(data, bytes):
         return data
@@ -92,8 +92,8 @@ class RospySubscriber(WakingSubscriber):
     def subscribe(self) -> None:
         """Subscribe at the ROS master."""
         with self._owner.changed:
-            self.process.subscribed[self.topic] += 1
-        self.process.at_shutdown.add(self._on_rospy_shutdown)
+            self.process.subscriber_counts[self.topic] += 1
+        self.process.shutdown_callbacks.add(self._on_rospy_shutdown)
         self._subscriber = self.process.rospy.Subscriber(
             self.topic, self.process.rospy.AnyMsg, self._receive, buff_size=_BUFFER_BYTES, tcp_nodelay=True
         )
@@ -117,9 +117,9 @@ class RospySubscriber(WakingSubscriber):
             if self.is_closed:
                 return
             source = self._source_of(header)
-            if source.last is raw:
+            if source.last_message is raw:
                 return  # latched: rospy may deliver a connection's last message twice
-            source.last = raw if header.get("latching") == "1" else None
+            source.last_message = raw if header.get("latching") == "1" else None
             try:
                 message = self._read(source, body)
             except (WireError, struct.error) as error:
@@ -221,10 +221,10 @@ class RospySubscriber(WakingSubscriber):
         self._owner.wait((self,), timeout_s)
         return self.poll()
 
-    def take_batch(self, most_bytes: int) -> list[Message]:
-        """Remove and return up to `most_bytes` of messages for one call of the sink."""
+    def take_batch(self, max_bytes: int) -> list[Message]:
+        """Remove and return up to `max_bytes` of messages for one call of the sink."""
         with self._owner.changed:
-            return self.inbox.pop_all(most_bytes)
+            return self.inbox.pop_all(max_bytes)
 
     def report(self, problem: str) -> None:
         """Set the reason why messages can't be decoded, shown in the graph of this process."""
@@ -242,8 +242,8 @@ class RospySubscriber(WakingSubscriber):
             self.is_closed = True
             self.inbox.pop_all()
             self.notify_waiting()
-            self.process.subscribed[self.topic] -= 1
-        self.process.at_shutdown.discard(self._on_rospy_shutdown)
+            self.process.subscriber_counts[self.topic] -= 1
+        self.process.shutdown_callbacks.discard(self._on_rospy_shutdown)
         self._owner.discard(self)
         if self._subscriber is not None:
             self.process.unsubscribe(self._subscriber, timeout_s)

@@ -64,11 +64,11 @@ class RospyPublisher:
         self.topic = process.resolve_name(spec.topic)
         self._lock = threading.RLock()
         self._is_closed = False
-        self._room = QueueLimit()
+        self._queue_limit = QueueLimit()
         self._drops = RejectionCounter()
-        queue = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
+        queue_length = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
         self._publisher: Any = process.advertise(
-            self.topic, self._definition, is_latched=spec.is_latched, queue=queue
+            self.topic, self._definition, is_latched=spec.is_latched, queue_length=queue_length
         )
         process.add_publisher(self.topic, spec.id, self._publisher)
 
@@ -81,7 +81,9 @@ class RospyPublisher:
     def subscribers(self) -> int:
         """Number of subscribers: one per connected ROS node, and each subscriber of this process."""
         connected_nodes = () if self._is_closed else self.process.connected_nodes(self._publisher)
-        own_count = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
+        own_count = 0
+        if self.process.name in connected_nodes:
+            own_count = max(1, self.process.subscriber_counts[self.topic])
         return sum(each != self.process.name for each in connected_nodes) + own_count
 
     @property
@@ -98,11 +100,11 @@ class RospyPublisher:
     def missing(self) -> tuple[str, ...]:
         """Names of nodes whose subscribers are registered but not connected."""
         try:
-            registered = self.process.master.names(self.topic, HANDSHAKE_TIMEOUT_S)[1]
+            registered_names = self.process.master.names(self.topic, HANDSHAKE_TIMEOUT_S)[1]
         except RosMasterUnreachable:
             return ()
         connected_nodes = self.process.connected_nodes(self._publisher)
-        return tuple(each.lstrip("/") for each in registered if each not in connected_nodes)
+        return tuple(each.lstrip("/") for each in registered_names if each not in connected_nodes)
 
     def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because rospy has no shared memory."""
@@ -132,7 +134,9 @@ class RospyPublisher:
             self.count += 1
             self.bytes += len(body)
             self.last_stamp_ns = time.time_ns()
-            dropped = self.process.send(self._publisher, self._definition, self.topic, body, self._room)
+            dropped = self.process.send(
+                self._publisher, self._definition, self.topic, body, self._queue_limit
+            )
             if dropped:
                 self._report_drops(dropped)
 
@@ -172,7 +176,7 @@ class RospyTransport:
         get_rospy()
         self.node = node
         self.changed = threading.Condition()
-        self._wakes = 0
+        self._wake_count = 0
         self._publishers: tuple[RospyPublisher, ...] = ()
         self._subscribers: tuple[RospySubscriber, ...] = ()
         self._servers: tuple[RosServer, ...] = ()
@@ -200,8 +204,8 @@ class RospyTransport:
     def create_subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
         """Create a subscriber; wait up to `HANDSHAKE_TIMEOUT_S` for registered publishers to connect."""
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
-        batch = 0 if spec.sink is None else _BATCH_BYTES
-        subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
+        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
+        subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch_bytes)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
         try:
@@ -266,13 +270,13 @@ class RospyTransport:
         Raises `RosShutdownError` if the node has servers and rospy was shut down.
         """
         own_subscribers = [each for each in subscribers if isinstance(each, RospySubscriber)]
-        before = self._wakes
+        before = self._wake_count
         with wake_on_call(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
                 self.changed.wait_for(
-                    lambda: self._wakes != before or any(len(each.inbox) for each in own_subscribers),
+                    lambda: self._wake_count != before or any(len(each.inbox) for each in own_subscribers),
                     timeout_s,
                 )
         if any(each.process.is_shut_down for each in self._servers):
@@ -281,7 +285,7 @@ class RospyTransport:
     def wake(self) -> None:
         """End all waits in progress."""
         with self.changed:
-            self._wakes += 1
+            self._wake_count += 1
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
@@ -299,26 +303,26 @@ class RospyTransport:
 
     def local_node(self, address: str) -> LocalRosNode:
         """Return this node's publishers, subscribers and services at the ROS master at `address`."""
-        outs: list[RospyPublisher] = [
+        publishers: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
         ]
-        ins: list[RospySubscriber] = [
+        subscribers: list[RospySubscriber] = [
             each for each in self._subscribers if each.process.master.address == address
         ]
         servers = [each for each in self._servers if each.process.master.address == address]
         clients = [each for each in self._clients if each.process.master.address == address]
-        names = [each.process.name for part in (outs, ins, servers, clients) for each in part]
+        names = [each.process.name for part in (publishers, subscribers, servers, clients) for each in part]
         return LocalRosNode(
             self.node,
             names[0] if names else "",
-            tuple((o.topic, o.ros_type, o.spec.is_latched, o.counts()) for o in outs),
+            tuple((each.topic, each.ros_type, each.spec.is_latched, each.counts()) for each in publishers),
             tuple(
                 (
-                    i.topic,
-                    ros_type_of(i.spec.msg_type),
-                    SubscriberCount(i.spec.id, i.received, i.lost, i.problem),
+                    each.topic,
+                    ros_type_of(each.spec.msg_type),
+                    SubscriberCount(each.spec.id, each.received, each.lost, each.problem),
                 )
-                for i in ins
+                for each in subscribers
             ),
             tuple((each.service, each.counts()) for each in servers),
             tuple((each.service, each.counts()) for each in clients),

@@ -96,7 +96,7 @@ def not_installed_error(name: str, kind: str) -> NepError:
 
     Args:
         name: Name of the type.
-        kind: Kind of the type, for the error message, such as "message type".
+        kind: Kind of the type, for the error message, such as "ROS message".
     """
     display_name = escaped(shortened(name, 100))
     return NepError(
@@ -152,11 +152,11 @@ def _with_stamp(payload: object) -> object:
 
 
 def _image_codec(definition: Definition) -> Codec:
-    maps = ros_codec(definition)
+    map_codec = ros_codec(definition)
 
     def encode(payload: object) -> Encoded:
         if isinstance(payload, Mapping):
-            return maps.encode(payload)
+            return map_codec.encode(payload)
         return raw_image(payload) if definition.name == _RAW_IMAGE_TYPE else _encode_file(payload)
 
     def check(payload: object) -> None:
@@ -290,8 +290,8 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
             True,
         )
     if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[codec.name]:
-        read = _unpack_string if ros_type == _STRING_TYPE else _unpack_array
-        return Unpacker(codec, msg_type, read, has_header=False)
+        unpack = _unpack_string if ros_type == _STRING_TYPE else _unpack_array
+        return Unpacker(codec, msg_type, unpack, has_header=False)
     if not is_ros_type(msg_type) and codec is not CODECS["json"]:
         raise _type_mismatch_error(msg_type, ros_type)
     definition = parse(ros_type, text) if text else _matching_definition(ros_type, md5sum)
@@ -320,7 +320,7 @@ def _type_mismatch_error(msg_type: str, ros_type: str) -> NepError:
     return NepError(
         _(
             "the publisher sends '{ros_type}', which a subscriber of '{msg_type}' can't read; "
-            "subscribe with that type"
+            "subscribe with the publisher's type"
         ).format(ros_type=ros_type, msg_type=msg_type)
     )
 
@@ -372,7 +372,7 @@ def _unpack_raw_image(body: memoryview) -> UnpackedData:
     _frame, offset = _read_sized(body, STAMP.size)
     height, width = struct.unpack_from("<II", body, offset)
     name, offset = _read_sized(body, offset + 8)
-    is_big, step = struct.unpack_from("<BI", body, offset)
+    is_big_endian, step = struct.unpack_from("<BI", body, offset)
     pixels = _read_all(body, offset + 5)
     encoding = str(name, "utf-8", "replace")
     encoding = f"{encoding}C1" if encoding in {"8U", "16U", "32F"} else encoding
@@ -383,18 +383,19 @@ def _unpack_raw_image(body: memoryview) -> UnpackedData:
                 "the encoding '{name}' isn't supported; use an encoding such as 'bgr8', 'mono8' or '16UC1'"
             ).format(name=encoding)
         )
-    size = int(layout.dtype[-1])
-    row = width * layout.channels * size
-    if step < row or step * height != len(pixels):
+    item_bytes = int(layout.dtype[-1])
+    row_bytes = width * layout.channels * item_bytes
+    if step < row_bytes or step * height != len(pixels):
         raise WireError(
             _("{width} x {height} pixels of '{name}' don't match {size} bytes").format(
                 width=width, height=height, name=encoding, size=len(pixels)
             )
         )
-    if step != row:
-        pixels = memoryview(b"".join(pixels[offset : offset + row] for offset in range(0, len(pixels), step)))
-    if is_big and size > 1:
-        pixels = _swap_bytes(pixels, size)
+    if step != row_bytes:
+        rows = (pixels[offset : offset + row_bytes] for offset in range(0, len(pixels), step))
+        pixels = memoryview(b"".join(rows))
+    if is_big_endian and item_bytes > 1:
+        pixels = _swap_bytes(pixels, item_bytes)
     return pixels, {"shape": [height, width, layout.channels], "encoding": encoding}
 
 

@@ -85,12 +85,13 @@ def _configured_range(environment: Mapping[str, str]) -> str:
 
 def _discovery_range(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
     # Returns the discovery range. Raises `NepError`.
-    local, configured = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _configured_range(environment)
-    if configured == "OFF":
+    local = environment.get("ROS_LOCALHOST_ONLY", "").strip()
+    configured_range = _configured_range(environment)
+    if configured_range == "OFF":
         return "nobody"
     if local == "1":
         return "computer"
-    if local == "0" or configured in _SUBNET_RANGES:
+    if local == "0" or configured_range in _SUBNET_RANGES:
         return "subnet"
     return "peers" if _peers(environment) else "computer"
 
@@ -100,7 +101,7 @@ def _peers(environment: Mapping[str, str]) -> list[str]:
 
 
 def is_loopback_only(environment: Mapping[str, str]) -> bool:
-    """Return True, the default, if only programs of this computer are discovered."""
+    """Return True if only programs of this computer are discovered, which is the default."""
     return _discovery_range(environment) in {"nobody", "computer"}
 
 
@@ -116,11 +117,11 @@ def cyclonedds_config(environment: Mapping[str, str]) -> str | None:
         "subnet": _peers(environment),
     }[discovery_range]
     interface = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
-    is_cast = discovery_range in {"computer", "subnet"}
+    has_multicast = discovery_range in {"computer", "subnet"}
     peer_elements = "".join(f'<Peer Address="{escape(each)}"/>' for each in peers)
     return (
         f'<CycloneDDS><Domain Id="any"><General>{interface if is_loopback_only(environment) else ""}'
-        f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_PACKET_SIZES}</General>"
+        f"<AllowMulticast>{'default' if has_multicast else 'false'}</AllowMulticast>{_PACKET_SIZES}</General>"
         f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if discovery_range == 'nobody' else ''}"
         f"<ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{_MAX_PARTICIPANT_INDEX}</MaxAutoParticipantIndex>"

@@ -84,22 +84,22 @@ def convert_definition(
     return converted, tuple(_field(name, each) for name, each in converted)
 
 
-def _replace_char(described: Any) -> Any:  # noqa: ANN401 - nested pairs
-    kind, rest = described
+def _replace_char(description: Any) -> Any:  # noqa: ANN401 - nested pairs
+    kind, details = description
     if kind == _BASE:
-        return (kind, ("uint8", 0)) if rest[0] == "char" else described
-    return described if kind == _NAME else (kind, (_replace_char(rest[0]), rest[1]))
+        return (kind, ("uint8", 0)) if details[0] == "char" else description
+    return description if kind == _NAME else (kind, (_replace_char(details[0]), details[1]))
 
 
-def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pairs
-    kind, rest = described
+def _field(name: str, description: Any) -> RosField:  # noqa: ANN401 - nested pairs
+    kind, details = description
     if kind == _NAME:
-        return RosField(name, rest, is_message=True)
+        return RosField(name, details, is_message=True)
     if kind == _BASE:
-        return RosField(name, rest[0], is_message=False, max_text_bytes=rest[1])
-    item = _field(name, rest[0])
-    length = rest[1] if kind == _ARRAY else -1
-    return RosField(name, item.kind, item.is_message, length, rest[1], item.max_text_bytes)
+        return RosField(name, details[0], is_message=False, max_text_bytes=details[1])
+    item = _field(name, details[0])
+    length = details[1] if kind == _ARRAY else -1
+    return RosField(name, item.kind, item.is_message, length, details[1], item.max_text_bytes)
 
 
 # ---- maps to messages
@@ -204,10 +204,10 @@ def _convert_float(field: RosField, value: object, path: str) -> float:
         number = float(value)
     except OverflowError:
         number = math.nan
-        is_fitting = False
+        is_in_range = False
     else:
-        is_fitting = field.kind != "float32" or math.isinf(number) or not abs(number) >= _FLOAT32_OVERFLOW
-    if not is_fitting:
+        is_in_range = field.kind != "float32" or math.isinf(number) or not abs(number) >= _FLOAT32_OVERFLOW
+    if not is_in_range:
         raise RosFieldError(path, _("is too large for '{kind}'").format(kind=field.kind))
     return number
 
@@ -243,10 +243,10 @@ def _convert_items(types: TypeRegistry, field: RosField, value: object, path: st
             ),
         )
     if field.is_message or field.kind == "string":
-        single = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
+        item_field = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
         items: Any = [
-            _convert_value(types, single, each, f"{path}[{number}]")
-            for number, each in enumerate(list(value))  # type: ignore[call-overload]
+            _convert_value(types, item_field, each, f"{path}[{index}]")
+            for index, each in enumerate(list(value))  # type: ignore[call-overload]
         ]
     else:
         items = _convert_array(field, value, path)
@@ -275,8 +275,8 @@ def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN4
         array = np.empty((), object)
     if array.ndim == 1 and (not array.size or _is_convertible(array, field, dtype)):
         return np.ascontiguousarray(array.astype(dtype))
-    single = RosField(field.name, "uint8" if field.kind in _OCTET_TYPES else field.kind, is_message=False)
-    items = [_convert_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
+    item_field = RosField(field.name, "uint8" if field.kind in _OCTET_TYPES else field.kind, is_message=False)
+    items = [_convert_scalar(item_field, each, f"{path}[{index}]") for index, each in enumerate(list(value))]
     return np.array(items, dtype)
 
 

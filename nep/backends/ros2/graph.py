@@ -65,8 +65,8 @@ class _NameCache:
 
     def id(self, endpoint: DdsEndpoint) -> int:
         # Returns the announced id, unless another endpoint announces the same one.
-        announced_ids = endpoint_id(endpoint.gid, endpoint.user_data.get("nepid"))
-        unique_id = endpoint_id(endpoint.gid, None) if announced_ids in self.ids else announced_ids
+        announced_id = endpoint_id(endpoint.gid, endpoint.user_data.get("nepid"))
+        unique_id = endpoint_id(endpoint.gid, None) if announced_id in self.ids else announced_id
         self.ids.add(unique_id)
         return unique_id
 
@@ -74,28 +74,28 @@ class _NameCache:
 def current_graph(participant: Participant) -> GraphView:
     """Return the current graph of the participant's domain."""
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _NameCache()
-    for local in participant.local_nodes:
-        _add_local(graph, local, names)
+    for local_node in participant.local_nodes:
+        _add_local(graph, local_node, names)
     endpoints = [
         (kind, each)
         for kind in ("writer", "reader")
         for each in participant.endpoints(kind)
         if ros_topic(each.topic) is not None or ros_service(each.topic) is not None
     ]
-    parties: dict[str, dict[str, list[NodeEndpoint]]] = {}
+    endpoints_by_topic: dict[str, dict[str, list[NodeEndpoint]]] = {}
     local_names = participant.local_node_names()
     for kind, each in endpoints:
         if each.gid in local_names and ros_service(each.topic) is None:
-            _add_endpoint(parties, names, NodeEndpoint(local_names[each.gid], each), kind)
+            _add_endpoint(endpoints_by_topic, names, NodeEndpoint(local_names[each.gid], each), kind)
     for node, kind, endpoint in islice(
         _remote_endpoints(participant, endpoints, names), _MAX_REMOTE_ENDPOINTS
     ):
         _add_remote(graph, node, kind, endpoint, names)
         if endpoint is not None and ros_service(endpoint.topic) is None:
-            _add_endpoint(parties, names, NodeEndpoint(node.name, endpoint), kind)
+            _add_endpoint(endpoints_by_topic, names, NodeEndpoint(node.name, endpoint), kind)
     alerts = (
         alert
-        for topic, each in sorted(parties.items())
+        for topic, each in sorted(endpoints_by_topic.items())
         for alert in mismatches(topic, each["writer"], each["reader"])
     )
     graph.apply(ReportAlerts("ros2", tuple(alerts)), 0, 0.0, "")
@@ -103,15 +103,18 @@ def current_graph(participant: Participant) -> GraphView:
 
 
 def _add_endpoint(
-    parties: dict[str, dict[str, list[NodeEndpoint]]], names: _NameCache, party: NodeEndpoint, kind: str
+    endpoints_by_topic: dict[str, dict[str, list[NodeEndpoint]]],
+    names: _NameCache,
+    node_endpoint: NodeEndpoint,
+    kind: str,
 ) -> None:
-    topic = names.topic(party.endpoint)
-    parties.setdefault(topic, {"writer": [], "reader": []})[kind].append(party)
+    topic = names.topic(node_endpoint.endpoint)
+    endpoints_by_topic.setdefault(topic, {"writer": [], "reader": []})[kind].append(node_endpoint)
 
 
-def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
-    publishers, subscribers = local.publishers, local.subscribers
-    servers, clients = local.servers, local.clients
+def _add_local(graph: Graph, local_node: LocalNode, names: _NameCache) -> None:
+    publishers, subscribers = local_node.publishers, local_node.subscribers
+    servers, clients = local_node.servers, local_node.clients
     specs: list[PublisherSpec | SubscriberSpec] = [each.spec for each in publishers]
     specs += [each.spec for each in subscribers]
     for spec in specs:
@@ -124,7 +127,7 @@ def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
     for service_spec in service_specs:
         names.topics.setdefault(dds_service(service_spec.service)[0], topic_of(service_spec.service))
         names.ids.add(service_spec.id)
-    node = local.node
+    node = local_node.node
     graph.apply(Join(node), 0, 0.0, node.id)
     for record in (*(each.record for each in publishers), *(each.record for each in servers)):
         graph.apply(AddPublisher(node, record), 0, 0.0, node.id)
@@ -134,16 +137,17 @@ def _add_local(graph: Graph, local: LocalNode, names: _NameCache) -> None:
         (*(each.counts for each in publishers), *(each.counts for each in servers)),
         (*(each.counts for each in subscribers), *(each.counts for each in clients)),
     )
-    graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
+    graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local_node.load()), 0, 0.0, node.id)
 
 
 def _remote_endpoints(
-    participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _NameCache
+    participant: Participant, discovered: Sequence[tuple[str, DdsEndpoint]], names: _NameCache
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
-    # Yields foreign writers and readers with their node, and None for nodes without any.
+    # Yields (node, kind, endpoint): the nodes of other programs with kind "" and endpoint None, then the
+    # writers and readers of other programs with their nodes.
     own_gid = participant.gid
-    alive = participant.participants() - {own_gid}
-    endpoints = [(kind, endpoint) for kind, endpoint in all_found if endpoint.participant != own_gid]
+    gids = participant.participants() - {own_gid}
+    endpoints = [(kind, endpoint) for kind, endpoint in discovered if endpoint.participant != own_gid]
     for _kind, endpoint in endpoints:
         if endpoint.user_data.get("neptype"):
             names.types.setdefault((endpoint.topic, endpoint.type), endpoint.user_data["neptype"])
@@ -153,7 +157,7 @@ def _remote_endpoints(
         if endpoint.user_data.get("nepnode")
     }
     owners: dict[bytes, NodeRecord] = {}
-    for gid, nodes in sorted(participant.remote_nodes(alive).items()):
+    for gid, nodes in sorted(participant.remote_nodes(gids).items()):
         for number, node in enumerate(nodes):
             node_id = next(
                 (announced_ids[node_gid] for node_gid in sorted(node.gids) if node_gid in announced_ids), ""

@@ -86,15 +86,15 @@ def restrict_to_loopback(domain: int) -> None:
     """
     if not sys.platform.startswith("linux"):
         return
-    first = _FIRST_PORT + _PORTS_PER_DOMAIN * domain
+    first_port = _FIRST_PORT + _PORTS_PER_DOMAIN * domain
     for path in Path(_FD_FOLDER).iterdir():
         try:
             if not path.is_socket():
                 continue
-            with socket.socket(fileno=os.dup(int(path.name))) as copy:
-                host, port = copy.getsockname()[:2]
-                if host == "0.0.0.0" and port in range(first, first + _PORTS_PER_DOMAIN):  # noqa: S104
-                    copy.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
+            with socket.socket(fileno=os.dup(int(path.name))) as duplicate:
+                host, port = duplicate.getsockname()[:2]
+                if host == "0.0.0.0" and port in range(first_port, first_port + _PORTS_PER_DOMAIN):  # noqa: S104
+                    duplicate.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
         except (
             OSError,
             ValueError,

@@ -37,22 +37,22 @@ class Matches:
     def __init__(self, library: Dds, types: MessageTypes, topics: DdsTopics, gid: bytes) -> None:
         self._types = types
         self._gid = gid
-        self._mask = (
+        self._status_masks = (
             library.core.DDSStatus.PublicationMatched,
             library.core.DDSStatus.SubscriptionMatched,
         )
         self._entities: dict[bytes, Any] = {}
         self._remote_matches: dict[bytes, frozenset[bytes]] = {}
-        self._published = b""
+        self._published_data = b""
         self._has_changes = False
-        self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
+        self._confirmed_pairs: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
         self._sample_class = topics.sample_class(_TYPE)
         self._writer = topics.create_state_writer(_TOPIC, _TYPE)
         self.reader = topics.create_state_reader(_TOPIC, _TYPE)
 
     def add(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Add a writer or reader of this program."""
-        entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
+        entity.set_status_mask(self._status_masks[not hasattr(entity, "get_matched_subscriptions")])
         self._entities[entity.guid.bytes] = entity
         self._remote_matches[entity.guid.bytes] = frozenset()
 
@@ -73,12 +73,12 @@ class Matches:
             return
         self._has_changes = False
         pairs = sorted(
-            own_gid + other for own_gid, matched in self._remote_matches.items() for other in matched
+            own_gid + other_gid for own_gid, matched in self._remote_matches.items() for other_gid in matched
         )
         data = b"".join((self._gid, *pairs[:_MAX_PAIRS]))
-        if data != self._published:
+        if data != self._published_data:
             self._writer.write(create_sample(self._sample_class, self._types.encode(_TYPE, {"data": data})))
-            self._published = data
+            self._published_data = data
 
     def _is_local(self, gid: bytes) -> bool:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
@@ -97,24 +97,24 @@ class Matches:
             (pairs[offset : offset + GID_BYTES], pairs[offset + GID_BYTES : offset + 2 * GID_BYTES])
             for offset in range(0, len(pairs), 2 * GID_BYTES)
         )
-        self._confirmed.pop(sender, None)
-        if len(self._confirmed) >= _MAX_PARTICIPANTS:
-            self._confirmed.pop(next(iter(self._confirmed)))
-        self._confirmed[sender] = frozenset(
+        self._confirmed_pairs.pop(sender, None)
+        if len(self._confirmed_pairs) >= _MAX_PARTICIPANTS:
+            self._confirmed_pairs.pop(next(iter(self._confirmed_pairs)))
+        self._confirmed_pairs[sender] = frozenset(
             pair
             for pair in gid_pairs
             if self._is_local(pair[1]) and pair[0][:PREFIX_BYTES] == sender[:PREFIX_BYTES]
         )
 
-    def is_confirmed(self, own_gid: bytes, other: bytes, participant: bytes) -> bool:
+    def is_confirmed(self, own_gid: bytes, other_gid: bytes, participant: bytes) -> bool:
         """Return True if another program has reported a match of its endpoint with one of ours.
 
         Args:
             own_gid: GUID of our endpoint.
-            other: GUID of the other program's endpoint. Endpoints of this program count as confirmed.
+            other_gid: GUID of the other program's endpoint. Endpoints of this program count as confirmed.
             participant: GUID of the other program's participant.
         """
-        return self._is_local(other) or (other, own_gid) in self._confirmed.get(participant, ())
+        return self._is_local(other_gid) or (other_gid, own_gid) in self._confirmed_pairs.get(participant, ())
 
     def unmatched_gids(
         self, entities: Iterable[Any], endpoints: Iterable[tuple[bytes, bytes, bool]]
@@ -129,9 +129,9 @@ class Matches:
         matches = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {
             gid
-            for gid, participant, publishes_matches in endpoints
+            for gid, participant, has_match_reports in endpoints
             if not any(
-                gid in matched and (not publishes_matches or self.is_confirmed(own_gid, gid, participant))
+                gid in matched and (not has_match_reports or self.is_confirmed(own_gid, gid, participant))
                 for own_gid, matched in matches
             )
         }

@@ -73,7 +73,7 @@ class MessageTypes:
         """Length in bytes of a GUID in this release's `ros_discovery_info`."""
         return self._fields[_GID_TYPE][0].size if _GID_TYPE in self._fields else 24
 
-    def checked(self, msg_type: str) -> str:
+    def validate(self, msg_type: str) -> str:
         """Validate a message type and return its full name. Raises `NepError` if the type is unknown."""
         name = type_name(msg_type)
         if name in self._type_errors and name not in self._fields:
@@ -136,9 +136,9 @@ class MessageTypes:
         Raises the same errors as `add`.
         """
         package, _srv, last = name.split("/")
-        alike = f"{package}/msg/{last}"  # lets rosbags resolve the package's own messages
+        message_name = f"{package}/msg/{last}"  # lets rosbags resolve the package's own messages
         try:
-            parsed = self._rosbags.get_types_from_msg(text, alike)[alike]
+            parsed = self._rosbags.get_types_from_msg(text, message_name)[message_name]
         except Exception as error:  # its parser raises its own exception classes
             raise NepError(
                 _("the definition of '{name}' can't be read: {error}").format(name=name, error=error)
@@ -197,11 +197,13 @@ class MessageTypes:
                 )
         with self._lock:
             fields = {name: convert_definition(entries)[1] for name, (_constants, entries) in parsed.items()}
-            while missing := self._missing_type_errors(fields):
-                errors.update(missing)
-                fields = {name: each for name, each in fields.items() if name not in missing}
-            same = {name for name in fields if name in self._fields and self._fields[name] == fields[name]}
-            changed = sorted(name for name in fields if name in self._fields and name not in same)
+            while missing_type_errors := self._missing_type_errors(fields):
+                errors.update(missing_type_errors)
+                fields = {name: each for name, each in fields.items() if name not in missing_type_errors}
+            unchanged = {
+                name for name in fields if name in self._fields and self._fields[name] == fields[name]
+            }
+            changed = sorted(name for name in fields if name in self._fields and name not in unchanged)
             if changed:
                 raise NepError(
                     _(
@@ -209,22 +211,22 @@ class MessageTypes:
                         "the program"
                     ).format(name=changed[0])
                 )
-            self._store.register({name: parsed[name] for name in fields if name not in same})
+            self._store.register({name: parsed[name] for name in fields if name not in unchanged})
             self._read_definitions()
         return errors
 
     def _missing_type_errors(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
-        # Types that use unknown types.
+        # Returns the errors of types that use unknown types.
         wstring_message = _(
             "'{name}' has the field '{field}' of type wstring, which 'ros2' doesn't support; use a string"
         )
-        unknown = _(
+        unknown_message = _(
             "'{name}' has the field '{field}' of type '{kind}', which is unknown or not supported; add "
             "that type, too"
         )
         return {
             name: NepError(
-                (wstring_message if field.kind.endswith(f"/{_WIDE_STRING_TYPE}") else unknown).format(
+                (wstring_message if field.kind.endswith(f"/{_WIDE_STRING_TYPE}") else unknown_message).format(
                     name=name, field=field.name, kind=field.kind
                 )
             )
@@ -236,10 +238,10 @@ class MessageTypes:
 
 def _suggestion(name: str, candidates: tuple[str, ...]) -> str:
     ending = name.rpartition("/")[2].lower()
-    alike = [each for each in candidates if each.rpartition("/")[2].lower() == ending]
+    similar_names = [each for each in candidates if each.rpartition("/")[2].lower() == ending]
     return (
-        did_you_mean(name, tuple(alike) or candidates)
-        if alike or len(candidates) < 10
+        did_you_mean(name, tuple(similar_names) or candidates)
+        if similar_names or len(candidates) < 10
         else _short_suggestion(name, candidates)
     )
 

@@ -38,21 +38,26 @@ def mismatches(
         (lambda writer, reader: reader.is_reliable and not writer.is_reliable, _reliability_alert),
         (lambda writer, reader: reader.is_latched and not writer.is_latched, _durability_alert),
     )
-    for is_wrong, alert in kinds:
+    for is_mismatch, create_alert in kinds:
         pairs = [
-            (one, other) for one in writers for other in readers if is_wrong(one.endpoint, other.endpoint)
+            (writer, reader)
+            for writer in writers
+            for reader in readers
+            if is_mismatch(writer.endpoint, reader.endpoint)
         ]
         if pairs:
-            yield alert(topic, [one for one, _other in pairs], [other for _one, other in pairs])
+            yield create_alert(
+                topic, [writer for writer, _reader in pairs], [reader for _writer, reader in pairs]
+            )
 
 
 def _merge_readers(readers: Iterable[NodeEndpoint]) -> Iterator[NodeEndpoint]:
-    # A subscriber of nep may have two readers; keep the one with the weaker requirements.
+    # A subscriber of nep may have two readers; merges them into one with the weaker requirements.
     merged: dict[str, NodeEndpoint] = {}
     for reader in readers:
         key = reader.endpoint.user_data.get("nepid") or reader.endpoint.gid.hex()
-        other = merged.get(key)
-        is_latched = reader.endpoint.is_latched and (other is None or other.endpoint.is_latched)
+        existing = merged.get(key)
+        is_latched = reader.endpoint.is_latched and (existing is None or existing.endpoint.is_latched)
         merged[key] = replace(reader, endpoint=replace(reader.endpoint, is_latched=is_latched))
     yield from merged.values()
 
@@ -62,23 +67,23 @@ def _have_different_definitions(writer: DdsEndpoint, reader: DdsEndpoint) -> boo
     return writer.type == reader.type and all(hashes) and hashes[0] != hashes[1]
 
 
-def _node_names(parties: Iterable[NodeEndpoint]) -> str:
-    unique_names = sorted({each.node for each in parties})
+def _node_names(endpoints: Iterable[NodeEndpoint]) -> str:
+    unique_names = sorted({each.node for each in endpoints})
     names = ", ".join(f"“{name}”" for name in unique_names[:_MAX_NAMES])
     if len(unique_names) <= _MAX_NAMES:
         return names
     return _("{names} and {count} more").format(names=names, count=len(unique_names) - _MAX_NAMES)
 
 
-def _type_of(parties: Sequence[NodeEndpoint]) -> str:
-    return ros_type(parties[0].endpoint.type)
+def _type_of(endpoints: Sequence[NodeEndpoint]) -> str:
+    return ros_type(endpoints[0].endpoint.type)
 
 
 def _type_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]) -> Alert:
     return Alert(
         f"ros2-type:{topic}",
         _(
-            "{readers} doesn't receive “{topic}” from {writers}: it requests “{wanted}”, but the "
+            "“{topic}” from {writers} doesn't reach {readers}: the subscriber requests “{wanted}”, but the "
             "publisher offers “{sent}”"
         ).format(
             readers=_node_names(readers),
@@ -108,7 +113,7 @@ def _reliability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Seq
     return Alert(
         f"ros2-reliability:{topic}",
         _(
-            "{readers} doesn't receive “{topic}” from {writers}: it requests “reliable”, but the "
+            "“{topic}” from {writers} doesn't reach {readers}: the subscriber requests “reliable”, but the "
             "publisher offers “best effort”"
         ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Subscribe with qos='sensor' or qos='best_effort', or publish with qos='reliable'."),
@@ -119,7 +124,7 @@ def _durability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequ
     return Alert(
         f"ros2-durability:{topic}",
         _(
-            "{readers} doesn't receive “{topic}” from {writers}: it requests earlier messages "
+            "“{topic}” from {writers} doesn't reach {readers}: the subscriber requests earlier messages "
             "(“transient local”), but the publisher doesn't keep them (“volatile”)"
         ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Publish with latched=True, or subscribe with the durability “volatile”."),

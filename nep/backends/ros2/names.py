@@ -124,8 +124,8 @@ def split_node_name(name: str) -> tuple[str, str]:
 
     Characters that ROS 2 doesn't allow are replaced by "_".
     """
-    *spaces, last = [_INVALID_CHARACTERS.sub("_", part) for part in name.split("/") if part] or ["_"]
-    parts = [f"_{part}" if part[:1].isdigit() else part for part in (*spaces, last)]
+    *namespaces, node_name = [_INVALID_CHARACTERS.sub("_", part) for part in name.split("/") if part] or ["_"]
+    parts = [f"_{part}" if part[:1].isdigit() else part for part in (*namespaces, node_name)]
     return "/" + "/".join(parts[:-1]), parts[-1]
 
 

@@ -113,7 +113,7 @@ class LocalNode(Protocol):
     def load(self) -> float | None:
         """Return the CPU load of the process as a share of one core; None if not measured yet."""
 
-    def endpoints_changed(self) -> None:
+    def handle_endpoints_changed(self) -> None:
         """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
 
 
@@ -175,7 +175,7 @@ class LocalClient(Protocol):
 
 @dataclass
 class _Member:
-    local: LocalNode
+    local_node: LocalNode
     gids: dict[str, set[bytes]] = field(default_factory=lambda: {"reader": set(), "writer": set()})
 
 
@@ -190,8 +190,8 @@ class Participant:
         """Guards all state; notified when endpoints change."""
         self._members: dict[str, _Member] = {}
         self._remote_nodes: dict[bytes, tuple[RosNode, ...]] = {}
-        self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
-        self._is_closing = self._has_changes = self._is_settled = False
+        self._read_callbacks: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
+        self._is_closing = self._has_changes = self._has_waited_for_discovery = False
         check_free_descriptors(_FDS_PER_PARTICIPANT, "a participant of ROS 2")
         try:
             self._open()
@@ -204,7 +204,7 @@ class Participant:
                     "domain already has {most} programs"
                 ).format(error=error, most=MAX_PARTICIPANTS)
             ) from error
-        self._began_at = time.monotonic()
+        self._started_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="nep-ros2", daemon=True)
         self._thread.start()
 
@@ -226,13 +226,13 @@ class Participant:
         self._guard = core.GuardCondition(self.entity)
         self._waitset.attach(self._guard)
         any_state = core.ViewState.Any | core.SampleState.Any
-        self._alive = {}
+        self._endpoint_readers = {}
         for kind, topic in (
             ("writer", builtin.BuiltinTopicDcpsPublication),
             ("reader", builtin.BuiltinTopicDcpsSubscription),
         ):
             reader = builtin.BuiltinDataReader(self.entity, topic)
-            self._alive[kind] = (
+            self._endpoint_readers[kind] = (
                 reader,
                 core.ReadCondition(reader, any_state | core.InstanceState.Alive),
             )
@@ -242,12 +242,12 @@ class Participant:
             self.watch(reader, condition, partial(self._mark_changed, reader, condition))
         self._info_writer = self.topics.create_state_writer(_INFO_TOPIC, _INFO_TYPE)
         self.matches = Matches(self.dds, self.types, self.topics, self.gid)
-        for state, process in (
+        for reader, process in (
             (self.topics.create_state_reader(_INFO_TOPIC, _INFO_TYPE), self._process_info),
             (self.matches.reader, self.matches.process),
         ):
-            ready = core.ReadCondition(state, any_state | core.InstanceState.Any)
-            self.watch(state, ready, partial(_read_states, state, ready, process))
+            condition = core.ReadCondition(reader, any_state | core.InstanceState.Any)
+            self.watch(reader, condition, partial(_read_states, reader, condition, process))
 
     def _create_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         try:
@@ -263,35 +263,35 @@ class Participant:
 
     def wait_for_discovery(self) -> None:
         """Wait until existing participants are discovered. Later calls return immediately."""
-        if self._is_settled:
+        if self._has_waited_for_discovery:
             return
         with self.changed:
             while (
-                remaining_s := self._began_at + _DISCOVERY_TIME_S - time.monotonic()
+                remaining_s := self._started_at + _DISCOVERY_TIME_S - time.monotonic()
             ) > 0.0 and not self._is_closing:
                 self.changed.wait(remaining_s)
             deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
             while not self._is_discovery_complete() and (remaining_s := deadline - time.monotonic()) > 0.0:
                 self.changed.wait(min(remaining_s, _POLL_S))
-            self._is_settled = True
+            self._has_waited_for_discovery = True
 
     def _is_discovery_complete(self) -> bool:
         # True if all ROS 2 participants have announced their nodes and the endpoints of these are discovered.
         if self._is_closing:
             return True
         discovered = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
-        telling = self.participants(with_nodes=True) - {self.gid}
+        gids_with_nodes = self.participants(with_nodes=True) - {self.gid}
         return all(
             gid in self._remote_nodes and all(node.gids <= discovered for node in self._remote_nodes[gid])
-            for gid in telling
+            for gid in gids_with_nodes
         )
 
     # ---- nodes
 
-    def add(self, local: LocalNode) -> None:
+    def add(self, local_node: LocalNode) -> None:
         """Add a node of this process."""
         with self.changed:
-            self._members[local.node.id] = _Member(local)
+            self._members[local_node.node.id] = _Member(local_node)
             self._publish_nodes_locked()
 
     def remove(self, node_id: str) -> bool:
@@ -335,18 +335,18 @@ class Participant:
 
     def _publish_nodes_locked(self) -> None:
         # Publishes the nodes of this process. Call with the lock held.
-        entries = []
+        node_entries = []
         for member in self._members.values():
-            space, name = split_node_name(member.local.node.name)
-            entries.append(
+            namespace, name = split_node_name(member.local_node.node.name)
+            node_entries.append(
                 {
-                    "node_namespace": space[:255],
+                    "node_namespace": namespace[:255],
                     "node_name": name[:255],
                     "reader_gid_seq": [self._gid_field(each) for each in sorted(member.gids["reader"])],
                     "writer_gid_seq": [self._gid_field(each) for each in sorted(member.gids["writer"])],
                 }
             )
-        info = {"gid": self._gid_field(self.gid), "node_entities_info_seq": entries}
+        info = {"gid": self._gid_field(self.gid), "node_entities_info_seq": node_entries}
         cdr = self.types.encode(_INFO_TYPE, info)
         self._info_writer.write(create_sample(self.topics.sample_class(_INFO_TYPE), cdr))
 
@@ -380,10 +380,13 @@ class Participant:
 
     def remote_node_names(self, gids: Iterable[bytes]) -> tuple[str, ...]:
         """Return the names of other programs' nodes that own the endpoints with these GUIDs."""
-        requested = set(gids)
+        requested_gids = set(gids)
         with self.changed:
             nodes = [
-                node for others in self._remote_nodes.values() for node in others if node.gids & requested
+                node
+                for participant_nodes in self._remote_nodes.values()
+                for node in participant_nodes
+                if node.gids & requested_gids
             ]
         return tuple(sorted({each.name for each in nodes}))
 
@@ -391,7 +394,7 @@ class Participant:
         """Return the node names of this process's writers and readers by GUID."""
         with self.changed:
             return {
-                gid: member.local.node.name
+                gid: member.local_node.node.name
                 for member in self._members.values()
                 for gids in member.gids.values()
                 for gid in gids
@@ -401,16 +404,16 @@ class Participant:
     def local_nodes(self) -> tuple[LocalNode, ...]:
         """Nodes of this process."""
         with self.changed:
-            return tuple(each.local for each in self._members.values())
+            return tuple(each.local_node for each in self._members.values())
 
-    def remote_nodes(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
+    def remote_nodes(self, gids: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
         """Return the nodes of other participants by the participant's GUID.
 
         Args:
-            alive: GUIDs of the existing participants; all others are removed.
+            gids: GUIDs of the existing participants; all others are removed.
         """
         with self.changed:
-            self._remote_nodes = {gid: nodes for gid, nodes in self._remote_nodes.items() if gid in alive}
+            self._remote_nodes = {gid: nodes for gid, nodes in self._remote_nodes.items() if gid in gids}
             return dict(self._remote_nodes)
 
     # ---- discovery
@@ -424,16 +427,16 @@ class Participant:
         core, builtin = self.dds.core, self.dds.builtin
         with self.changed:
             reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
-            alive = core.ReadCondition(
+            condition = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
-            samples = reader.read(_MAX_SAMPLES_PER_READ, alive)
-        announced = policy_classes(self.dds).Userdata
+            samples = reader.read(_MAX_SAMPLES_PER_READ, condition)
+        userdata = policy_classes(self.dds).Userdata
         return frozenset(
             each.key.bytes
             for each in samples
             if not with_nodes
-            or (announced in each.qos and "enclave" in decode_user_data(each.qos[announced].data))
+            or (userdata in each.qos and "enclave" in decode_user_data(each.qos[userdata].data))
         )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
@@ -446,8 +449,8 @@ class Participant:
         with self.changed:
             if self._is_closing:
                 return []
-            reader, alive = self._alive[kind]
-            samples = reader.read(_MAX_SAMPLES_PER_READ, alive)
+            reader, condition = self._endpoint_readers[kind]
+            samples = reader.read(_MAX_SAMPLES_PER_READ, condition)
         return [
             self.to_endpoint(each)
             for each in samples
@@ -479,13 +482,13 @@ class Participant:
             read: Called in the participant's thread.
         """
         with self.changed:
-            self._reads[id(reader)] = (reader, condition, read)
+            self._read_callbacks[id(reader)] = (reader, condition, read)
             self._waitset.attach(condition)
 
     def unwatch(self, reader: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Unregister the function that `watch` registered for a reader."""
         with self.changed:
-            entry = self._reads.pop(id(reader), None)
+            entry = self._read_callbacks.pop(id(reader), None)
             if entry is not None:
                 self._waitset.detach(entry[1])
 
@@ -495,14 +498,14 @@ class Participant:
             with self.changed:
                 if self._should_stop():
                     return
-                for _reader, condition, read in list(self._reads.values()):
+                for _reader, condition, read in list(self._read_callbacks.values()):
                     if condition.is_triggered():
                         _run_logged(read)
                 _run_logged(self.matches.publish_changes)
                 if self._has_changes:
                     self._has_changes = False
                     for member in list(self._members.values()):
-                        _run_logged(member.local.endpoints_changed)
+                        _run_logged(member.local_node.handle_endpoints_changed)
                 self.changed.notify_all()
 
     def _should_stop(self) -> bool:
@@ -526,27 +529,27 @@ class Participant:
             self.changed.notify_all()
         self._thread.join()
         with self.changed:
-            for _reader, condition, _read in self._reads.values():
+            for _reader, condition, _read in self._read_callbacks.values():
                 self._waitset.detach(condition)
             self._waitset.detach(self._guard)
-            self._reads.clear()
-            self._alive.clear()
+            self._read_callbacks.clear()
+            self._endpoint_readers.clear()
             self.topics.clear()
             for entity in (self._waitset, self._guard, self.entity, self._domain):
                 if entity is not None:
                     _delete(entity)
 
 
-def _run_logged(step: Callable[[], None]) -> None:
+def _run_logged(callback: Callable[[], None]) -> None:
     # The thread continues whatever it receives.
     try:
-        step()
+        callback()
     except Exception:
         _logger.exception("error while processing ROS 2 data")
 
 
-def _read_states(reader: Any, ready: Any, process: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
-    for sample in reader.take(100, ready):
+def _read_states(reader: Any, condition: Any, process: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
+    for sample in reader.take(100, condition):
         cdr = getattr(sample, "cdr", None)
         if cdr is not None:
             process(cdr)
@@ -568,11 +571,11 @@ _participants: dict[int, Participant] = {}
 _lock = threading.Lock()
 
 
-def join_domain(local: LocalNode, number: int) -> Participant:
+def join_domain(local_node: LocalNode, number: int) -> Participant:
     """Add a node to the process's participant in a domain and return the participant.
 
     Args:
-        local: Node to add.
+        local_node: Node to add.
         number: Domain id.
 
     Raises:
@@ -581,7 +584,7 @@ def join_domain(local: LocalNode, number: int) -> Participant:
     with _lock:
         if number not in _participants:
             _participants[number] = Participant(number)
-        _participants[number].add(local)
+        _participants[number].add(local_node)
         return _participants[number]
 
 

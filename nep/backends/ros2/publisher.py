@@ -45,7 +45,7 @@ def wait_for_matches(
     deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
     expected = [(each.gid, each.participant, "nepid" in each.user_data) for each in endpoints]
     with participant.changed:
-        while (unready := participant.matches.unmatched_gids(entities(), expected)) and (
+        while (unmatched_gids := participant.matches.unmatched_gids(entities(), expected)) and (
             remaining_s := deadline - time.monotonic()
         ) > 0.0:
             participant.changed.wait(min(remaining_s, _POLL_S))
@@ -53,7 +53,7 @@ def wait_for_matches(
             ready_at = time.monotonic() + _READY_DELAY_S
             while (remaining_s := ready_at - time.monotonic()) > 0.0:
                 participant.changed.wait(remaining_s)
-        return participant.remote_node_names(unready)
+        return participant.remote_node_names(unmatched_gids)
 
 
 def endpoint_user_data(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
@@ -64,10 +64,10 @@ def endpoint_user_data(type_hash: str, node_id: str, spec: PublisherSpec | Subsc
         node_id: Id of the node.
         spec: Settings of the publisher or subscriber.
     """
-    announced = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
+    entries = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
     if _PLAIN_TYPE.fullmatch(spec.msg_type):
-        announced["neptype"] = spec.msg_type
-    return encode_user_data(announced)
+        entries["neptype"] = spec.msg_type
+    return encode_user_data(entries)
 
 
 class Ros2Publisher:
@@ -84,20 +84,20 @@ class Ros2Publisher:
         self.count = 0
         self.problem = ""
         self._bytes = 0
-        self._stamp_ns: int | None = None
+        self._last_stamp_ns: int | None = None
         self._participant = participant
         self._node_id = node_id
         self._on_close = on_close
         self._mapping = mapping_for(spec.msg_type)
-        self._ids: dict[int, str] = {}
+        self._ids_by_handle: dict[int, str] = {}
         self._is_closed = False
         library = participant.dds
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
         type_hash = participant.types.type_hash(ros_type)
-        announced = endpoint_user_data(type_hash, node_id, spec)
+        user_data = endpoint_user_data(type_hash, node_id, spec)
         depth = queue_depth(spec.qos, spec.codec.name)
         with participant.changed:
-            self._kind = participant.topics.sample_class(ros_type)
+            self._sample_class = participant.topics.sample_class(ros_type)
             self._writer: Any = library.pub.DataWriter(
                 participant.entity,
                 participant.topics.topic(name, ros_type),
@@ -107,7 +107,7 @@ class Ros2Publisher:
                         spec.qos,
                         depth,
                         is_latched=spec.is_latched,
-                        announced=announced,
+                        user_data=user_data,
                         history=spec.history,
                     )
                 ),
@@ -138,7 +138,9 @@ class Ros2Publisher:
     @property
     def counts(self) -> PublisherCount:
         """Statistics shown in the graph."""
-        return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._stamp_ns, self.problem)
+        return PublisherCount(
+            self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self.problem
+        )
 
     @property
     def subscribers(self) -> int:
@@ -150,13 +152,15 @@ class Ros2Publisher:
             if self._is_closed:
                 return 0
             handles = self._writer.get_matched_subscriptions()
-            self._ids = {each: self._ids.get(each) or self._id_of(each) for each in handles}
-            return len(set(self._ids.values()))
+            self._ids_by_handle = {
+                each: self._ids_by_handle.get(each) or self._id_of(each) for each in handles
+            }
+            return len(set(self._ids_by_handle.values()))
 
     def _id_of(self, handle: int) -> str:
         data = self._writer.get_matched_subscription_data(handle)
-        announced = {} if data is None else self._participant.to_endpoint(data).user_data
-        return announced.get("nepid") or f"handle {handle}"
+        user_data = {} if data is None else self._participant.to_endpoint(data).user_data
+        return user_data.get("nepid") or f"handle {handle}"
 
     @property
     def has_subscribers(self) -> bool:
@@ -168,7 +172,7 @@ class Ros2Publisher:
         """Count a message that is not sent because the topic has no subscribers."""
         with self._participant.changed:
             self.count += 1
-            self._stamp_ns = time.time_ns()
+            self._last_stamp_ns = time.time_ns()
 
     def report(self, problem: str) -> None:
         """Set the reason why payloads can't be encoded, shown in the graph of this program."""
@@ -184,22 +188,22 @@ class Ros2Publisher:
         Raises `ClosedError`, and `WireError` if the data isn't a message of the ROS type.
         """
         cdr = self._mapping.pack(encoded)
-        sample = create_sample(self._kind, cdr)
+        sample = create_sample(self._sample_class, cdr)
         if self._is_closed:
             raise ClosedError(f"publisher '{self.spec.topic}'")
-        self._stamp_ns = time.time_ns()
+        self._last_stamp_ns = time.time_ns()
         try:
-            self._writer.write(sample, self._stamp_ns)
+            self._writer.write(sample, self._last_stamp_ns)
         except self._participant.dds.core.DDSException as error:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'") from error
-            codes = self._participant.dds.core.DDSException
-            if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # cyclonedds validates every message
+            dds_exception = self._participant.dds.core.DDSException
+            if error.code == dds_exception.DDS_RETCODE_BAD_PARAMETER:  # cyclonedds validates every message
                 raise WireError(
                     _("the bytes aren't a message of type '{name}'").format(name=self._mapping.ros_type),
                     len(cdr),
                 ) from error
-            if error.code != codes.DDS_RETCODE_TIMEOUT:
+            if error.code != dds_exception.DDS_RETCODE_TIMEOUT:
                 raise
         with self._participant.changed:
             self.count += 1

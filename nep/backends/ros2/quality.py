@@ -2,8 +2,8 @@
 
 | name          | reliability | queue depth                                 |
 |---------------|-------------|---------------------------------------------|
-| "" "reliable" | RELIABLE    | see `queue_depth`                              |
-| "best_effort" | BEST_EFFORT | see `queue_depth`                              |
+| "" "reliable" | RELIABLE    | see `queue_depth`                           |
+| "best_effort" | BEST_EFFORT | see `queue_depth`                           |
 | "sensor"      | BEST_EFFORT | 5 messages, as ROS 2's sensor data profile  |
 
 Durability is TRANSIENT_LOCAL for latched topics, otherwise VOLATILE. The queue depth applies only
@@ -31,34 +31,34 @@ _DEFAULT_DEPTH = 8192
 _UNLIMITED = -1
 
 
-def queue_depth(quality: str, codec: str) -> int:
+def queue_depth(profile: str, codec: str) -> int:
     """Return the queue depth in messages for a QoS profile and a codec."""
-    return _SENSOR_DEPTH if quality == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
+    return _SENSOR_DEPTH if profile == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
 
 
 def qos_policies(
-    library: Dds, quality: str, depth: int, *, is_latched: bool, announced: bytes, history: int = 1
+    library: Dds, profile: str, depth: int, *, is_latched: bool, user_data: bytes, history: int = 1
 ) -> tuple[Any, ...]:
     """Return the QoS policies of a writer or reader.
 
     Args:
         library: Modules of cyclonedds.
-        quality: Name of the QoS profile.
+        profile: Name of the QoS profile.
         depth: Queue depth in messages.
         is_latched: True to store messages for late readers, or to receive stored messages.
-        announced: USER_DATA.
+        user_data: USER_DATA of the endpoint.
         history: Number of messages stored for late readers.
     """
     policies = policy_classes(library)
-    is_reliable = quality in ("", "reliable")
+    is_reliable = profile in ("", "reliable")
     result = [
         policies.Reliability.Reliable(_MAX_BLOCKING_NS) if is_reliable else policies.Reliability.BestEffort,
         policies.Durability.TransientLocal if is_latched else policies.Durability.Volatile,
         policies.History.KeepLast(max(depth, history)),
         policies.DataRepresentation(use_cdrv0_representation=True),
-        policies.Userdata(announced),
+        policies.Userdata(user_data),
     ]
     if is_latched:
-        last = policies.History.KeepLast(max(1, history))
-        result.append(policies.DurabilityService(0, last, _UNLIMITED, _UNLIMITED, _UNLIMITED))
+        history_policy = policies.History.KeepLast(max(1, history))
+        result.append(policies.DurabilityService(0, history_policy, _UNLIMITED, _UNLIMITED, _UNLIMITED))
     return tuple(result)

@@ -37,15 +37,15 @@ _MAX_SOURCES = 4096
 """Maximum number of publishers that are tracked."""
 
 
-def endpoint_id(gid: bytes, announced: str | None) -> int:
+def endpoint_id(gid: bytes, announced_id: str | None) -> int:
     """Return the id of a publisher or subscriber.
 
     Args:
         gid: GUID of the writer or reader.
-        announced: Id in its USER_DATA, in hexadecimal; without a valid one, the id is derived from `gid`.
+        announced_id: Id in its USER_DATA, in hexadecimal; without a valid one, the id is derived from `gid`.
     """
     try:
-        number = int(announced or "", 16)
+        number = int(announced_id or "", 16)
     except ValueError:
         number = 0
     if 0 < number < 2**63:
@@ -74,7 +74,7 @@ class _Source:
     # Publisher whose messages were received.
     id: int
     kind: MessageKind
-    newest_ns: int = -1
+    newest_stamp_ns: int = -1
     is_caught_up: bool = False
     held_messages: list[tuple[int, Message]] = field(default_factory=list)
     """Messages with their time stamps that arrived before the publisher's history and wait for it."""
@@ -90,21 +90,21 @@ class Ros2Subscriber(WakingSubscriber):
         self.received = self.refused = 0
         self.problem = ""
         self.is_closed = False
-        batch = 0 if spec.sink is None else _MAX_BATCH_BYTES
-        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
-        self._dropped = 0
+        batch_bytes = 0 if spec.sink is None else _MAX_BATCH_BYTES
+        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
+        self._dropped_count = 0
         self._transport = transport
         self._participant = participant
         self._mapping = mapping_for(spec.msg_type)
         self._type_hash = participant.types.type_hash(self._mapping.ros_type)
-        self._name = dds_topic(spec.topic)
+        self._dds_name = dds_topic(spec.topic)
         self._sources: dict[int, _Source] = {}
         self._readers: list[Any] = []
-        self._lost_before = 0
-        self._has_latched = False
+        self._lost_before_close = 0
+        self._has_latched_reader = False
         writers = [
             each
-            for each in participant.endpoints("writer", self._name)
+            for each in participant.endpoints("writer", self._dds_name)
             if each.has_type(dds_type(self._mapping.ros_type), self._type_hash)
             and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
         ]
@@ -121,25 +121,27 @@ class Ros2Subscriber(WakingSubscriber):
     def _add_reader_locked(self, *, is_latched: bool) -> None:
         # Call with the participant's lock held.
         participant, spec = self._participant, self.spec
-        self._has_latched = self._has_latched or is_latched
+        self._has_latched_reader = self._has_latched_reader or is_latched
         library, core = participant.dds, participant.dds.core
-        announced = endpoint_user_data(self._type_hash, self._transport.node.id, spec)
+        user_data = endpoint_user_data(self._type_hash, self._transport.node.id, spec)
         depth = max(queue_depth(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,
-            participant.topics.topic(self._name, self._mapping.ros_type),
+            participant.topics.topic(self._dds_name, self._mapping.ros_type),
             participant.qos(
-                *qos_policies(library, spec.qos, depth, is_latched=is_latched, announced=announced)
+                *qos_policies(library, spec.qos, depth, is_latched=is_latched, user_data=user_data)
             ),
         )
         self._readers.append(reader)
         participant.assign(self._transport.node.id, "reader", reader)
-        ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
-        participant.watch(reader, ready, lambda: self._read(reader, ready))
+        condition = core.ReadCondition(
+            reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any
+        )
+        participant.watch(reader, condition, lambda: self._read(reader, condition))
 
     def update_latched_reader(self) -> None:
         """Add the second reader if a latching publisher has appeared. Called in the participant's thread."""
-        if not self._has_latched and not self.is_closed:
+        if not self._has_latched_reader and not self.is_closed:
             for handle in self._readers[0].get_matched_publications():
                 if self._source(self._readers[0], handle).kind.is_latched:
                     self._add_reader_locked(is_latched=True)
@@ -147,16 +149,16 @@ class Ros2Subscriber(WakingSubscriber):
 
     # ---- receiving
 
-    def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+    def _read(self, reader: Any, condition: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         # Runs in the participant's thread, with its lock held.
-        while samples := reader.take(_BATCH_SIZE, ready):
-            messages = [each for sample in samples for each in self._messages(reader, sample)]
+        while samples := reader.take(_BATCH_SIZE, condition):
+            messages = [each for sample in samples for each in self._convert_sample(reader, sample)]
             if messages:
                 self._enqueue(messages)
             if len(samples) < _BATCH_SIZE:
                 return
 
-    def _messages(self, reader: Any, sample: Any) -> list[Message]:  # noqa: ANN401 - see above
+    def _convert_sample(self, reader: Any, sample: Any) -> list[Message]:  # noqa: ANN401 - see above
         cdr = getattr(sample, "cdr", None)
         if cdr is None:
             return self._release_held(sample.sample_info.publication_handle)
@@ -181,9 +183,9 @@ class Ros2Subscriber(WakingSubscriber):
     def _merge_history(self, reader: Any, source: _Source, message: Message, stamp_ns: int) -> list[Message]:  # noqa: ANN401 - see above
         # Merges the messages of a latching publisher: the history first, then the others, without duplicates.
         # Messages of the first reader are held until the second one has received the history.
-        if reader is not self._readers[0] or not self._has_latched:
+        if reader is not self._readers[0] or not self._has_latched_reader:
             messages: list[tuple[int, Message]] = []
-            if self._has_latched:
+            if self._has_latched_reader:
                 source.is_caught_up = True
                 if source.held_messages and stamp_ns >= source.held_messages[0][0]:
                     messages, source.held_messages = source.held_messages, []
@@ -198,13 +200,12 @@ class Ros2Subscriber(WakingSubscriber):
         return self._without_duplicates(source, messages)
 
     def _without_duplicates(self, source: _Source, messages: list[tuple[int, Message]]) -> list[Message]:
-        # Drops duplicates.
-        new = []
+        new_messages = []
         for stamp_ns, message in messages:
-            if stamp_ns > source.newest_ns:
-                source.newest_ns = stamp_ns
-                new.append(message)
-        return new
+            if stamp_ns > source.newest_stamp_ns:
+                source.newest_stamp_ns = stamp_ns
+                new_messages.append(message)
+        return new_messages
 
     def _release_held(self, handle: int) -> list[Message]:
         # A publisher has disappeared: deliver its held messages.
@@ -219,15 +220,15 @@ class Ros2Subscriber(WakingSubscriber):
         if existing is not None:
             return existing
         sample = reader.get_matched_publication_data(handle)
-        described = None if sample is None else self._participant.to_endpoint(sample)
-        is_latched = described is not None and described.is_latched
+        endpoint = None if sample is None else self._participant.to_endpoint(sample)
+        is_latched = endpoint is not None and endpoint.is_latched
         source = _Source(
             endpoint_id(handle.to_bytes(8, "little", signed=handle < 0), None)
-            if described is None
-            else endpoint_id(described.gid, described.user_data.get("nepid")),
+            if endpoint is None
+            else endpoint_id(endpoint.gid, endpoint.user_data.get("nepid")),
             self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
         )
-        if described is not None:
+        if endpoint is not None:
             if len(self._sources) >= _MAX_SOURCES:
                 self._sources.pop(next(iter(self._sources)))
             self._sources[handle] = source
@@ -240,7 +241,7 @@ class Ros2Subscriber(WakingSubscriber):
             for message in messages:
                 dropped = self.inbox.put(message)
                 self.received += 1 - dropped
-                self._dropped += dropped
+                self._dropped_count += dropped
             self.notify_waiting()
 
     # ---- reading
@@ -269,7 +270,7 @@ class Ros2Subscriber(WakingSubscriber):
     def lost(self) -> int | None:
         """Number of messages that DDS reports as lost or that were dropped from the full queue."""
         with self._participant.changed:
-            return self._lost_before + self._lost_in_transit_count() + self._dropped
+            return self._lost_before_close + self._lost_in_transit_count() + self._dropped_count
 
     def _lost_in_transit_count(self) -> int:
         if self.is_closed or has_forked() or self._participant.has_closed():
@@ -307,7 +308,7 @@ class Ros2Subscriber(WakingSubscriber):
         with self._participant.changed:
             if self.is_closed:
                 return
-            self._lost_before = self._lost_in_transit_count()
+            self._lost_before_close = self._lost_in_transit_count()
             self.is_closed = True
             if self._participant.has_closed():
                 self._readers.clear()

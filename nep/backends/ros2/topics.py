@@ -44,8 +44,8 @@ class DdsTopics:
     def create_state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         """Create a writer whose last sample is also delivered to late readers."""
         policies = self._dds.qos.Policy
-        last = policies.History.KeepLast(1)
-        history = (last, policies.DurabilityService(0, last, -1, -1, -1))
+        history_policy = policies.History.KeepLast(1)
+        history = (history_policy, policies.DurabilityService(0, history_policy, -1, -1, -1))
         return self._dds.pub.DataWriter(
             self._entity, self.topic(name, ros_type), self._state_qos(ros_type, *history)
         )
@@ -72,8 +72,8 @@ class DdsTopics:
 
         The client's id and the number of the call precede the fields.
         """
-        hints = self._dds.idl.types
-        return self._create_class(ros_type, {"guid": hints.uint64, "sequence_number": hints.int64})
+        idl_types = self._dds.idl.types
+        return self._create_class(ros_type, {"guid": idl_types.uint64, "sequence_number": idl_types.int64})
 
     def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - created dynamically
         """Return the sample class of a ROS type."""
@@ -84,43 +84,45 @@ class DdsTopics:
             members = base_members | {
                 each.name: self._member_type(each) for each in self._types.fields(ros_type)
             }
-            created = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
-            created.serialize = _serialize
-            created.deserialize = classmethod(_deserialize)
-            self._classes[ros_type] = created
+            sample_class = self._dds.idl.make_idl_struct(
+                ros_type.rpartition("/")[2], dds_type(ros_type), members
+            )
+            sample_class.serialize = _serialize
+            sample_class.deserialize = classmethod(_deserialize)
+            self._classes[ros_type] = sample_class
         return self._classes[ros_type]
 
     def _member_type(self, field: RosField) -> Any:  # noqa: ANN401 - a type
-        hints = self._dds.idl.types
+        idl_types = self._dds.idl.types
         if field.is_message:
             item = self.sample_class(field.kind)
         elif field.kind == "bool":
             item = bool
         elif field.kind == "string":
-            item = hints.bounded_str[field.max_text_bytes] if field.max_text_bytes else str
+            item = idl_types.bounded_str[field.max_text_bytes] if field.max_text_bytes else str
         else:
-            item = getattr(hints, _IDL_NAMES.get(field.kind, field.kind))
+            item = getattr(idl_types, _IDL_NAMES.get(field.kind, field.kind))
         if field.length is None:
             return item
         if field.length >= 0:
-            return hints.array[item, field.length]
-        return hints.sequence[item, field.size] if field.size else hints.sequence[item]
+            return idl_types.array[item, field.length]
+        return idl_types.sequence[item, field.size] if field.size else idl_types.sequence[item]
 
     def clear(self) -> None:
         """Release all topics. Called when the participant is closed."""
         self._topics.clear()
 
 
-def create_sample(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
-    """Return a sample of class `kind` with the content `cdr`."""
-    created = kind.__new__(kind)
-    created.cdr = cdr
-    return created
+def create_sample(sample_class: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
+    """Return a sample of class `sample_class` with the content `cdr`."""
+    sample = sample_class.__new__(sample_class)
+    sample.cdr = cdr
+    return sample
 
 
 def _serialize(sample: Any, *_arguments: object, **_options: object) -> bytes:  # noqa: ANN401 - see above
     return bytes(sample.cdr)
 
 
-def _deserialize(kind: Any, /, cdr: bytes, *_arguments: object, **_options: object) -> Any:  # noqa: ANN401
-    return create_sample(kind, cdr)
+def _deserialize(sample_class: Any, /, cdr: bytes, *_arguments: object, **_options: object) -> Any:  # noqa: ANN401
+    return create_sample(sample_class, cdr)

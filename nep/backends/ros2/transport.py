@@ -41,7 +41,7 @@ class Ros2Transport:
         self.node = node
         self.changed = threading.Condition()
         """Guards inboxes. Lock order: the participant's lock before this one."""
-        self._wakes = 0
+        self._wake_count = 0
         self._load = CpuLoad()
         self._participant: Participant | None = None
         self._lock = threading.RLock()
@@ -90,7 +90,7 @@ class Ros2Transport:
             self._check_open()
             raise
 
-    def endpoints_changed(self) -> None:
+    def handle_endpoints_changed(self) -> None:
         """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
         for subscriber in self._subscribers:
             subscriber.update_latched_reader()
@@ -172,14 +172,14 @@ class Ros2Transport:
     ) -> None:
         """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
-        before = self._wakes
+        before = self._wake_count
         with wake_on_call(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
                 self.changed.wait_for(
                     lambda: (
-                        self._wakes != before
+                        self._wake_count != before
                         or any(len(each.inbox) or each.is_closed for each in own_subscribers)
                     ),
                     timeout_s,
@@ -188,7 +188,7 @@ class Ros2Transport:
     def wake(self) -> None:
         """End all waits in progress."""
         with self.changed:
-            self._wakes += 1
+            self._wake_count += 1
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate

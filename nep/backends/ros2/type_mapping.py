@@ -70,7 +70,7 @@ def codec_for(msg_type: str) -> Codec:
 def mapping_for(msg_type: str) -> TypeMapping:
     """Return the mapping for a message type. Raises `NepError` for an unknown ROS type."""
     if is_type_name(msg_type):
-        return _ros_mapping(message_types().checked(msg_type))
+        return _ros_mapping(message_types().validate(msg_type))
     codec = codecs.codec_for(msg_type)
     if codec.name == "image":
         return TypeMapping(_IMAGE_TYPE, replace(codec, encode=_encode_image), _pack_image, _unpack_image)
@@ -163,11 +163,11 @@ def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
     return memoryview(cdr)[16 : 16 + size]
 
 
-def _read_numbers(cdr: bytes, form: str, offset: int) -> tuple[int, ...]:
+def _read_numbers(cdr: bytes, format_chars: str, offset: int) -> tuple[int, ...]:
     # The header has the byte order. Raises `WireError`.
-    if len(cdr) < offset + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
+    if len(cdr) < offset + 4 * len(format_chars) or cdr[0] != 0 or cdr[1] > 1:
         raise WireError(_("not a ROS message"), len(cdr))
-    return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, offset)
+    return struct.unpack_from(f"{'<' if cdr[1] else '>'}{format_chars}", cdr, offset)
 
 
 def _read_data_field(name: str, cdr: bytes) -> bytes:

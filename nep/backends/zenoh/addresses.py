@@ -48,7 +48,7 @@ _MAX_TIMEOUT_S = 10**6
 _FDS_PER_SESSION = 16
 _FDS_PER_PEER = 2
 _PORT_ATTEMPTS = 5
-_CONNECTED_S, _CONNECT_POLL_S = 1.0, 0.005
+_CONNECT_TIMEOUT_S, _CONNECT_POLL_S = 1.0, 0.005
 _SOURCE_LOCATION = re.compile(r" at /\S+\.rs:\d+\.?")
 
 
@@ -73,7 +73,7 @@ class OpenSession:
 
     @property
     def is_router_lost(self) -> bool:
-        """True if no router is connected. zenoh reconnects automatically."""
+        """True if a router is needed and none is connected. zenoh reconnects automatically."""
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
@@ -110,7 +110,7 @@ def validate_address(master: str | None = None) -> str:
 
 
 def _parse_endpoints(address: str) -> tuple[str, ...]:
-    # Returns () if the place isn't a list of endpoints.
+    # Returns () if the address isn't a list of endpoints.
     endpoints = tuple(endpoint.strip() for endpoint in address.split(","))
     return endpoints if all(map(_ENDPOINT.fullmatch, endpoints)) else ()
 
@@ -122,9 +122,9 @@ def open_session_at(address: str, wait_s: float | None) -> OpenSession:
         address: Network address returned by `validate_address`.
         wait_s: Seconds to wait for a router; None waits forever.
     """
-    local = _LOCAL_ADDRESS.fullmatch(address)
-    if local is not None:
-        return _open_local(local.group(1) or "nodes")
+    match = _LOCAL_ADDRESS.fullmatch(address)
+    if match is not None:
+        return _open_local(match.group(1) or "nodes")
     check_free_descriptors(_FDS_PER_SESSION, "a session of zenoh")
     endpoints = _parse_endpoints(address)
     if not endpoints:
@@ -146,17 +146,17 @@ def open_session_at(address: str, wait_s: float | None) -> OpenSession:
 
 
 def _open_local(name: str) -> OpenSession:
-    meeting = Rendezvous(name)
-    with meeting.exclusive():
-        others = [entry.port for entry in meeting.entries()]
-        check_free_descriptors(_FDS_PER_SESSION + _FDS_PER_PEER * len(others), "a session of zenoh")
-        port, session = _open_at_free_port(others)
-        entry = meeting.add(port)
-    endpoints = tuple(f"tcp://{LOOPBACK}:{each}" for each in (port, *others))
-    return OpenSession(session, meeting, entry, endpoints)
+    rendezvous = Rendezvous(name)
+    with rendezvous.exclusive():
+        other_ports = [entry.port for entry in rendezvous.entries()]
+        check_free_descriptors(_FDS_PER_SESSION + _FDS_PER_PEER * len(other_ports), "a session of zenoh")
+        port, session = _open_at_free_port(other_ports)
+        entry = rendezvous.add(port)
+    endpoints = tuple(f"tcp://{LOOPBACK}:{each}" for each in (port, *other_ports))
+    return OpenSession(session, rendezvous, entry, endpoints)
 
 
-def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
+def _open_at_free_port(other_ports: list[int]) -> tuple[int, Any]:
     # Another program may bind the port before zenoh does; then try another port.
     for remaining_attempts in reversed(range(_PORT_ATTEMPTS)):
         port = free_port()
@@ -164,7 +164,7 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
             "mode": "peer",
             "listen": {"endpoints": [f"tcp/{LOOPBACK}:{port}"], "timeout_ms": 0, "exit_on_failure": True},
             "connect": {
-                "endpoints": [f"tcp/{LOOPBACK}:{each}" for each in others],
+                "endpoints": [f"tcp/{LOOPBACK}:{each}" for each in other_ports],
                 "timeout_ms": 0,
                 "exit_on_failure": False,
             },
@@ -188,7 +188,7 @@ def _open_from_file(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     config = _load_config(path)
     session = _open_session(config, str(path))
     if json.loads(config.get_json("connect/endpoints")):
-        pause, deadline = threading.Event(), time.monotonic() + _CONNECTED_S
+        pause, deadline = threading.Event(), time.monotonic() + _CONNECT_TIMEOUT_S
         while time.monotonic() < deadline and not (session.info.routers_zid() or session.info.peers_zid()):
             pause.wait(_CONNECT_POLL_S)
     return session

@@ -36,7 +36,7 @@ class EarlyMessages(Generic[T]):
         self._max_messages = max_messages
         self._clock = clock
         self._queued: dict[int, list[tuple[int, T, int]]] = {}
-        self._until: dict[int, float] = {}
+        self._deadlines: dict[int, float] = {}
         self._bytes = 0
 
     def queue_if_early(self, header: Header, message: T, size_bytes: int) -> bool:
@@ -51,7 +51,8 @@ class EarlyMessages(Generic[T]):
         if source is None or source.remote is None or source.has_echoed:
             return False
         now = self._clock()
-        if now >= self._until.setdefault(header.publisher, now + _MAX_QUEUED_S) or not self._has_room(header):
+        deadline = self._deadlines.setdefault(header.publisher, now + _MAX_QUEUED_S)
+        if now >= deadline or not self._has_room(header):
             return False
         self._queued.setdefault(header.publisher, []).append((header.seq, message, size_bytes))
         self._bytes += size_bytes
@@ -66,9 +67,11 @@ class EarlyMessages(Generic[T]):
 
         Messages that the history contained as well are left out.
         """
-        self._until.pop(publisher, None)
-        queued = self._queued.pop(publisher, [])
-        self._bytes -= sum(size_bytes for _seq, _message, size_bytes in queued)
+        self._deadlines.pop(publisher, None)
+        queued_messages = self._queued.pop(publisher, [])
+        self._bytes -= sum(size_bytes for _seq, _message, size_bytes in queued_messages)
         source = self._sources.find(publisher)
-        last = 0 if source is None or source.last is None else source.last
-        return [message for seq, message, _size in sorted(queued, key=itemgetter(0)) if seq > last]
+        last_seq = 0 if source is None or source.last is None else source.last
+        return [
+            message for seq, message, _size in sorted(queued_messages, key=itemgetter(0)) if seq > last_seq
+        ]

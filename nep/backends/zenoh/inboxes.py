@@ -38,7 +38,7 @@ class Inboxes:
     def __init__(self, name: str) -> None:
         self.changed = threading.Condition()
         self._name = name
-        self._wakes = 0
+        self._wake_count = 0
         self._sinks: tuple[SinkSubscriber, ...] = ()
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
@@ -46,28 +46,30 @@ class Inboxes:
     @property
     def wake_count(self) -> int:
         """Number of `wake` calls so far."""
-        return self._wakes
+        return self._wake_count
 
-    def wait(self, subscribers: Sequence[SinkSubscriber], timeout_s: float, wakes: int | None = None) -> None:
+    def wait(
+        self, subscribers: Sequence[SinkSubscriber], timeout_s: float, previous_count: int | None = None
+    ) -> None:
         """Wait for a message in `subscribers`, for one of them to close, or for `wake`.
 
         Args:
             subscribers: Subscribers to wait for.
             timeout_s: Maximum time to wait in seconds.
-            wakes: Earlier value of `wake_count`; returns immediately if `wake` was called since then.
-                None selects the current value.
+            previous_count: Earlier value of `wake_count`; returns immediately if `wake` was called since
+                then. None selects the current value.
         """
         with self.changed:
-            before = self._wakes if wakes is None else wakes
+            before = self._wake_count if previous_count is None else previous_count
             self.changed.wait_for(
-                lambda: self._wakes != before or any(each.has_input for each in subscribers),
+                lambda: self._wake_count != before or any(each.has_input for each in subscribers),
                 timeout_s,
             )
 
     def wake(self) -> None:
         """End all waits in progress."""
         with self.changed:
-            self._wakes += 1
+            self._wake_count += 1
             self.changed.notify_all()
 
     def add_sink(self, subscriber: SinkSubscriber) -> None:

@@ -27,7 +27,7 @@ _LIVE_PREFIX = f"{_ROOT}/live/"
 ALL_CALLS_KEY = f"{_ROOT}/call/*"
 ALL_TOKENS_KEY = f"{_LIVE_PREFIX}**"
 _WILDCARDS = frozenset({"*", "**"})
-_TOPIC_AT, _SINCE_AT = 3, 4
+_TOPIC_INDEX, _SINCE_INDEX = 3, 4
 _MAX_ID = 2**64 - 1
 _NODE_CHUNKS, _PUBLISHER_CHUNKS, _SUBSCRIBER_CHUNKS = 7, 6, 4
 
@@ -79,13 +79,14 @@ def pattern_hellos_key(pattern: str) -> str:
 
 
 def _pattern_chunk(pattern: str) -> str:
-    # A topic is one chunk and zenoh's wildcards match whole chunks, so only the fixed begin and end are used.
+    # A topic is one chunk, whose levels zenoh doesn't distinguish. The expression therefore matches only the
+    # parts before the first and after the last wildcard.
     levels = pattern.split("/")
-    wild = [each for each, level in enumerate(levels) if level in _WILDCARDS]
-    first, last = wild[0], wild[-1]
-    begin = "/".join(levels[:first]) + ("/" if first and levels[first] == "*" else "")
-    end = ("/" if levels[last] == "*" and levels[last + 1 :] else "") + "/".join(levels[last + 1 :])
-    return f"{quote(begin, safe='')}$*{quote(end, safe='')}" if begin or end else "*"
+    wildcard_indexes = [index for index, level in enumerate(levels) if level in _WILDCARDS]
+    first, last = wildcard_indexes[0], wildcard_indexes[-1]
+    prefix = "/".join(levels[:first]) + ("/" if first and levels[first] == "*" else "")
+    suffix = ("/" if levels[last] == "*" and levels[last + 1 :] else "") + "/".join(levels[last + 1 :])
+    return f"{quote(prefix, safe='')}$*{quote(suffix, safe='')}" if prefix or suffix else "*"
 
 
 def topic_of(key: str) -> str:
@@ -93,7 +94,7 @@ def topic_of(key: str) -> str:
 
     Returns "" if the key is too short to contain a topic.
     """
-    return _decode_chunk(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
+    return _decode_chunk(key.split("/")[_TOPIC_INDEX]) if key.count("/") >= _TOPIC_INDEX else ""
 
 
 def call_key(node_id: str) -> str:
@@ -135,7 +136,7 @@ def service_key(service: str, since_ns: int, server: int) -> str:
 
 def server_key(node_id: str, record: PublisherRecord) -> str:
     """Return the key of a server's liveliness token."""
-    since = record.endpoints[0].split("/")[_SINCE_AT]
+    since = record.endpoints[0].split("/")[_SINCE_INDEX]
     return "/".join(
         (
             f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/srv",
@@ -165,11 +166,11 @@ def parse_token(key: str) -> LiveToken | None:
     try:
         if chunks[:1] == ["node"] and len(chunks) == _NODE_CHUNKS:
             _kind, name, host, pid, language, generation, since = chunks
-            number, since_ns = int(pid), int(since)
-            if not (0 <= number < 2**63 and 0 <= since_ns < 2**63):
+            pid_number, since_ns = int(pid), int(since)
+            if not (0 <= pid_number < 2**63 and 0 <= since_ns < 2**63):
                 return None
             return LiveToken(
-                node_id, NodeRecord(node_id, name, host, number or None, language, generation, since_ns)
+                node_id, NodeRecord(node_id, name, host, pid_number or None, language, generation, since_ns)
             )
         if chunks[:1] == ["pub"] and len(chunks) == _PUBLISHER_CHUNKS:
             _kind, id_, topic, msg_type, codec, latched = chunks
@@ -189,17 +190,17 @@ def parse_token(key: str) -> LiveToken | None:
         return None
 
 
-def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> LiveToken | None:
+def _parse_service(node_id: str, kind: str = "", id_: str = "", *chunks: str) -> LiveToken | None:
     # Raises `ValueError`.
-    if kind == "srv" and len(rest) == 2 and rest[0]:
-        service, since = rest
+    if kind == "srv" and len(chunks) == 2 and chunks[0]:
+        service, since = chunks
         endpoint = service_key(service, _parse_id(since), _parse_id(id_))
         record = PublisherRecord(
             _parse_id(id_), topic_of_service(service), SERVICE_TYPE, SERVICE_TYPE, (endpoint,)
         )
         return LiveToken(node_id, record)
-    if kind == "cli" and len(rest) == 1 and rest[0]:
-        return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic_of_service(rest[0]), SERVICE_TYPE))
+    if kind == "cli" and len(chunks) == 1 and chunks[0]:
+        return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic_of_service(chunks[0]), SERVICE_TYPE))
     return None
 
 

@@ -77,12 +77,12 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             _sessions.remove(session)
 
 
-def prevent_finalization(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+def prevent_finalization(instance: Any) -> None:  # noqa: ANN401 - zenoh is not typed
     """Prevent an object from ever being finalized.
 
     In a forked child process, finalizing an object of zenoh would notify the network.
     """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))
 
 
 def _forked() -> None:

@@ -21,12 +21,13 @@ class ZenohServices:
     """Servers, clients and surveyors of one node.
 
     Args:
-        session: Returns the node's session for a configuration; raises `ClosedError` if the node is closed.
+        get_session: Returns the node's session for a configuration; raises `ClosedError` if the node is
+            closed.
         node_name: Name of the node.
     """
 
-    def __init__(self, session: SessionProvider, node_name: str) -> None:
-        self._session = session
+    def __init__(self, get_session: SessionProvider, node_name: str) -> None:
+        self._get_session = get_session
         self._node_name = node_name
         self._lock = threading.Lock()
         self._deadlines = Deadlines(node_name)
@@ -36,7 +37,7 @@ class ZenohServices:
 
     def create_server(self, spec: ServerSpec) -> ZenohServer:
         """Create a server. See `ServiceTransport.create_server`."""
-        session = self._session(spec.configuration, spec.wait_s)
+        session = self._get_session(spec.configuration, spec.wait_s)
         session.join()
         server = ZenohServer(session, spec, self._discard)
         try:
@@ -52,7 +53,7 @@ class ZenohServices:
 
     def create_client(self, spec: ClientSpec) -> ZenohClient:
         """Create a client or surveyor. See `ServiceTransport.create_client`."""
-        session = self._session(spec.configuration, spec.wait_s)
+        session = self._get_session(spec.configuration, spec.wait_s)
         session.join()
         client = ZenohClient(session, spec, self._deadlines, self._discard)
         try:

@@ -52,14 +52,16 @@ class ZenohPublisher:
         self._problem = ""
         self._history: History[tuple[bytes, bytes]] = History(spec.history)
         self._is_closed = False
-        self._is_matched = False
+        self._has_matching_subscribers = False
         self._lock = threading.Lock()
-        self._out: Any = session.declare_publisher(
+        self._zenoh_publisher: Any = session.declare_publisher(
             data_key(spec.topic), congestion_control=zenoh.CongestionControl.DROP
         )
-        self._listener: Any = self._out.declare_matching_listener(create_handler(self._handle_matching))
-        self._is_matched = bool(self._out.matching_status.matching)
-        self._hellos: Any = session.declare_queryable(
+        self._listener: Any = self._zenoh_publisher.declare_matching_listener(
+            create_handler(self._handle_matching)
+        )
+        self._has_matching_subscribers = bool(self._zenoh_publisher.matching_status.matching)
+        self._hello_queryable: Any = session.declare_queryable(
             hello_key(spec.topic, spec.id), create_handler(self._handle_hello)
         )
 
@@ -73,10 +75,10 @@ class ZenohPublisher:
     @property
     def has_subscribers(self) -> bool:
         """True if the topic has subscribers, including programs that don't use nep."""
-        return self._is_matched or self.subscribers > 0
+        return self._has_matching_subscribers or self.subscribers > 0
 
     def _handle_matching(self, status: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-        self._is_matched = bool(status.matching)
+        self._has_matching_subscribers = bool(status.matching)
 
     def _handle_hello(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread. Replies with the history and the number of the last message.
@@ -137,7 +139,7 @@ class ZenohPublisher:
             )
             attachment = header.pack() + extension
             self._history.add((data, attachment), len(data))
-            self._out.put(data, attachment=attachment)
+            self._zenoh_publisher.put(data, attachment=attachment)
 
     # ---- closing
 
@@ -153,6 +155,6 @@ class ZenohPublisher:
 
     def release(self) -> None:
         """Undeclare the publisher's key expressions at the session."""
-        for entity in (self._hellos, self._listener, self._out):
+        for entity in (self._hello_queryable, self._listener, self._zenoh_publisher):
             with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                 entity.undeclare()

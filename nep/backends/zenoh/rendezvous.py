@@ -69,7 +69,7 @@ def free_port() -> int:
 
 
 class Rendezvous:
-    """Folder of all sessions of a local network. Raises `NepError` if the folder isn't owned by the user.
+    """Folder of all sessions of a local network. Raises `NepError` if the folder can't be used.
 
     Args:
         name: Name of the local network.
@@ -152,8 +152,8 @@ def _create_private_folder(folder: Path) -> Path:
     if not stat.S_ISDIR(status.st_mode) or not is_ours:
         raise NepError(
             _(
-                "can't use '{folder}' to connect nodes: it belongs to another user; set XDG_RUNTIME_DIR to "
-                "a folder that you own"
+                "can't use '{folder}' to connect nodes: it is a link or belongs to another user; set "
+                "XDG_RUNTIME_DIR to a folder that you own"
             ).format(folder=folder)
         )
     return folder
@@ -178,12 +178,12 @@ def _process_status(entry: SessionEntry) -> str | None:
     try:
         process = psutil.Process(entry.pid)
         status = process.status()
-        is_same = abs(round(process.create_time() * 100) - entry.start_time) <= 1
+        is_same_process = abs(round(process.create_time() * 100) - entry.start_time) <= 1
     except psutil.NoSuchProcess:
         return None
     except psutil.Error:
         return psutil.STATUS_RUNNING
-    return status if is_same and status != psutil.STATUS_ZOMBIE else None
+    return status if is_same_process and status != psutil.STATUS_ZOMBIE else None
 
 
 def _lock(descriptor: int) -> bool:

@@ -30,29 +30,29 @@ class Roster:
         self._publishers: dict[str, dict[int, tuple[str, PublisherRecord]]] = {}
         self._subscribers: dict[str, dict[int, tuple[str, SubscriberRecord]]] = {}
         self._patterns: set[str] = set()
-        self._count = 0
+        self._token_count = 0
 
-    def update(self, alive: LiveToken, *, is_present: bool) -> None:
+    def update(self, token: LiveToken, *, is_present: bool) -> None:
         """Add or remove a node, publisher or subscriber. Idempotent.
 
         Args:
-            alive: Liveliness token.
+            token: Liveliness token.
             is_present: True to add the token, False to remove it.
         """
         with self._lock:
-            if is_present and self._count >= _MAX_TOKENS:
+            if is_present and self._token_count >= _MAX_TOKENS:
                 return
-            node_id, record = alive
+            node_id, record = token
             if isinstance(record, NodeRecord):
                 before = len(self._nodes)
                 self._nodes.pop(node_id, None)
                 if is_present:
                     self._nodes[node_id] = record
-                self._count += len(self._nodes) - before
+                self._token_count += len(self._nodes) - before
             elif isinstance(record, PublisherRecord):
-                self._count += _update_table(self._publishers, (node_id, record), is_present)
+                self._token_count += _update_table(self._publishers, (node_id, record), is_present)
             else:
-                self._count += _update_table(self._subscribers, (node_id, record), is_present)
+                self._token_count += _update_table(self._subscribers, (node_id, record), is_present)
                 if is_pattern(record.topic):
                     self._patterns.discard(record.topic)
                     if record.topic in self._subscribers:
@@ -131,15 +131,15 @@ class Roster:
 
 
 def _update_table(
-    table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_present: bool
+    table: dict[str, dict[int, tuple[str, _Record]]], entry: tuple[str, _Record], is_present: bool
 ) -> int:
     # Returns the change of the number of entries.
-    record = alive[1]
+    record = entry[1]
     entries = table.setdefault(record.topic, {})
     before = len(entries)
     entries.pop(record.id, None)
     if is_present:
-        entries[record.id] = alive
+        entries[record.id] = entry
     if not entries:
         del table[record.topic]
     return len(entries) - before

@@ -1,7 +1,7 @@
 """Servers and clients over zenoh: a server is a queryable, and a call is a query to its key.
 
 Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. When a server
-ends, zenoh finishes its queries without a reply, so the client knows that its calls are lost.
+ends, zenoh finishes its queries without a reply, so the client knows that no reply will arrive.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ class ZenohServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics shown in the graph."""
-        tally = self.stats
-        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+        stats = self.stats
+        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 
     def begin_close(self) -> None:
         """Unregister; reject queued and new calls."""
@@ -140,10 +140,10 @@ class ZenohServer:
             if self.is_closed:
                 return
             self.is_closed = True
-            pending, self._queries = tuple(self._queries), set()
+            pending_queries, self._queries = tuple(self._queries), set()
         with suppress(load_zenoh().ZError):  # closing the session has undeclared it
             self._queryable.undeclare()
-        for query in pending:
+        for query in pending_queries:
             query.drop()
         self._on_close(self)
 
@@ -158,15 +158,15 @@ class ZenohServer:
 
 @dataclass(eq=False)
 class _Call:
-    # Call in flight at the server `key`; "" while there is no server. `finished_at` is the deadline for the
-    # removal of the server's token after zenoh has finished the query.
+    # Call in flight at the server `key`; "" while there is no server. After zenoh has finished the query,
+    # the server's token should be removed by `token_deadline`.
     number: int
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
     callback: OutcomeCallback
     key: str = ""
-    finished_at: float = math.inf
+    token_deadline: float = math.inf
     size: int = 0
 
     def __post_init__(self) -> None:
@@ -251,19 +251,19 @@ class ZenohClient(ClientCalls[_Call]):
             if not key or call.key or call.number not in self._calls:
                 return
             call.key = key
-        limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
-        parts = NATIVE.encode_call(call.number, self.spec.codec.number, limit_s, call.data)
+        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        parts = NATIVE.encode_call(call.number, self.spec.codec.number, remaining_s, call.data)
         call.data = b""  # the query outlives its timeout: release the payload
-        query_s = (
+        query_timeout_s = (
             _MAX_QUERY_TIMEOUT_S
-            if limit_s is None
-            else min(_MAX_QUERY_TIMEOUT_S, limit_s + _LATE_REPLY_WINDOW_S)
+            if remaining_s is None
+            else min(_MAX_QUERY_TIMEOUT_S, remaining_s + _LATE_REPLY_WINDOW_S)
         )
         try:
             self._session.call(
                 key,
                 parts,
-                query_s,
+                query_timeout_s,
                 lambda reply: self._handle_reply(call, reply),
                 lambda: self._handle_query_finished(call),
             )
@@ -291,18 +291,18 @@ class ZenohClient(ClientCalls[_Call]):
                 self.late += 1
 
     def _handle_query_finished(self, call: _Call) -> None:
-        # The query is finished: without a reply, the server has ended or never received the call.
+        # If no reply has arrived, the server has ended or never received the call.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
             return
-        call.finished_at = time.monotonic() + _TOKEN_DELAY_S
-        self._deadlines.add(call.finished_at)
+        call.token_deadline = time.monotonic() + _TOKEN_DELAY_S
+        self._deadlines.add(call.token_deadline)
 
     def _fail_without_reply(self, call: _Call, now: float) -> None:
         # Handles calls whose query is finished without a reply.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
-        elif call.finished_at <= now:
+        elif call.token_deadline <= now:
             reason = _(
                 "the server of '{service}' is connected but didn't reply; it may be unable to decode the "
                 "call, or a router's access control denies '{key}'"
@@ -326,7 +326,7 @@ class ZenohClient(ClientCalls[_Call]):
 
     # ---- events
 
-    def servers_changed(self) -> None:
+    def handle_servers_changed(self) -> None:
         """Let the timeout thread send the waiting calls, because the servers of the service have changed."""
         self._deadlines.add(0.0)
 
@@ -334,21 +334,21 @@ class ZenohClient(ClientCalls[_Call]):
         """Send waiting calls, fail expired ones, return the next deadline. See `ExpiringClient.expire`."""
         key = next(iter(self._servers), "")
         with self._lock:
-            waiting = [each for each in self._calls.values() if not each.key and each.deadline > now]
-        for call in waiting:
+            waiting_calls = [each for each in self._calls.values() if not each.key and each.deadline > now]
+        for call in waiting_calls:
             self._send(call, key)
         with self._lock:
-            finished = [each for each in self._calls.values() if each.finished_at < math.inf]
-        for call in finished:
+            finished_calls = [each for each in self._calls.values() if each.token_deadline < math.inf]
+        for call in finished_calls:
             self._fail_without_reply(call, now)
         with self._lock:
-            late = [each for each in self._calls.values() if each.deadline <= now]
-        for call in late:
-            kind = ServiceTimeoutError if call.key else NoServerError
-            self._finish(call, kind(self.spec.service, call.timeout_s or 0.0))
+            expired_calls = [each for each in self._calls.values() if each.deadline <= now]
+        for call in expired_calls:
+            error_class = ServiceTimeoutError if call.key else NoServerError
+            self._finish(call, error_class(self.spec.service, call.timeout_s or 0.0))
         with self._lock:
-            dues = [min(each.deadline, each.finished_at) for each in self._calls.values()]
-        return min(dues, default=math.inf)
+            deadlines = [min(each.deadline, each.token_deadline) for each in self._calls.values()]
+        return min(deadlines, default=math.inf)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""

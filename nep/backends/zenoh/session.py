@@ -75,7 +75,7 @@ class ListedClient(Protocol):
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
 
-    def servers_changed(self) -> None:
+    def handle_servers_changed(self) -> None:
         """Handle a change of the service's servers. Called in a zenoh thread; must not block."""
 
 
@@ -85,7 +85,7 @@ class PendingQuery:
     def __init__(self, timeout_s: float, on_finished: Callable[[], None] | None = None) -> None:
         self._on_finished = on_finished
         self.replies: dict[str, bytes] = {}
-        self._ends_at = time.monotonic() + timeout_s + _TIMEOUT_GRACE_S
+        self._deadline = time.monotonic() + timeout_s + _TIMEOUT_GRACE_S
         self._is_finished = False
         self._changed = threading.Condition()
 
@@ -104,21 +104,26 @@ class PendingQuery:
         if self._on_finished is not None:
             self._on_finished()
 
-    def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
-        """Wait for replies; return the keys in `wanted` without a reply, or an empty set if it is None.
+    def wait(
+        self, expected_keys: frozenset[str] | None = None, deadline: float | None = None
+    ) -> frozenset[str]:
+        """Wait for replies and return the expected keys without a reply.
 
         Args:
-            wanted: Keys whose replies to wait for; None waits until the query is finished.
+            expected_keys: Keys whose replies to wait for; None waits until the query is finished, and returns
+                an empty set.
             deadline: Time (`time.monotonic`) at which to stop waiting; None for the query's timeout.
         """
-        ends_at = self._ends_at if deadline is None else min(deadline, self._ends_at)
+        end_time = self._deadline if deadline is None else min(deadline, self._deadline)
         with self._changed:
             wait_until(
                 self._changed,
-                lambda: self._is_finished or (wanted is not None and wanted <= self.replies.keys()),
-                ends_at - time.monotonic(),
+                lambda: (
+                    self._is_finished or (expected_keys is not None and expected_keys <= self.replies.keys())
+                ),
+                end_time - time.monotonic(),
             )
-            return frozenset() if wanted is None else wanted - self.replies.keys()
+            return frozenset() if expected_keys is None else expected_keys - self.replies.keys()
 
 
 class ZenohSession:
@@ -145,11 +150,11 @@ class ZenohSession:
         self._zenoh_subscribers: dict[int, Any] = {}
         self._load = CpuLoad()
         self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-        self._opened = open_session_at(address, wait_s)
-        self.endpoints = self._opened.endpoints
-        self._zenoh: Any = self._opened.session
+        self._session = open_session_at(address, wait_s)
+        self.endpoints = self._session.endpoints
+        self._zenoh: Any = self._session.session
         try:
-            self._declared = (
+            self._declarations = (
                 self._zenoh.liveliness().declare_subscriber(
                     ALL_TOKENS_KEY, create_handler(self._handle_token), history=True
                 ),
@@ -209,7 +214,7 @@ class ZenohSession:
 
         After a reply, this node knows all earlier declarations of the replying node, and vice versa.
         """
-        if self._opened.rendezvous is None:
+        if self._session.rendezvous is None:
             self._sync_routers(timeout_s)
         query = self.send_query(ALL_CALLS_KEY, requests.Ping(), timeout_s)
         query.wait()
@@ -282,29 +287,29 @@ class ZenohSession:
 
     def _handle_token(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
-        alive = parse_token(str(sample.key_expr))
-        if alive is None:
+        token = parse_token(str(sample.key_expr))
+        if token is None:
             return
         is_present = sample.kind == load_zenoh().SampleKind.PUT
-        self.roster.update(alive, is_present=is_present)
-        record = alive.record
+        self.roster.update(token, is_present=is_present)
+        record = token.record
         if not isinstance(record, PublisherRecord):
             return
         if service_of(record.topic) is not None:
             for client in self._clients:
                 if client.record.topic == record.topic:
-                    client.servers_changed()
+                    client.handle_servers_changed()
             return
         for subscriber in self._subscribers:
             if subscriber.matches_topic(record.topic):
                 if is_present:
-                    subscriber.add_publisher(self.roster.remote_publisher(alive.node_id, record))
+                    subscriber.add_publisher(self.roster.remote_publisher(token.node_id, record))
                     self._start_handshake(record, subscriber)
                 else:
                     subscriber.mark_silent(record.id)
 
     def _start_handshake(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
-        # Greets a publisher that was created after its subscriber.
+        # Sends a hello to a publisher that was created after its subscriber.
         self.send_query(
             hello_key(record.topic, record.id),
             None,
@@ -318,11 +323,11 @@ class ZenohSession:
 
         Raises `NepError` while no router is connected.
         """
-        if self._opened.is_router_lost:
+        if self._session.is_router_lost:
             raise NepError(
-                _("no zenoh router replied at '{place}'; start it, and this node reconnects").format(
-                    place=",".join(self._opened.routers)
-                )
+                _(
+                    "no zenoh router replied at '{place}'; start the router, and this node will reconnect"
+                ).format(place=",".join(self._session.routers))
             )
         query = self.send_query(ALL_CALLS_KEY, requests.QueryGraph(), timeout_s)
         query.wait()
@@ -339,8 +344,10 @@ class ZenohSession:
             alive_ids = replied_ids | {each[0].id for each in members}
             for departed_id in self._graph.members.keys() - alive_ids:
                 self._graph.apply(requests.Leave(departed_id), 0, now, "")
-            silent = [requests.Join(node, 0, outs, ins) for node, outs, ins in members]
-            for request in (*silent, *(each for node_requests in request_lists for each in node_requests)):
+            joins = [
+                requests.Join(node, 0, publishers, subscribers) for node, publishers, subscribers in members
+            ]
+            for request in (*joins, *(each for node_requests in request_lists for each in node_requests)):
                 self._graph.apply(request, 0, now, "")
             return self._graph.view()
 
@@ -372,7 +379,7 @@ class ZenohSession:
         """Subscribe to the messages and announce the subscriber by declaring its liveliness token."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
-        for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
+        for remote in self._publishers_for(subscriber):  # messages before the handshake are queued
             subscriber.add_publisher(remote)
         key = pattern_data_key(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
@@ -405,23 +412,23 @@ class ZenohSession:
             for remote in self.roster.publishers_of(topic)
         )
 
-    def create_publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
+    def create_publisher(self, new_publisher: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
         """Create a publisher in this session.
 
         Args:
-            make: Called with the zenoh session; returns the publisher.
+            new_publisher: Called with the zenoh session; returns the publisher.
         """
-        return make(self._zenoh)
+        return new_publisher(self._zenoh)
 
     def discard(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
         """Remove a closed publisher or subscriber and undeclare its liveliness token."""
         with self._lock:
             self._publishers = tuple(entity for entity in self._publishers if entity is not closed)
             self._subscribers = tuple(entity for entity in self._subscribers if entity is not closed)
-            undeclared = [self._tokens.pop(closed, None)]
+            entities = [self._tokens.pop(closed, None)]
             if isinstance(closed, ZenohSubscriber):
-                undeclared.append(self._zenoh_subscribers.pop(closed.spec.id, None))
-        for entity in undeclared:
+                entities.append(self._zenoh_subscribers.pop(closed.spec.id, None))
+        for entity in entities:
             if entity is not None:
                 with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                     entity.undeclare()
@@ -496,7 +503,7 @@ class ZenohSession:
 
         Waits up to `timeout_s` seconds.
         """
-        self._opened.unregister()
+        self._session.unregister()
         with self._lock:
             tokens = list(self._tokens.values())
             self._tokens.clear()
@@ -516,9 +523,9 @@ def _parse_requests(key: str, reply: bytes) -> tuple[Request, ...]:
     if not isinstance(bodies, list) or not all(isinstance(each, bytes) for each in bodies):
         return ()
     decoded = [decode_request(each).request for each in bodies]
-    allowed = requests.Join | requests.Renew | requests.ReportMissing
+    allowed_types = requests.Join | requests.Renew | requests.ReportMissing
     return tuple(
         each
         for each in decoded
-        if isinstance(each, allowed) and key == call_key(requests.node_id_of(each) or "")
+        if isinstance(each, allowed_types) and key == call_key(requests.node_id_of(each) or "")
     )

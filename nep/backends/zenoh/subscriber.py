@@ -54,16 +54,18 @@ class ZenohSubscriber(WakingSubscriber):
         self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
     ) -> None:
         super().__init__(inboxes.changed)
-        batch = 0 if spec.sink is None else _BATCH_BYTES
+        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
         self.spec = spec
         self.ready: deque[Message] = deque()
         self.is_closed = False
         self._inboxes = inboxes
         self._on_close = on_close
-        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
+        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
         self._sources = PublisherTracker()
         self._rejections = RejectionCounter()
-        self._early = EarlyMessages[tuple[_TopicParser, list[bytes]]](self._sources, spec.max_messages)
+        self._early_messages = EarlyMessages[tuple[_TopicParser, list[bytes]]](
+            self._sources, spec.max_messages
+        )
         self._problem = ""
         self._own_parser = self._new_topic_parser(spec.topic)
         self._topic_parsers: OrderedDict[str, _TopicParser] = OrderedDict()
@@ -160,46 +162,46 @@ class ZenohSubscriber(WakingSubscriber):
         if topic_parser is not None:
             self._process(sample, topic_parser, topic_parser.subscriber_part)
 
-    def _process(self, sample: Any, topic_parser: _TopicParser, first: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _process(self, sample: Any, topic_parser: _TopicParser, first_part: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
         payload: bytes = sample.payload.to_bytes()
         attachment: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        rest = [attachment[:HEADER_BYTES]]
+        tail = [attachment[:HEADER_BYTES]]
         if (
             payload
-            or first == topic_parser.topic
+            or first_part == topic_parser.topic
             or len(attachment) > HEADER_BYTES
             or _is_latched(attachment)
         ):
-            rest.append(payload)
+            tail.append(payload)
         if len(attachment) > HEADER_BYTES:
-            rest.append(attachment[HEADER_BYTES:])
+            tail.append(attachment[HEADER_BYTES:])
         with self._inboxes.changed:
             if not self.is_closed:
-                self._process_parts_locked(topic_parser, first, rest)
+                self._process_parts_locked(topic_parser, first_part, tail)
 
-    def _process_parts_locked(self, topic_parser: _TopicParser, first: bytes, rest: list[bytes]) -> None:
+    def _process_parts_locked(self, topic_parser: _TopicParser, first_part: bytes, tail: list[bytes]) -> None:
         # Call with the lock of the inboxes held.
         try:
-            if not rest[0]:
+            if not tail[0]:
                 raise WireError(
-                    _("the message has no header; its publisher isn't a nep program"), len(rest[-1])
+                    _("the message has no header; its publisher isn't a nep program"), len(tail[-1])
                 )
             if (
-                first == topic_parser.topic
-                and _is_latched(rest[0])
-                and self._queue_if_early(topic_parser, rest)
+                first_part == topic_parser.topic
+                and _is_latched(tail[0])
+                and self._queue_if_early(topic_parser, tail)
             ):
                 return
-            self._enqueue(topic_parser.parser.parse(first, rest))
-            if first == topic_parser.subscriber_part and len(rest) == 1:  # end of the reply to a hello
-                self._deliver_early_messages(read_header(rest[0]).publisher)
+            self._enqueue(topic_parser.parser.parse(first_part, tail))
+            if first_part == topic_parser.subscriber_part and len(tail) == 1:  # end of the reply to a hello
+                self._deliver_early_messages(read_header(tail[0]).publisher)
         except WireError as error:
             if self._rejections.add(error.reason):
                 _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
 
-    def _queue_if_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:
-        header = read_header(rest[0])
-        is_early = self._early.queue_if_early(header, (topic_parser, rest), sum(map(len, rest)))
+    def _queue_if_early(self, topic_parser: _TopicParser, tail: list[bytes]) -> bool:
+        header = read_header(tail[0])
+        is_early = self._early_messages.queue_if_early(header, (topic_parser, tail), sum(map(len, tail)))
         if not is_early:  # messages queued before this one need not wait any longer, either
             self._deliver_early_messages(header.publisher)
         return is_early
@@ -210,8 +212,8 @@ class ZenohSubscriber(WakingSubscriber):
             self.notify_waiting()
 
     def _deliver_early_messages(self, publisher: int) -> None:
-        for topic_parser, rest in self._early.pop(publisher):
-            self._enqueue(topic_parser.parser.parse(topic_parser.topic, rest))
+        for topic_parser, tail in self._early_messages.pop(publisher):
+            self._enqueue(topic_parser.parser.parse(topic_parser.topic, tail))
 
     def end_handshake(self, publishers: Iterable[int]) -> None:
         """Stop waiting for the replies of these publishers to a hello, and deliver their queued messages."""
@@ -222,8 +224,8 @@ class ZenohSubscriber(WakingSubscriber):
     def add_publisher(self, remote: RemotePublisher) -> None:
         """Add a publisher or update its record; silent publishers that it replaces are removed."""
         with self._inboxes.changed:
-            for old in self._sources.replaced_publishers(remote):
-                self._sources.pop(old)
+            for replaced in self._sources.replaced_publishers(remote):
+                self._sources.pop(replaced)
             self._sources.add_listed(remote).is_silent = False
 
     def mark_silent(self, publisher: int) -> None:

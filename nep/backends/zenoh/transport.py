@@ -48,7 +48,7 @@ class ZenohTransport:
         self._node = node
         self._inboxes = Inboxes(node.name)
         self._lock = threading.Lock()
-        self._opening = threading.Lock()
+        self._open_lock = threading.Lock()
         self._sessions: dict[str, ZenohSession] = {}
         self._publishers: dict[ZenohPublisher, ZenohSession] = {}
         self._subscribers: dict[ZenohSubscriber, ZenohSession] = {}
@@ -152,21 +152,20 @@ class ZenohTransport:
                 _(
                     "the back end 'zenoh' doesn't support direct connections; omit the configuration (no "
                     "master is needed), or use master='tcp/192.168.1.5:7447' to connect to a router on "
-                    "another "
-                    "computer"
+                    "another computer"
                 )
             )
-        with self._opening:  # open only one session per place
+        with self._open_lock:  # open only one session per address
             with self._lock:
                 self._check_open_locked()
                 session = self._sessions.get(configuration.master)
             if session is None:
                 session = ZenohSession(self._node, configuration.master, wait_s)
                 with self._lock:
-                    is_late = self._is_closed
-                    if not is_late:
+                    is_closed = self._is_closed
+                    if not is_closed:
                         self._sessions[configuration.master] = session
-                if is_late:
+                if is_closed:
                     session.close(0.0)
                     raise ClosedError(f"node '{self._node.name}'")
         return session
@@ -203,19 +202,20 @@ class ZenohTransport:
             session = self._publishers.pop(publisher, None)
         if pending_flush is not None:
             expected_keys = frozenset(call_key(each.node_id) for each in pending_flush.expected)
-            silent = pending_flush.query.wait(expected_keys, deadline)
+            silent_keys = pending_flush.query.wait(expected_keys, deadline)
             listed_ids = {
                 each.id for each in pending_flush.session.roster.subscribers_of(publisher.spec.topic)
             }
-            undelivered = sum(
-                call_key(each.node_id) in silent and each.id in listed_ids for each in pending_flush.expected
+            undelivered_count = sum(
+                call_key(each.node_id) in silent_keys and each.id in listed_ids
+                for each in pending_flush.expected
             )
-            if undelivered:
+            if undelivered_count:
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
                     publisher.spec.topic,
-                    undelivered,
+                    undelivered_count,
                     publisher.count,
                 )
         publisher.release()
@@ -274,7 +274,7 @@ class ZenohTransport:
             self._wait_for_flush(publisher, deadline)
         self._services.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
         self._inboxes.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
-        with self._opening:
+        with self._open_lock:
             sessions = list(self._sessions.values())
         for session in sessions:
             session.close(min(_CLOSE_TIMEOUT_S, timeout_s))

@@ -64,7 +64,7 @@ def unix_socket_name(endpoint: str) -> str:
     )
 
 
-def _bind_unix_socket(owner: Socket, endpoint: str) -> str:
+def _bind_unix_socket(zmq_socket: Socket, endpoint: str) -> str:
     name = (
         unix_socket_name(endpoint)
         if has_unix_sockets()
@@ -74,7 +74,7 @@ def _bind_unix_socket(owner: Socket, endpoint: str) -> str:
     )
     if name:
         try:
-            owner.bind(name)
+            zmq_socket.bind(name)
         except zmq.ZMQError as error:
             _logger.debug("can't bind '%s': %s", name, error)
             return ""
@@ -118,27 +118,30 @@ class Bindings:
 
     Args:
         socket: Socket to bind.
-        may_be_local: True to bind Unix sockets as well.
-        is_watched: True if the owner itself closes connections that don't respond; see `enable_keep_alive`.
+        may_bind_unix_sockets: True to bind Unix sockets as well.
+        has_silence_check: True if the owner itself closes connections that don't respond; see
+            `enable_keep_alive`.
     """
 
-    def __init__(self, socket: Socket, *, may_be_local: bool, is_watched: bool = False) -> None:
+    def __init__(
+        self, socket: Socket, *, may_bind_unix_sockets: bool, has_silence_check: bool = False
+    ) -> None:
         self._socket = socket
-        self._may_be_local = may_be_local
-        self._is_watched = is_watched
-        self._bound: dict[str, str] = {}
-        self._local: dict[str, str] = {}
+        self._may_bind_unix_sockets = may_bind_unix_sockets
+        self._has_silence_check = has_silence_check
+        self._endpoints_by_host: dict[str, str] = {}
+        self._unix_sockets_by_host: dict[str, str] = {}
         """Names of the bound Unix sockets, by host."""
 
     @property
     def is_local(self) -> bool:
         """True if a Unix socket is bound in addition to the loopback endpoint."""
-        return bool(self._local)
+        return bool(self._unix_sockets_by_host)
 
     @property
     def endpoints(self) -> tuple[str, ...]:
         """All bound endpoints."""
-        return (*self._bound.values(), *self._local.values())
+        return (*self._endpoints_by_host.values(), *self._unix_sockets_by_host.values())
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind these hosts and unbind all others; return the endpoints in the order of `hosts`.
@@ -146,31 +149,34 @@ class Bindings:
         Each host gets its own port. Hosts that can't be bound are skipped. If none of them can be
         bound, raises `AddressInUseError` or `TooManyFilesError`.
         """
-        for host in [bound_host for bound_host in self._bound if bound_host not in hosts]:
+        for host in [bound_host for bound_host in self._endpoints_by_host if bound_host not in hosts]:
             self._unbind_host(host)
-        problem: AddressInUseError | TooManyFilesError | None = None
+        last_error: AddressInUseError | TooManyFilesError | None = None
         for host in hosts:
-            if host not in self._bound:
+            if host not in self._endpoints_by_host:
                 try:
-                    enable_keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
-                    self._bound[host] = bind_free_port(self._socket, host)
-                    name = _bind_unix_socket(self._socket, self._bound[host]) if self._may_be_local else ""
+                    enable_keep_alive(
+                        self._socket, endpoint_of(f"{host}:*"), has_silence_check=self._has_silence_check
+                    )
+                    self._endpoints_by_host[host] = endpoint = bind_free_port(self._socket, host)
+                    name = _bind_unix_socket(self._socket, endpoint) if self._may_bind_unix_sockets else ""
                     if name:
-                        self._local[host] = name
+                        self._unix_sockets_by_host[host] = name
                 except (AddressInUseError, TooManyFilesError) as error:
-                    problem = error
-        if problem is not None and not self._bound:
-            raise problem
-        return tuple(self._bound[host] for host in hosts if host in self._bound)
+                    last_error = error
+        if last_error is not None and not self._endpoints_by_host:
+            raise last_error
+        return tuple(self._endpoints_by_host[host] for host in hosts if host in self._endpoints_by_host)
 
     def unbind_local(self) -> None:
         """Unbind the Unix sockets; existing connections stay open."""
-        for name in self._local.values():
+        for name in self._unix_sockets_by_host.values():
             self._unbind(name)
-        self._local.clear()
+        self._unix_sockets_by_host.clear()
 
     def _unbind_host(self, host: str) -> None:
-        for endpoint in filter(None, (self._bound.pop(host), self._local.pop(host, ""))):
+        endpoints = self._endpoints_by_host.pop(host), self._unix_sockets_by_host.pop(host, "")
+        for endpoint in filter(None, endpoints):
             self._unbind(endpoint)
 
     def _unbind(self, endpoint: str) -> None:

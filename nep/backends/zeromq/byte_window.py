@@ -39,8 +39,8 @@ class SendWindow:
     def __init__(self) -> None:
         self.unacked_bytes = 0
         """Total size of the unacknowledged messages."""
-        self._bound = WINDOW_BYTES
-        self._sent: deque[tuple[int, int]] = deque()
+        self._window_bytes = WINDOW_BYTES
+        self._unacked: deque[tuple[int, int]] = deque()
         self._bytes_since_request = 0
         self._requested_at = float("-inf")
         self._has_drops = False
@@ -50,7 +50,9 @@ class SendWindow:
 
         A message larger than the window is sent when the window is almost empty.
         """
-        return self.unacked_bytes <= ACK_INTERVAL_BYTES or self.unacked_bytes + size_bytes <= self._bound
+        return (
+            self.unacked_bytes <= ACK_INTERVAL_BYTES or self.unacked_bytes + size_bytes <= self._window_bytes
+        )
 
     def add_sent(self, seq: int, size_bytes: int) -> None:
         """Add sent bytes to the window.
@@ -59,10 +61,10 @@ class SendWindow:
             seq: Sequence number of the newest message that the bytes belong to.
             size_bytes: Number of bytes sent since the previous call.
         """
-        if self._sent and self._sent[-1][1] + size_bytes <= _MAX_ENTRY_BYTES:
-            self._sent.append((seq, self._sent.pop()[1] + size_bytes))
+        if self._unacked and self._unacked[-1][1] + size_bytes <= _MAX_ENTRY_BYTES:
+            self._unacked.append((seq, self._unacked.pop()[1] + size_bytes))
         else:
-            self._sent.append((seq, size_bytes))
+            self._unacked.append((seq, size_bytes))
         self.unacked_bytes += size_bytes
         self._bytes_since_request += size_bytes
 
@@ -80,16 +82,16 @@ class SendWindow:
         self._has_drops = False
         return True
 
-    def acknowledge(self, seq: int, bound_bytes: int) -> None:
+    def acknowledge(self, seq: int, window_bytes: int) -> None:
         """Handle an acknowledgement.
 
         Args:
             seq: Sequence number up to which all messages are acknowledged.
-            bound_bytes: Window requested by the subscriber, in bytes.
+            window_bytes: Window requested by the subscriber, in bytes.
         """
-        self._bound = max(MIN_WINDOW_BYTES, min(bound_bytes, WINDOW_BYTES))
-        while self._sent and self._sent[0][0] <= seq:
-            self.unacked_bytes -= self._sent.popleft()[1]
+        self._window_bytes = max(MIN_WINDOW_BYTES, min(window_bytes, WINDOW_BYTES))
+        while self._unacked and self._unacked[0][0] <= seq:
+            self.unacked_bytes -= self._unacked.popleft()[1]
 
     def should_request_ack(self, now: float, *, has_room: bool) -> bool:
         """Return True if an acknowledgement should be requested now, and restart the retry interval.

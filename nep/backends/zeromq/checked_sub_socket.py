@@ -43,7 +43,7 @@ class CheckedSubSocket(SubSocket):
             if self._is_authentic(parts):
                 self._pending_parts = parts
             else:
-                self.rejections.add(_("a message wasn't sent by the publisher that it names"))
+                self.rejections.add(_("a message contains the id of a publisher that didn't send it"))
         frame = self._pending_parts.pop(0)
         return frame.bytes if copy else frame
 
@@ -51,9 +51,9 @@ class CheckedSubSocket(SubSocket):
         return bool(self._pending_parts)
 
     def _is_authentic(self, parts: list[zmq.Frame]) -> bool:
-        first = parts[0].bytes
-        if len(first) >= self._payload_offset and first.startswith(self._topic):
-            publisher = unpack_header_at(first, self._topic_length)[-1]
+        first_part = parts[0].bytes
+        if len(first_part) >= self._payload_offset and first_part.startswith(self._topic):
+            publisher = unpack_header_at(first_part, self._topic_length)[-1]
         elif len(parts) > 1 and len(parts[1]) == HEADER_BYTES:
             publisher = unpack_header(parts[1].bytes)[-1]
         else:

@@ -70,12 +70,12 @@ class PollState(NamedTuple):
     """Conditions under which the I/O thread serves an owner again.
 
     Attributes:
-        pause_reading: True to ignore input until `due`.
+        is_reading_paused: True to ignore input until `due`.
         due: Time (`time.monotonic`) at which to serve the owner; None to wait for input only.
         wants_write: True to serve the owner also when its descriptor is writable. Not for ZeroMQ sockets.
     """
 
-    pause_reading: bool = False
+    is_reading_paused: bool = False
     due: float | None = None
     wants_write: bool = False
 
@@ -107,7 +107,7 @@ class IoThread:
         self._selector = new_selector()
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
         self._commands: deque[tuple[str, Pollable, threading.Event | None]] = deque()
-        self._served: set[Pollable] = set()
+        self._pollables: set[Pollable] = set()
         self._polled: dict[Pollable, tuple[int, int]] = {}
         """Registered descriptor and event mask of each owner."""
         self._suspects: set[Pollable] = set()
@@ -128,25 +128,25 @@ class IoThread:
         """Start the thread."""
         self._thread.start()
 
-    def add(self, served: Pollable) -> None:
-        """Start serving `served`: once immediately, then on input. May be called before `start`."""
-        self._queue_command("add", served, None)
+    def add(self, pollable: Pollable) -> None:
+        """Start serving `pollable`: once immediately, then on input. May be called before `start`."""
+        self._queue_command("add", pollable, None)
 
-    def serve_soon(self, served: Pollable) -> None:
-        """Serve `served` again as soon as possible, even if its descriptor is not ready."""
-        self._queue_command("soon", served, None)
+    def serve_soon(self, pollable: Pollable) -> None:
+        """Serve `pollable` again as soon as possible, even if its descriptor is not ready."""
+        self._queue_command("soon", pollable, None)
 
-    def remove(self, served: Pollable, timeout_s: float = 2.0) -> None:
-        """Stop serving `served`, whose socket may be closed afterwards.
+    def remove(self, pollable: Pollable, timeout_s: float = 2.0) -> None:
+        """Stop serving `pollable`, whose socket may be closed afterwards.
 
         Waits up to `timeout_s` seconds for the thread. If a sink blocks the thread, only the first call
         waits.
         """
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            self._unregister(served)
+            self._unregister(pollable)
             return
         done = threading.Event()
-        self._queue_command("remove", served, done)
+        self._queue_command("remove", pollable, done)
         if self._stuck_iteration != self._iteration and not done.wait(timeout_s):
             self._stuck_iteration = self._iteration
 
@@ -164,12 +164,12 @@ class IoThread:
         """Mark the thread as closed in a forked child process, where the thread doesn't exist."""
         self._is_closing = True
         self._pause = threading.Event()
-        self._served.clear()
+        self._pollables.clear()
         self._commands.clear()
         self._selector.close()
 
-    def _queue_command(self, command: str, served: Pollable, done: threading.Event | None) -> None:
-        self._commands.append((command, served, done))
+    def _queue_command(self, command: str, pollable: Pollable, done: threading.Event | None) -> None:
+        self._commands.append((command, pollable, done))
         self._waker.wake()
 
     # ---- in the I/O thread
@@ -184,7 +184,7 @@ class IoThread:
                     _logger.exception("polling failed; rebuilding the poller")
                     self._rebuild_poller()
         self._release()
-        for _what, _served, done in self._commands:
+        for _command, _pollable, done in self._commands:
             if done is not None:
                 done.set()
 
@@ -196,7 +196,7 @@ class IoThread:
             self._waker.clear()
         self._run_commands()
         for key, _events in ready:
-            if isinstance(key.data, tuple) and key.data[0] in self._served:
+            if isinstance(key.data, tuple) and key.data[0] in self._pollables:
                 self._serve(key.data[0])
         self._serve_due()
 
@@ -212,101 +212,101 @@ class IoThread:
                 _logger.exception("can't poll the sockets of this program; retrying")
                 self._pause.wait(_RETRY_S)
                 continue
-            self._suspects = set(self._served)
-            for served in tuple(self._served):
-                self._serve(served)
+            self._suspects = set(self._pollables)
+            for pollable in tuple(self._pollables):
+                self._serve(pollable)
             return
 
     def _run_commands(self) -> None:
         while self._commands:
-            command, served, done = self._commands.popleft()
+            command, pollable, done = self._commands.popleft()
             if command == "remove":
-                self._unregister(served)
+                self._unregister(pollable)
             else:
                 if command == "add":
-                    self._served.add(served)
-                if served in self._served:
-                    self._serve(served)
+                    self._pollables.add(pollable)
+                if pollable in self._pollables:
+                    self._serve(pollable)
             if done is not None:
                 done.set()
 
-    def _serve(self, served: Pollable) -> None:
+    def _serve(self, pollable: Pollable) -> None:
         now = time.monotonic()
         try:
-            rest = served.serve(now)
+            state = pollable.serve(now)
         except Exception:  # one broken socket must not block the others
             _logger.exception("error while serving a socket; retrying")
-            rest = PollState(pause_reading=True, due=now + _RETRY_S)
-        if served not in self._served or self._is_closing:
+            state = PollState(is_reading_paused=True, due=now + _RETRY_S)
+        if pollable not in self._pollables or self._is_closing:
             return  # removed while it was served
         try:
-            self._update_registration(served, _event_mask(rest))
+            self._update_registration(pollable, _event_mask(state))
         except (OSError, ValueError, KeyError) as error:
             _logger.error("can't poll a socket, serving it every second instead: %s", error)  # noqa: TRY400
-            self._polled.pop(served, None)
-            self._suspects.add(served)
-            rest = PollState(pause_reading=True, due=now + _RETRY_S)
-        if rest.due is None:
-            self._wake_times.pop(served, None)
-        elif self._wake_times.get(served) != rest.due:
-            self._wake_times[served] = rest.due
-            heapq.heappush(self._timers, (rest.due, next(self._numbers), served))
+            self._polled.pop(pollable, None)
+            self._suspects.add(pollable)
+            state = PollState(is_reading_paused=True, due=now + _RETRY_S)
+        if state.due is None:
+            self._wake_times.pop(pollable, None)
+        elif self._wake_times.get(pollable) != state.due:
+            self._wake_times[pollable] = state.due
+            heapq.heappush(self._timers, (state.due, next(self._numbers), pollable))
 
     def _serve_due(self) -> None:
         now = time.monotonic()
-        late: list[Pollable] = []
+        due_pollables: list[Pollable] = []
         while self._timers and self._timers[0][0] <= now:
-            due, _number, served = heapq.heappop(self._timers)
-            if self._wake_times.get(served) == due:  # otherwise it was rescheduled
-                del self._wake_times[served]
-                late.append(served)
-        for served in late:
-            if served in self._served:
-                self._serve(served)
+            due, _number, pollable = heapq.heappop(self._timers)
+            if self._wake_times.get(pollable) == due:  # otherwise it was rescheduled
+                del self._wake_times[pollable]
+                due_pollables.append(pollable)
+        for pollable in due_pollables:
+            if pollable in self._pollables:
+                self._serve(pollable)
 
     def _timeout(self) -> float | None:
         while self._timers and self._wake_times.get(self._timers[0][2]) != self._timers[0][0]:
             heapq.heappop(self._timers)
         return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
 
-    def _probe(self, served: Pollable, mask: int) -> None:
+    def _probe(self, pollable: Pollable, mask: int) -> None:
         # Windows' select reports a broken descriptor only while polling, and then for all descriptors.
-        with self._new_selector() as trial:
-            trial.register(served.fd, mask)
-            trial.select(0)
-        self._suspects.discard(served)
+        with self._new_selector() as selector:
+            selector.register(pollable.fd, mask)
+            selector.select(0)
+        self._suspects.discard(pollable)
 
-    def _update_registration(self, served: Pollable, mask: int) -> None:
-        polled = self._polled.get(served)
+    def _update_registration(self, pollable: Pollable, mask: int) -> None:
+        polled = self._polled.get(pollable)
         if polled is None:
             if mask:
-                if served in self._suspects:
-                    self._probe(served, mask)
-                self._selector.register(served.fd, mask, (served,))
-                self._polled[served] = (served.fd, mask)
+                if pollable in self._suspects:
+                    self._probe(pollable, mask)
+                self._selector.register(pollable.fd, mask, (pollable,))
+                self._polled[pollable] = (pollable.fd, mask)
         elif not mask:
-            del self._polled[served]
+            del self._polled[pollable]
             self._selector.unregister(polled[0])
         elif mask != polled[1]:
-            self._selector.modify(polled[0], mask, (served,))
-            self._polled[served] = (polled[0], mask)
+            self._selector.modify(polled[0], mask, (pollable,))
+            self._polled[pollable] = (polled[0], mask)
 
-    def _unregister(self, served: Pollable) -> None:
-        self._served.discard(served)
-        self._suspects.discard(served)
-        self._wake_times.pop(served, None)
-        if served in self._polled:
+    def _unregister(self, pollable: Pollable) -> None:
+        self._pollables.discard(pollable)
+        self._suspects.discard(pollable)
+        self._wake_times.pop(pollable, None)
+        if pollable in self._polled:
             with suppress(OSError, ValueError, KeyError):  # the poller is closed or was rebuilt
-                self._update_registration(served, 0)
+                self._update_registration(pollable, 0)
 
     def _release(self) -> None:
         self._selector.close()
         self._waker.close()
 
 
-def _event_mask(rest: PollState) -> int:
-    return (0 if rest.pause_reading else selectors.EVENT_READ) | (
-        selectors.EVENT_WRITE if rest.wants_write else 0
+def _event_mask(state: PollState) -> int:
+    return (0 if state.is_reading_paused else selectors.EVENT_READ) | (
+        selectors.EVENT_WRITE if state.wants_write else 0
     )
 
 
@@ -337,7 +337,7 @@ class SharedContext:
         self._idle_wakers: list[Waker] = []
         self._pause = threading.Event()
         self._is_terminated = False
-        self.users = 0
+        self.user_count = 0
         """Number of users. Guarded by the module's lock."""
         try:
             self.io.start()
@@ -345,11 +345,11 @@ class SharedContext:
             self.io.close()
             raise
 
-    def socket(self, kind: int, owner: str) -> Socket:
+    def socket(self, socket_type: int, owner: str) -> Socket:
         """Create a socket with a linger of 0.
 
         Args:
-            kind: Socket type of zmq.
+            socket_type: Socket type of zmq.
             owner: Owner of the socket, for error messages.
 
         Raises:
@@ -358,15 +358,15 @@ class SharedContext:
         """
         self._wait_for_room(owner)
         try:
-            created = self._context.socket(kind)
+            socket = self._context.socket(socket_type)
         except zmq.ZMQError as error:
             if is_descriptor_shortage(error.errno):
                 raise TooManyFilesError(owner, open_descriptor_count(), descriptor_limit()) from error
             if self._context.closed:
                 raise ClosedError("the node") from error
             raise
-        created.setsockopt(zmq.LINGER, 0)
-        return created
+        socket.setsockopt(zmq.LINGER, 0)
+        return socket
 
     def _wait_for_room(self, owner: str) -> None:
         # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
@@ -396,7 +396,7 @@ class SharedContext:
     def acquire(self) -> None:
         """Add a user, so that the context isn't terminated before the matching `release`."""
         with _lock:
-            self.users += 1
+            self.user_count += 1
 
     def release(self) -> None:
         """Remove a user, which must have closed all its sockets before.
@@ -404,8 +404,8 @@ class SharedContext:
         The last user stops the thread and terminates the context.
         """
         with _lock:
-            self.users -= 1
-            if self.users:
+            self.user_count -= 1
+            if self.user_count:
                 return
             _discard_shared(self)
         self.io.close()
@@ -418,14 +418,8 @@ class SharedContext:
 
 
 _lock = threading.Lock()
-
-
 _shared_context: SharedContext | None = None
-
-
 _inherited_contexts: list[SharedContext] = []
-
-
 """Contexts inherited by a forked child process.
 
 Never destroyed, because destroying them would affect the parent process.
@@ -441,13 +435,13 @@ def shared_context() -> SharedContext:
     with _lock:
         if _shared_context is None:
             _shared_context = SharedContext()
-        _shared_context.users += 1
+        _shared_context.user_count += 1
         return _shared_context
 
 
-def _discard_shared(terminated: SharedContext) -> None:
+def _discard_shared(context: SharedContext) -> None:
     global _shared_context  # noqa: PLW0603 - one per process
-    if _shared_context is terminated:
+    if _shared_context is context:
         _shared_context = None
 
 

@@ -116,9 +116,9 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
     if direct.mode == "many2many":
         # both sides connect, to the two ports of the original NEP's proxy
         return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
-    binds = is_publisher == (direct.mode == "one2many")
+    should_bind = is_publisher == (direct.mode == "one2many")
     address = f"{direct.ip}:{direct.port}"
-    return bind(socket, address) if binds else connect(socket, address)
+    return bind(socket, address) if should_bind else connect(socket, address)
 
 
 class OriginalPublisher:
@@ -205,9 +205,9 @@ class OriginalPublisher:
         if self._untracked_bytes < TRACKING_INTERVAL_BYTES:
             self._socket.send(frame, zmq.DONTWAIT)
             return
-        tracked = zmq.Frame(frame, track=True, copy=False, copy_threshold=0)
-        self._socket.send(tracked, zmq.DONTWAIT)
-        self._backlog.add_sent(tracked.tracker, self._untracked_bytes)
+        tracked_frame = zmq.Frame(frame, track=True, copy=False, copy_threshold=0)
+        self._socket.send(tracked_frame, zmq.DONTWAIT)
+        self._backlog.add_sent(tracked_frame.tracker, self._untracked_bytes)
         self._untracked_bytes = 0
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
@@ -294,7 +294,7 @@ class OriginalSubSocket(UnbatchedReader):
         """True if a message can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message of the topic, or None if there is none. See `Readable.read`."""
         while True:
             try:

@@ -34,8 +34,8 @@ class TrackedPublisher:
 
     Attributes:
         form: Header form of the publisher's last message, to which `kind` belongs; 0 if there is none.
-        last: Sequence number of the newest message that was received or counted as lost; None if unknown. 0
-            if all messages of the publisher are expected.
+        last: Sequence number of the newest message that was received or counted as lost. None if unknown; 0
+            before the first message, if all messages of the publisher are expected.
     """
 
     form: int = 0
@@ -248,30 +248,30 @@ class PublisherTracker:
         self.received -= count
         self.lost += count
 
-    def mark_closing(self, publisher: int, final: int, now: float) -> None:
+    def mark_closing(self, publisher: int, last_seq: int, now: float) -> None:
         """Record that a publisher was unregistered or replaced.
 
         Args:
             publisher: Id of the publisher.
-            final: Sequence number of its last message, 0 if unknown.
+            last_seq: Sequence number of its last message, 0 if unknown.
             now: Current time (`time.monotonic`).
         """
         source = self.by_id.get(publisher)
         if source is not None and source.bye_deadline is None:
             source.bye_deadline = now + BYE_TIMEOUT_S
-            source.announced_seq = max(source.announced_seq, final)
+            source.announced_seq = max(source.announced_seq, last_seq)
 
-    def mark_silent(self, publisher: int, final: int) -> None:
+    def mark_silent(self, publisher: int, last_seq: int) -> None:
         """Record that the master no longer lists a publisher.
 
         Args:
             publisher: Id of the publisher.
-            final: Sequence number of the newest message known to the master.
+            last_seq: Sequence number of the newest message known to the master.
         """
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_silent = True
-            source.announced_seq = max(source.announced_seq, final)
+            source.announced_seq = max(source.announced_seq, last_seq)
 
     def count_missing(self, publisher: int) -> None:
         """Count the missing messages of a publisher as lost. Call before removing the publisher."""
@@ -286,11 +286,11 @@ class PublisherTracker:
         beyond `MAX_UNLISTED_PUBLISHERS`.
         """
         sources = self.by_id.items()
-        silent = [each for each, source in sources if source.is_silent and source.bye_deadline is None]
-        overdue = [
+        silent_ids = [each for each, source in sources if source.is_silent and source.bye_deadline is None]
+        overdue_ids = [
             each for each, source in sources if source.bye_deadline is not None and now >= source.bye_deadline
         ]
-        return silent[: max(0, len(silent) - MAX_UNLISTED_PUBLISHERS)] + overdue
+        return silent_ids[: max(0, len(silent_ids) - MAX_UNLISTED_PUBLISHERS)] + overdue_ids
 
     def unresponsive_publishers(self, now: float) -> list[int]:
         """Return the ids of publishers from which nothing was received before the reconnection time."""

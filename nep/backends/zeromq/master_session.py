@@ -70,7 +70,7 @@ _ADDRESS_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for checking whether the publishers must bind other addresses."""
 _JOIN_RETRY_S = 0.5
 _RECONNECT_S, _RECONNECT_REMOTE_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
-"""Reconnection intervals for a master on this and on another computer.
+"""Reconnection intervals in seconds for a master on this and on another computer.
 
 libzmq gives up after a failed handshake, for example with a PUB socket at the master's address.
 """
@@ -102,12 +102,12 @@ class SessionSubscriber(Protocol):
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to publishers in addition to the existing ones."""
 
-    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
+    def handle_publisher_removed(self, publisher: int, last_seq: int, *, is_closed: bool) -> None:
         """Handle the removal of a publisher.
 
         Args:
             publisher: Id of the publisher.
-            final: Sequence number of its last message, 0 if unknown.
+            last_seq: Sequence number of its last message, 0 if unknown.
             is_closed: True if the publisher unregistered, False if its node doesn't respond.
         """
 
@@ -135,24 +135,24 @@ class RenewalTimer:
 
     def __init__(self) -> None:
         self.due_at = 0.0
-        self._renew_s = RENEW_INTERVAL_S
+        self._interval_s = RENEW_INTERVAL_S
 
     def start(self, now: float) -> None:
         """Record a renewal sent at `now` (`time.monotonic`) and schedule the next one.
 
         The next renewal takes place even if the master doesn't reply.
         """
-        self.due_at = now + self._renew_s
+        self.due_at = now + self._interval_s
 
-    def set_interval(self, renew_s: float, now: float) -> None:
+    def set_interval(self, interval_s: float, now: float) -> None:
         """Set the interval that the master requests.
 
         Args:
-            renew_s: Interval in seconds.
+            interval_s: Interval in seconds.
             now: Current time (`time.monotonic`).
         """
-        self._renew_s = min(_MAX_RENEW_INTERVAL_S, max(RENEW_INTERVAL_S, renew_s))
-        self.due_at = now + self._renew_s
+        self._interval_s = min(_MAX_RENEW_INTERVAL_S, max(RENEW_INTERVAL_S, interval_s))
+        self.due_at = now + self._interval_s
 
 
 class MasterSession:
@@ -181,7 +181,7 @@ class MasterSession:
         self._lock = threading.Lock()
         self._publishers: dict[int, tuple[PublisherRecord, SessionPublisher]] = {}
         self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]] = {}
-        self._confirmed: set[int] = set()
+        self._confirmed_ids: set[int] = set()
         self._epoch, self._revision = 0, 0
         self._join_retry_at = 0.0
         self._renewal_timer = RenewalTimer()
@@ -189,7 +189,7 @@ class MasterSession:
         self._was_connected = False
         self._is_closed = False
         self._leave_request: PendingRequest | None = None
-        self._leave_sent_s = 0.0
+        self._leave_sent_at = 0.0
         self._is_master_local = is_loopback(address)
         self._reconnect_s = _RECONNECT_S if self._is_master_local else _RECONNECT_REMOTE_S
         self._reconnect_at = time.monotonic() + self._reconnect_s
@@ -200,11 +200,11 @@ class MasterSession:
             self._set_address(self._resolver.address)
         self._resolver.resolve(time.monotonic())
         self._bound_hosts = self.hosts
-        self._connected_from = self._own_host
+        self._connected_host = self._own_host
         self._load = CpuLoad()
         self._clock = ClockSamples()
         self._read_at = self._clock.now()
-        self._clocks: Mapping[str, ClockDifference] = {}
+        self._clock_differences: Mapping[str, ClockDifference] = {}
         self.fd = self._client.fd
 
     @property
@@ -263,16 +263,15 @@ class MasterSession:
             self.remove_publisher(record.id, 0)
             raise
         with self._lock:
-            self._confirmed.add(record.id)
+            self._confirmed_ids.add(record.id)
         added = reply if isinstance(reply, AddedReply) else AddedReply(reply.epoch, reply.revision)
-        self._served_hosts = (
-            added.hosts
-        )  # the first registration returns the addresses that the master serves
+        # the first registration returns the addresses that the master serves
+        self._served_hosts = added.hosts
         endpoints = publisher.move(self.hosts)
         if endpoints == record.endpoints or not endpoints:
             return added
-        moved = replace(record, endpoints=endpoints, local=publisher.is_local)
-        return self.add_publisher(moved, publisher, wait_s)
+        moved_record = replace(record, endpoints=endpoints, local=publisher.is_local)
+        return self.add_publisher(moved_record, publisher, wait_s)
 
     def add_subscriber(
         self,
@@ -292,7 +291,7 @@ class MasterSession:
             self.remove_subscriber(record.id)
             raise
         with self._lock:
-            self._confirmed.add(record.id)
+            self._confirmed_ids.add(record.id)
         if not isinstance(reply, FoundReply):
             return FoundReply(reply.epoch, reply.revision)
         return replace(reply, publishers=self._select_endpoints(reply.publishers))
@@ -306,7 +305,7 @@ class MasterSession:
         """
         with self._lock:
             removed = self._publishers.pop(publisher, None)
-            self._confirmed.discard(publisher)
+            self._confirmed_ids.discard(publisher)
         if removed is not None:
             self._client.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
@@ -314,7 +313,7 @@ class MasterSession:
         """Unregister a subscriber by its id, without waiting."""
         with self._lock:
             removed = self._subscribers.pop(subscriber, None)
-            self._confirmed.discard(subscriber)
+            self._confirmed_ids.discard(subscriber)
         if removed is not None:
             self._client.notify(RemoveSubscriber(self._node.id, subscriber))
 
@@ -343,16 +342,16 @@ class MasterSession:
         with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
-            self._confirmed.clear()
+            self._confirmed_ids.clear()
         if self._epoch != 0 and self._client.is_connected:
             self._leave_request = self._client.send_request(Leave(self._node.id))
-            self._leave_sent_s = time.monotonic()
+            self._leave_sent_at = time.monotonic()
 
     def finish_leave(self, timeout_s: float) -> None:
         """Wait for the reply to the request of `start_leave`, until `timeout_s` seconds after it was sent."""
         if self._leave_request is None:
             return
-        remaining_s = timeout_s + self._leave_sent_s - time.monotonic()
+        remaining_s = timeout_s + self._leave_sent_at - time.monotonic()
         try:
             self._client.wait(self._leave_request, max(0.0, remaining_s))
         except (MasterUnreachable, RequestRefusedError, ClosedError):
@@ -401,32 +400,34 @@ class MasterSession:
             self._client.reconnect()
 
     def _update_addresses(self) -> None:
-        # Publishers move when this computer's address or the master changes, or when descriptors run out.
+        # Rebinds the publishers when this computer's address or the master changes, or descriptors run out.
         if not self._is_master_local and self._resolver.address:
             self._own_host = local_address_towards(self._resolver.address) or self._own_host
             self._reconnect_from(self._own_host)
-        is_cramped = not has_room_for_unix_sockets()
-        if self.hosts == self._bound_hosts and not is_cramped:
+        is_short_of_descriptors = not has_room_for_unix_sockets()
+        if self.hosts == self._bound_hosts and not is_short_of_descriptors:
             return
         self._bound_hosts = self.hosts
         with self._lock:
-            for id, (record, publisher) in self._publishers.items():
-                if is_cramped:
+            for member_id, (record, publisher) in self._publishers.items():
+                if is_short_of_descriptors:
                     publisher.unbind_local()
                 try:
-                    moved = replace(record, endpoints=publisher.move(self.hosts), local=publisher.is_local)
+                    moved_record = replace(
+                        record, endpoints=publisher.move(self.hosts), local=publisher.is_local
+                    )
                 except (AddressInUseError, TooManyFilesError):
                     self._bound_hosts = ()  # try again at the next renewal
                     continue
-                if moved != record and moved.endpoints:
-                    self._publishers[id] = (moved, publisher)
-                    if id in self._confirmed:
-                        self._client.notify(AddPublisher(self._node, moved))
+                if moved_record != record and moved_record.endpoints:
+                    self._publishers[member_id] = (moved_record, publisher)
+                    if member_id in self._confirmed_ids:
+                        self._client.notify(AddPublisher(self._node, moved_record))
 
     def _reconnect_from(self, host: str) -> None:
         # Connections from the old address would stay silent for many seconds.
-        before, self._connected_from = self._connected_from, host
-        if before in {host, LOOPBACK}:  # `LOOPBACK`: not known before
+        old_host, self._connected_host = self._connected_host, host
+        if old_host in {host, LOOPBACK}:  # `LOOPBACK`: not known before
             return
         self._client.reconnect()
         self._was_connected = False
@@ -453,9 +454,11 @@ class MasterSession:
 
     def _handle_publisher_added(self, added: PublisherAdded) -> None:
         remotes = self._select_endpoints((added.publisher,))
-        can_be_heard = any(is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints)
+        has_valid_endpoint = any(
+            is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints
+        )
         for subscriber in self._subscribers_of(added.publisher.publisher.topic):
-            if added.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
+            if added.is_new and has_valid_endpoint and isinstance(subscriber, NativeSubscriber):
                 subscriber.expect_all_messages(added.publisher.publisher.id)
             subscriber.connect(remotes)
 
@@ -465,7 +468,7 @@ class MasterSession:
                 if isinstance(pattern_subscriber, PatternSubscriber):
                     pattern_subscriber.record_early_close(removed.id)
         for subscriber in self._subscribers_of(removed.topic, may_create=False):
-            subscriber.publisher_removed(removed.id, removed.last_seq, is_closed=removed.is_closed)
+            subscriber.handle_publisher_removed(removed.id, removed.last_seq, is_closed=removed.is_closed)
 
     def _renew(self) -> None:
         if self._epoch == 0:
@@ -475,10 +478,12 @@ class MasterSession:
             self._update_clocks({})  # also after the clock of this computer was set
         with self._lock:
             publishers = [
-                publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed
+                publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed_ids
             ]
             subscribers = [
-                subscriber for each, (_, subscriber) in self._subscribers.items() if each in self._confirmed
+                subscriber
+                for each, (_, subscriber) in self._subscribers.items()
+                if each in self._confirmed_ids
             ]
             request = Renew(
                 self._node.id,
@@ -491,14 +496,14 @@ class MasterSession:
             )
             self._client.notify(request, callback=partial(self._add_clock_sample, self._clock.now()))
 
-    def _add_clock_sample(self, sent: Moment, reply: Reply) -> None:
+    def _add_clock_sample(self, sent_at: Moment, reply: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
         if not isinstance(reply, RenewedReply) or reply.epoch != self._epoch or not reply.times:
             return
         was_known = self._clock.offset() is not None
         if len(reply.times) != 2:
             self._client.rejections.add(_("a reply to a renewal must have two times"))
-        elif self._clock.add(sent, *reply.times, self._read_at) and not was_known:
+        elif self._clock.add(sent_at, *reply.times, self._read_at) and not was_known:
             self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
     def _handle_renewed(self, reply: RenewedReply, now: float) -> None:
@@ -526,8 +531,8 @@ class MasterSession:
         return differences
 
     def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:
-        if clocks or self._clocks:
-            self._clocks = clocks
+        if clocks or self._clock_differences:
+            self._clock_differences = clocks
             for _record, subscriber in self._all_subscribers():
                 # replies of servers have no time stamps
                 if isinstance(subscriber, NativeSubscriber | PatternSubscriber):
@@ -535,9 +540,8 @@ class MasterSession:
 
     def _join(self, now: float) -> None:
         # Registers everything again, at most once per `_JOIN_RETRY_S`.
-        self._renewal_timer.set_interval(
-            RENEW_INTERVAL_S, now
-        )  # the new master hasn't requested an interval yet
+        # the new master hasn't requested an interval yet
+        self._renewal_timer.set_interval(RENEW_INTERVAL_S, now)
         if now < self._join_retry_at:
             return
         self._join_retry_at = now + _JOIN_RETRY_S
@@ -547,31 +551,31 @@ class MasterSession:
             publishers = tuple(record for record, _ in self._publishers.values())
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
-            items = {record.id for record in publishers} | {record.id for record in subscribers}
-            self._client.notify(request, callback=lambda reply: self._handle_joined(reply, items))
+            ids = {record.id for record in publishers} | {record.id for record in subscribers}
+            self._client.notify(request, callback=lambda reply: self._handle_joined(reply, ids))
 
-    def _handle_joined(self, reply: Reply, items: set[int]) -> None:
+    def _handle_joined(self, reply: Reply, ids: set[int]) -> None:
         if not isinstance(reply, FoundReply):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
         self._clock.clear()  # the master may run on another computer now
         self._join_retry_at = 0.0
         with self._lock:
-            self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
-        by_topic: dict[str, list[RemotePublisher]] = {}
+            self._confirmed_ids = ids & (self._publishers.keys() | self._subscribers.keys())
+        publishers_by_topic: dict[str, list[RemotePublisher]] = {}
         for remote in self._select_endpoints(reply.publishers):
-            by_topic.setdefault(remote.publisher.topic, []).append(remote)
+            publishers_by_topic.setdefault(remote.publisher.topic, []).append(remote)
         for record, subscriber in self._all_subscribers():
             if isinstance(subscriber, PatternSubscriber):
                 for topic in {
                     *subscriber.topics,
-                    *(each for each in by_topic if _matches_pattern(record, each)),
+                    *(each for each in publishers_by_topic if _matches_pattern(record, each)),
                 }:
                     member = subscriber.member(topic)
                     if member is not None:
-                        member.reconcile(by_topic.get(topic, ()))
+                        member.reconcile(publishers_by_topic.get(topic, ()))
             else:
-                subscriber.reconcile(by_topic.get(record.topic, ()))
+                subscriber.reconcile(publishers_by_topic.get(record.topic, ()))
 
     def _subscribers_of(self, topic: str, *, may_create: bool = True) -> list[SessionSubscriber]:
         # Pattern subscribers create a member for a new topic only with `may_create`.

@@ -57,13 +57,13 @@ class PatternSubscriber(WakingSubscriber):
         self._io = io
         self._on_close = on_close
         self._members: dict[str, NativeSubscriber] = {}
-        self._closed_early: set[int] | None = set()
+        self._early_closed_ids: set[int] | None = set()
         """Ids of publishers that closed before `connect_listed`; None after `connect_listed`."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._removed_totals = _RemovedTotals()
-        self._dropped = 0
+        self._dropped_count = 0
         self._problem = self._member_error = ""
-        self._failures = 0
+        self._failure_count = 0
         self._members_lock = threading.RLock()
 
     # ---- reading
@@ -91,7 +91,7 @@ class PatternSubscriber(WakingSubscriber):
             return
         with self._changed:
             if not self.is_closed:
-                self._dropped += sum(map(self._inbox.put, messages))
+                self._dropped_count += sum(map(self._inbox.put, messages))
                 self.notify_waiting()
 
     # ---- statistics
@@ -103,7 +103,7 @@ class PatternSubscriber(WakingSubscriber):
             return (
                 self._removed_totals.received
                 + sum(each.received for each in self._members.values())
-                - self._dropped
+                - self._dropped_count
             )
 
     @property
@@ -113,7 +113,7 @@ class PatternSubscriber(WakingSubscriber):
             return (
                 self._removed_totals.lost
                 + sum(each.lost or 0 for each in self._members.values())
-                + self._dropped
+                + self._dropped_count
             )
 
     @property
@@ -156,12 +156,12 @@ class PatternSubscriber(WakingSubscriber):
                 member = self._members[topic] = self._new_member(topic)
             except NepError as error:
                 self._member_error = str(error)
-                self._failures += 1
-                if is_logged(self._failures):
+                self._failure_count += 1
+                if is_logged(self._failure_count):
                     _logger.warning("'%s' can't subscribe to '%s': %s", self.spec.topic, topic, error)
                 return None
             self._member_error = ""
-            is_registered = self._closed_early is None
+            is_registered = self._early_closed_ids is None
         if is_registered:
             member.connect_listed(())
         self._io.add(member)
@@ -169,7 +169,7 @@ class PatternSubscriber(WakingSubscriber):
 
     def _new_member(self, topic: str) -> NativeSubscriber:
         if len(self._members) >= _MAX_MEMBERS:
-            raise NepError(f"it is already subscribed to {_MAX_MEMBERS} topics")
+            raise NepError(f"the pattern is already subscribed to {_MAX_MEMBERS} topics")
         spec = replace(
             self.spec,
             topic=topic,
@@ -183,12 +183,12 @@ class PatternSubscriber(WakingSubscriber):
     def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to the publishers listed at registration, except those that have closed in the meantime."""
         with self._members_lock:
-            closed, self._closed_early = self._closed_early or set(), None
+            closed_ids, self._early_closed_ids = self._early_closed_ids or set(), None
             members = list(self._members.values())
         for member in members:
             member.connect_listed(())
         for remote in remotes:
-            if remote.publisher.id not in closed:
+            if remote.publisher.id not in closed_ids:
                 topic_member = self.member(remote.publisher.topic)
                 if topic_member is not None:
                     topic_member.connect((remote,))
@@ -196,8 +196,8 @@ class PatternSubscriber(WakingSubscriber):
     def record_early_close(self, publisher: int) -> None:
         """Record the id of a closed publisher, which the reply to the registration may still list."""
         with self._members_lock:
-            if self._closed_early is not None:
-                self._closed_early.add(publisher)
+            if self._early_closed_ids is not None:
+                self._early_closed_ids.add(publisher)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait for the echo of these publishers; return False on timeout. See `NativeSubscriber.wait_for`."""

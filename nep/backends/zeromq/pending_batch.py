@@ -53,10 +53,10 @@ class PendingBatch:
     """Pending messages of one publisher. Guarded by the publisher's lock, except `pending`.
 
     Args:
-        may_wait: False to disable batches.
+        is_enabled: False to disable batches.
     """
 
-    def __init__(self, *, may_wait: bool) -> None:
+    def __init__(self, *, is_enabled: bool) -> None:
         self.pending: list[tuple[bytes, int]] = []
         """Pending payloads with their time stamps.
 
@@ -65,7 +65,7 @@ class PendingBatch:
         """
         self.until_ns = 0
         """Time (ns since 1970) until which a new message is batched."""
-        self.ends_ns = 0
+        self.flush_deadline_ns = 0
         """Time (ns since 1970) by which the pending messages must be sent."""
         self.is_allowed = False
         """True if all current subscribers accept batches."""
@@ -73,17 +73,17 @@ class PendingBatch:
         """True if the I/O thread is scheduled to send the pending messages."""
         self.is_flushing = False
         """True while pending messages are being sent."""
-        self.has_sent_full = False
+        self.has_sent_full_batch = False
         """True if the publisher has sent a full batch since the I/O thread last checked."""
-        self._may_wait = may_wait
+        self._is_enabled = is_enabled
 
-    def set_allowed(self, *, reads_batches: bool) -> None:
+    def set_allowed(self, *, is_supported: bool) -> None:
         """Enable batches only while all current subscribers accept them.
 
         Args:
-            reads_batches: True if all current subscribers accept batches.
+            is_supported: True if all current subscribers accept batches.
         """
-        self.is_allowed = self._may_wait and reads_batches
+        self.is_allowed = self._is_enabled and is_supported
         if not self.is_allowed:
             self.until_ns = 0
 
@@ -97,7 +97,7 @@ class PendingBatch:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
     def publish_function(
-        self, hooks: PublishHooks, path: BatchOwner, lock: threading.Lock
+        self, hooks: PublishHooks, sender: BatchOwner, lock: threading.Lock
     ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
@@ -105,22 +105,22 @@ class PendingBatch:
 
         Args:
             hooks: Functions for encoding and for the slow path.
-            path: Sending end of the publisher.
-            lock: Lock of `path`.
+            sender: Sending end of the publisher.
+            lock: Lock of `sender`.
         """
-        owner, kind, encode, on_null, fallback = hooks
-        batch, pending, put, send_now = self, self.pending, self.pending.append, path.send_now
+        owner, raw_type, encode, on_null, fallback = hooks
+        batch, pending, append, send_now = self, self.pending, self.pending.append, sender.send_now
 
         def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
             if strict:
                 fallback(payload, strict=True)
                 return
             stamp_ns = _time_ns()
-            if owner.is_closed or path.problem or not path.has_subscribers or type(payload) is Encoded:
+            if owner.is_closed or sender.problem or not sender.has_subscribers or type(payload) is Encoded:
                 fallback(payload)
                 return
             try:
-                data: Any = payload if type(payload) is kind else encode(payload)
+                data: Any = payload if type(payload) is raw_type else encode(payload)
             except Exception:  # noqa: BLE001 - a payload may be of any class; `fallback` sends or reports it
                 fallback(payload)
                 return
@@ -129,20 +129,20 @@ class PendingBatch:
             if stamp_ns >= batch.until_ns or len(data) >= MAX_BATCHED_BYTES:
                 send_now(data)
                 return
-            put((data, stamp_ns))
+            append((data, stamp_ns))
             count = len(pending)
             if count >= MAX_PENDING_MESSAGES or count * len(data) >= FULL_BATCH_BYTES:
                 with lock:
-                    path.flush_locked()
-                batch.has_sent_full = True
+                    sender.flush_locked()
+                batch.has_sent_full_batch = True
                 return
             if count == 1:
-                batch.ends_ns = stamp_ns + MAX_DELAY_NS
+                batch.flush_deadline_ns = stamp_ns + MAX_DELAY_NS
             if not batch.is_flush_scheduled:
                 with lock:
-                    path.flush_soon_locked()
-            until_ns, ends_ns = stamp_ns + BATCH_WINDOW_NS, batch.ends_ns
-            batch.until_ns = until_ns if until_ns < ends_ns else ends_ns  # noqa: FURB136 - takes half the time of min
+                    sender.flush_soon_locked()
+            until_ns, deadline_ns = stamp_ns + BATCH_WINDOW_NS, batch.flush_deadline_ns
+            batch.until_ns = until_ns if until_ns < deadline_ns else deadline_ns  # noqa: FURB136 - takes half the time of min
 
         return publish
 
@@ -165,14 +165,14 @@ class PendingBatch:
         Args:
             now_ns: Current time in nanoseconds.
         """
-        had_full, self.has_sent_full = self.has_sent_full, False
+        had_full_batch, self.has_sent_full_batch = self.has_sent_full_batch, False
         # Must precede reading: a thread that appends afterwards requests a check itself.
-        self.is_flush_scheduled = had_full
+        self.is_flush_scheduled = had_full_batch
         pending = self.pending[:1]
-        left_ns = pending[0][1] + MAX_DELAY_NS - now_ns if pending else 0
-        if 0 < left_ns <= MAX_DELAY_NS:  # larger values mean that the clock was set
+        remaining_ns = pending[0][1] + MAX_DELAY_NS - now_ns if pending else 0
+        if 0 < remaining_ns <= MAX_DELAY_NS:  # larger values mean that the clock was set
             self.is_flush_scheduled = True
-            return _BURST_CHECK_INTERVAL_S if had_full else left_ns / 1e9
+            return _BURST_CHECK_INTERVAL_S if had_full_batch else remaining_ns / 1e9
         return 0.0
 
     @property

@@ -83,16 +83,17 @@ class HandshakePublisher:
     The condition `changed` guards the publisher's state.
     """
 
-    def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
+    def __init__(self, changed: threading.Condition, counts_at_hello: dict[int, int]) -> None:
         """Initialize the publisher.
 
         Args:
             changed: Condition that guards the publisher's state.
-            seen: Number of messages published before the hello of each connected subscriber, by its id.
+            counts_at_hello: Number of messages published before the hello of each connected subscriber, by
+                its id.
         """
-        self._changed, self._counts_at_hello = changed, seen
-        self._names: dict[int, str] = {}
-        self._expected: set[int] = set()
+        self._changed, self._counts_at_hello = changed, counts_at_hello
+        self._node_names: dict[int, str] = {}
+        self._expected_ids: set[int] = set()
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
@@ -104,14 +105,15 @@ class HandshakePublisher:
     def missing(self) -> tuple[str, ...]:
         """Names of nodes whose subscribers are registered but not connected."""
         with self._changed:
-            return tuple(sorted({self._names[each] for each in self._expected - set(self._counts_at_hello)}))
+            missing_ids = self._expected_ids - set(self._counts_at_hello)
+            return tuple(sorted({self._node_names[each] for each in missing_ids}))
 
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
         """Add registered subscribers whose hellos are expected."""
         with self._changed:
             for subscriber in expected:
-                self._expected.add(subscriber.id)
-                self._names[subscriber.id] = subscriber.node_name
+                self._expected_ids.add(subscriber.id)
+                self._node_names[subscriber.id] = subscriber.node_name
 
     def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
         """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
@@ -146,8 +148,8 @@ class NativePublisher(HandshakePublisher):
         set_send_high_water_mark(socket)
         self._bindings = Bindings(
             socket,
-            may_be_local=spec.codec.name in SMALL_CODECS,
-            is_watched=RemoteConnection.can_detect_silence,
+            may_bind_unix_sockets=spec.codec.name in SMALL_CODECS,
+            has_silence_check=RemoteConnection.can_detect_silence,
         )
         # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
@@ -166,18 +168,18 @@ class NativePublisher(HandshakePublisher):
         self._history: History[tuple[Part, ...]] = History(spec.history)
         self._polled_ns = self._count_at_check = 0
         self._is_io_scheduled = False
-        self._batch = PendingBatch(may_wait=spec.may_batch and not spec.is_latched)
+        self._batch = PendingBatch(is_enabled=spec.may_batch and not spec.is_latched)
         self._id = spec.id
         self._topic = topic_part(spec.topic)
-        self._codec = spec.codec.number
+        self._codec_number = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
-        self._form = encode_form(self._codec, self._flags)
-        # `with` is three times faster on the lock than on the condition
+        self._form = encode_form(self._codec_number, self._flags)
+        # entering the lock is three times faster than entering the condition
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.counts_at_hello)
         self.fd = int(socket.getsockopt(zmq.FD))
-        bytes_only = PublishHooks(self, bytes, _reject_payload, None, self.send_now)
-        self._send_bytes = self._batch.publish_function(bytes_only, self, self._lock)
+        bytes_hooks = PublishHooks(self, bytes, _reject_payload, None, self.send_now)
+        self._send_bytes = self._batch.publish_function(bytes_hooks, self, self._lock)
 
     @property
     def count(self) -> int:
@@ -221,7 +223,7 @@ class NativePublisher(HandshakePublisher):
 
     @property
     def rejections(self) -> RejectionCounter:
-        """Log of rejected subscriptions."""
+        """Counter of rejected subscriptions."""
         return self._subscriptions.rejections
 
     @property
@@ -297,19 +299,20 @@ class NativePublisher(HandshakePublisher):
             self._poll_subscriptions_locked(stamp_ns)
 
     def _read_subscriptions_if_needed_locked(self, size: int) -> None:
-        # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
-        # order. Without a history only if `_send_all_locked` would read them.
+        # Reads subscriptions before a message of the history is counted, so that a new subscriber receives it
+        # once, in order. With a history of one message only if `_send_all_locked` would read them.
         if self.spec.history > 1 or self._bytes + size >= self._full_path_at:
             self._read_subscriptions_locked()
 
     def _send_large(self, payload: bytes | memoryview, extension: bytes | None) -> None:
         # The payload is copied at most once.
         shared = self._subscriptions.shared
-        # before taking the lock: loading the library is slow
-        opened = (
+        # must stay referenced until `shared.write`; created before taking the lock, because loading the
+        # library is slow
+        iceoryx_node = (
             start_sharing() if shared is not None and self._counts_at_hello and not shared.readers else None
         )
-        if shared is not None and opened is None and not shared.readers:
+        if shared is not None and iceoryx_node is None and not shared.readers:
             shared = None
         data = to_sendable(payload) if shared is None or not shared.readers else None
         size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
@@ -319,13 +322,15 @@ class NativePublisher(HandshakePublisher):
             self.flush_locked()
             if self._flags:
                 self._read_subscriptions_if_needed_locked(size)
-            number = (
+            reference = (
                 shared.write(payload, self._counts_at_hello, time.monotonic())
                 if shared and not self._legacy_filters
                 else None
             )
             is_for_all = (
-                number is not None and shared is not None and shared.readers >= self._counts_at_hello.keys()
+                reference is not None
+                and shared is not None
+                and shared.readers >= self._counts_at_hello.keys()
             )
             if data is None and not is_for_all:
                 data = to_sendable(payload)
@@ -333,16 +338,16 @@ class NativePublisher(HandshakePublisher):
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if (
-                number is not None
+                reference is not None
                 and is_for_all
                 and total < self._full_path_at
                 and not (extension or self._flags)
             ):
-                header = pack_header(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
+                header = pack_header(self._form | SHARED << 16, len(reference), seq, stamp_ns, self._id)
                 # subscribers with shared memory accept one part
-                self._send(b"".join((self._topic, header, number)))
+                self._send(b"".join((self._topic, header, reference)))
             else:
-                self._send_all_locked(b"" if data is None else data, extension, size, number)
+                self._send_all_locked(b"" if data is None else data, extension, size, reference)
             self._poll_subscriptions_locked(stamp_ns)
 
     def borrow_memory(self, size_bytes: int) -> memoryview | None:
@@ -357,7 +362,7 @@ class NativePublisher(HandshakePublisher):
 
     def _send_offer_locked(self, subscriber: int, generation: int) -> None:
         notice = pack_header(
-            encode_form(self._codec, OFFER), generation, self._count, time.time_ns(), self._id
+            encode_form(self._codec_number, OFFER), generation, self._count, time.time_ns(), self._id
         )
         self._send_parts_locked(self._subscriptions.hellos[subscriber], (notice,))
 
@@ -417,20 +422,22 @@ class NativePublisher(HandshakePublisher):
             self._send_all_locked(data, None, len(data))
 
     def _send_all_locked(
-        self, data: Part, extension: bytes | None, size: int, number: bytes | None = None
+        self, data: Part, extension: bytes | None, size: int, reference: bytes | None = None
     ) -> None:
-        # Full path for messages with flags, and for flow control. Call with the lock held. `number` replaces
-        # `data` for subscribers that read shared memory.
+        # Full path for messages with flags, and for flow control. Call with the lock held. `reference`
+        # replaces `data` for subscribers that read shared memory.
         self.flush_locked()
         tail = self._message_parts(data, extension, size, 0)
-        shared = None if number is None else self._message_parts(number, extension, len(number), SHARED)
+        shared_parts = (
+            None if reference is None else self._message_parts(reference, extension, len(reference), SHARED)
+        )
         self._history.add(tail, size)
         if self._bytes < self._full_path_at:
-            self._send_to_all_locked(tail, shared)
+            self._send_to_all_locked(tail, shared_parts)
         else:
             if not self._flags:
                 self._read_subscriptions_locked()
-            self._send_with_flow_control_locked(tail, shared, size)
+            self._send_with_flow_control_locked(tail, shared_parts, size)
 
     def _message_parts(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
@@ -438,43 +445,43 @@ class NativePublisher(HandshakePublisher):
         header = pack_header(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
-    def _send_to_all_locked(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
-        # `shared` goes to subscribers with shared memory, `tail` to the others.
-        if shared is None:
+    def _send_to_all_locked(self, tail: tuple[Part, ...], shared_parts: tuple[Part, ...] | None) -> None:
+        # `shared_parts` goes to subscribers with shared memory, `tail` to the others.
+        if shared_parts is None:
             self._send_parts_locked(self._topic, tail)
             return
         readers = self._shared_readers()
         if readers >= self._counts_at_hello.keys():
-            if len(shared) == 2:  # subscribers with shared memory accept one part
-                self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared))))
+            if len(shared_parts) == 2:  # subscribers with shared memory accept one part
+                self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared_parts))))
             else:
-                self._send_parts_locked(self._topic, shared)
+                self._send_parts_locked(self._topic, shared_parts)
             return
         for subscriber, hello_bytes in self._subscriptions.hellos.items():
-            self._send_parts_locked(hello_bytes, shared if subscriber in readers else tail)
+            self._send_parts_locked(hello_bytes, shared_parts if subscriber in readers else tail)
 
     def _shared_readers(self) -> set[int]:
         shared = self._subscriptions.shared
         return set() if shared is None else shared.readers
 
     def _send_with_flow_control_locked(
-        self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None, size: int
+        self, tail: tuple[Part, ...], shared_parts: tuple[Part, ...] | None, size: int
     ) -> None:
         # While a subscriber has no room, the message is sent to each of the others
         # alone.
         windows = self._subscriptions.windows
-        since = self._bytes - size - self._windowed_bytes  # sent to all
-        if since:
+        unwindowed_bytes = self._bytes - size - self._windowed_bytes  # sent to all
+        if unwindowed_bytes:
             for window in windows.values():
-                window.add_sent(self._count - 1, since)
+                window.add_sent(self._count - 1, unwindowed_bytes)
         self._windowed_bytes = self._bytes
         has_acks = self._subscriptions.all_acknowledge
         has_room = {subscriber: window.has_room(size) for subscriber, window in windows.items()}
         if all(has_room.values()) and (has_acks or self._backlog.has_room(size)):
             if has_acks:
-                self._send_to_all_locked(tail, shared)
+                self._send_to_all_locked(tail, shared_parts)
             else:
-                self._send_tracked_locked(tail, size + since)
+                self._send_tracked_locked(tail, size + unwindowed_bytes)
             self._full_path_at = self._bytes + (ACK_INTERVAL_BYTES if has_acks else TRACKING_INTERVAL_BYTES)
             receivers = windows
         else:
@@ -482,8 +489,8 @@ class NativePublisher(HandshakePublisher):
             receivers = {subscriber: window for subscriber, window in windows.items() if has_room[subscriber]}
             for subscriber, window in windows.items():
                 if subscriber in receivers:
-                    is_shared = shared is not None and subscriber in self._shared_readers()
-                    parts = shared if is_shared and shared is not None else tail
+                    is_shared = shared_parts is not None and subscriber in self._shared_readers()
+                    parts = shared_parts if is_shared and shared_parts is not None else tail
                     self._send_parts_locked(self._subscriptions.hellos[subscriber], parts)
                 else:
                     window.record_drop()
@@ -501,11 +508,11 @@ class NativePublisher(HandshakePublisher):
         self._send_parts_locked(self._topic, (tail[0], frame, *tail[2:]))
         self._backlog.add_sent(frame.tracker, size)
 
-    def _send_parts_locked(self, first: bytes, tail: tuple[Part, ...]) -> None:
+    def _send_parts_locked(self, first_part: bytes, tail: tuple[Part, ...]) -> None:
         # XPUB never blocks: it drops messages for subscribers whose queue is full.
         self.flush_locked()
         send = self._send
-        send(first, _SNDMORE)
+        send(first_part, _SNDMORE)
         for part in tail[:-1]:
             send(part, _SNDMORE, len(part) < _MIN_ZERO_COPY_BYTES)
         send(tail[-1], 0, len(tail[-1]) < _MIN_ZERO_COPY_BYTES)
@@ -531,16 +538,16 @@ class NativePublisher(HandshakePublisher):
     def _read_subscriptions_locked(self) -> None:
         # Reads until the socket is empty.
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            event = self._socket.recv(zmq.DONTWAIT, copy=False)
+            frame = self._socket.recv(zmq.DONTWAIT, copy=False)
             hello_bytes = self._subscriptions.handle_event(
-                event.bytes, self._count, partial(RemoteConnection.from_frame, event)
+                frame.bytes, self._count, partial(RemoteConnection.from_frame, frame)
             )
             # Before the echo: a subscriber that received it must already be counted.
             self.subscribers = len(self._counts_at_hello)
             # a connected subscriber may leave without being reported as missing
-            self._expected.difference_update(self._counts_at_hello)
+            self._expected_ids.difference_update(self._counts_at_hello)
             self.has_subscribers = self._subscriptions.has_subscribers
-            self._batch.set_allowed(reads_batches=self._subscriptions.all_accept_batches)
+            self._batch.set_allowed(is_supported=self._subscriptions.all_accept_batches)
             if hello_bytes is not None:
                 self._complete_handshake_locked(hello_bytes)
             self._changed.notify_all()
@@ -564,7 +571,7 @@ class NativePublisher(HandshakePublisher):
         self._send_parts_locked(hello_bytes, (self._encode_notice(0),))
 
     def _encode_notice(self, flags: int) -> bytes:
-        return pack_header(encode_form(self._codec, flags), 0, self._count, time.time_ns(), self._id)
+        return pack_header(encode_form(self._codec_number, flags), 0, self._count, time.time_ns(), self._id)
 
     # ---- closing
 
@@ -591,17 +598,17 @@ class NativePublisher(HandshakePublisher):
                 ):
                     self._send_bye_locked()  # a full queue drops the bye like any other message
             if self._counts_at_hello:
-                undelivered = [
+                undelivered_counts = [
                     max(self._count - seen_count, len(self._history))
                     for seen_count in self._counts_at_hello.values()
                 ]
-                if any(undelivered):  # otherwise only the bye is missing
+                if any(undelivered_counts):  # otherwise only the bye is missing
                     _logger.warning(
                         "'%s' was closed before %d subscriber(s) received everything: "
                         "up to %d messages not delivered",
                         self.spec.topic,
-                        sum(map(bool, undelivered)),
-                        max(undelivered),
+                        sum(map(bool, undelivered_counts)),
+                        max(undelivered_counts),
                     )
                 self._subscriptions.clear()
                 self.subscribers = 0

@@ -39,7 +39,7 @@ class PendingRequest:
     callback: ReplyCallback | None = None
     reply: Reply | None = None
     is_sent: bool = False
-    view: bytes | None = None
+    graph_reply: bytes | None = None
     """Encoded graph reply, which the waiting thread decodes."""
 
 
@@ -93,7 +93,7 @@ class RpcClient:
     def has_waiting_requests(self) -> bool:
         """True if a thread waits for a reply."""
         with self._changed:
-            return any(call.has_waiter for call in self._requests.values())
+            return any(each.has_waiter for each in self._requests.values())
 
     def connect(self, address: str) -> None:
         """Disconnect from the previous address and connect to `address`. Thread-safe."""
@@ -131,37 +131,37 @@ class RpcClient:
 
     def send_request(self, request: Request) -> PendingRequest:
         """Send a request without waiting; return the object to pass to `wait`."""
-        return self._send(request, is_waited=True, callback=None)
+        return self._send(request, has_waiter=True, callback=None)
 
-    def wait(self, call: PendingRequest, timeout_s: float | None) -> Reply:
+    def wait(self, request: PendingRequest, timeout_s: float | None) -> Reply:
         """Wait for the reply to a request sent with `send_request`. Raises the same errors as `request`."""
-        started = time.monotonic()
+        started_at = time.monotonic()
         with self._changed:
             while not wait_until(
                 self._changed,
-                lambda: call.reply is not None or call.view is not None or self._is_closed,
-                _remaining_s(started, timeout_s),
+                lambda: request.reply is not None or request.graph_reply is not None or self._is_closed,
+                _remaining_s(started_at, timeout_s),
             ):
-                if timeout_s is not None and time.monotonic() - started >= timeout_s:
+                if timeout_s is not None and time.monotonic() - started_at >= timeout_s:
                     self._requests = {
-                        number: each for number, each in self._requests.items() if each is not call
+                        number: each for number, each in self._requests.items() if each is not request
                     }
                     raise MasterUnreachable(self.address, timeout_s)
-                call.is_sent = False  # requests are idempotent, so they may be resent
+                request.is_sent = False  # requests are idempotent, so they may be resent
                 self._flush_locked()
                 self._after_use()
-        if call.view is not None:
-            return self._decode_reply(call.view)
-        if call.reply is None:
+        if request.graph_reply is not None:
+            return self._decode_reply(request.graph_reply)
+        if request.reply is None:
             raise ClosedError("the node")
-        if isinstance(call.reply, RejectedReply):
-            raise RequestRefusedError(call.reply.reason)
-        return call.reply
+        if isinstance(request.reply, RejectedReply):
+            raise RequestRefusedError(request.reply.reason)
+        return request.reply
 
-    def _decode_reply(self, view: bytes) -> Reply:
+    def _decode_reply(self, graph_reply: bytes) -> Reply:
         # Runs in the calling thread: decoding a graph of thousands of topics takes long.
         try:
-            reply = decode_reply(view)[1]
+            reply = decode_reply(graph_reply)[1]
         except WireError as error:
             self._reject(error)
             raise RequestRefusedError(
@@ -178,7 +178,7 @@ class RpcClient:
             request: Request to the master.
             callback: Called with the reply in the I/O thread; None to ignore the reply.
         """
-        self._send(request, is_waited=False, callback=callback)
+        self._send(request, has_waiter=False, callback=callback)
 
     def read(self) -> list[ReceivedMessage]:
         """Return up to `_MAX_MESSAGES_PER_READ` received messages and send pending requests.
@@ -212,52 +212,52 @@ class RpcClient:
             self._is_closed = True
             self._socket.close(0)
 
-    def _send(self, request: Request, *, is_waited: bool, callback: ReplyCallback | None) -> PendingRequest:
+    def _send(self, request: Request, *, has_waiter: bool, callback: ReplyCallback | None) -> PendingRequest:
         with self._changed:
             number = next(self._numbers)
-            call = PendingRequest(encode_request(request, number), is_waited, callback)
+            pending_request = PendingRequest(encode_request(request, number), has_waiter, callback)
             if self._is_closed:
-                return call
-            self._requests[number] = call
+                return pending_request
+            self._requests[number] = pending_request
             if len(self._requests) > _MAX_REQUESTS:
                 self._drop_oldest_locked()
             self._flush_locked()
             events = self._events()
-            if events & zmq.POLLOUT and not call.is_sent:
-                self._flush_locked()  # it has just connected, and this was the only signal
+            if events & zmq.POLLOUT and not pending_request.is_sent:
+                self._flush_locked()  # the socket has just connected, and this was the only signal
                 events = self._events()
         if events & zmq.POLLIN:
             self._after_use()
-        return call
+        return pending_request
 
     def _drop_oldest_locked(self) -> None:
         # Requests without a waiting thread would pile up while the master hangs.
-        oldest = next((number for number, call in self._requests.items() if not call.has_waiter), None)
-        if oldest is not None:
-            del self._requests[oldest]
+        oldest_number = next((number for number, each in self._requests.items() if not each.has_waiter), None)
+        if oldest_number is not None:
+            del self._requests[oldest_number]
 
     def _flush_locked(self) -> bool:
         # Requests without a waiting thread are dropped if they can't be sent.
         # Returns True if anything was sent.
         has_sent = False
-        for number, call in list(self._requests.items()):
-            if call.is_sent or self._is_closed:
+        for number, pending_request in list(self._requests.items()):
+            if pending_request.is_sent or self._is_closed:
                 continue
             try:
-                self._socket.send(call.body, zmq.DONTWAIT)
-                call.is_sent = has_sent = True
+                self._socket.send(pending_request.body, zmq.DONTWAIT)
+                pending_request.is_sent = has_sent = True
             except zmq.Again:
-                if not call.has_waiter:
+                if not pending_request.has_waiter:
                     del self._requests[number]
         return has_sent
 
     def _read_one_locked(self) -> ReceivedMessage | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
-        view_number = call_of_graph_reply(body)
-        if view_number is not None:
-            graph_call = self._requests.pop(view_number, None)
-            if graph_call is not None:  # otherwise its request has timed out
-                graph_call.view = body
+        graph_request_number = call_of_graph_reply(body)
+        if graph_request_number is not None:
+            graph_request = self._requests.pop(graph_request_number, None)
+            if graph_request is not None:  # otherwise its request has timed out
+                graph_request.graph_reply = body
                 self._changed.notify_all()
             return None
         try:
@@ -265,12 +265,12 @@ class RpcClient:
         except WireError as error:
             self._reject(error)
             return None
-        call = self._requests.pop(number, None)
-        if call is None or isinstance(reply, Push):
+        pending_request = self._requests.pop(number, None)
+        if pending_request is None or isinstance(reply, Push):
             return ReceivedMessage(reply, None)
-        call.reply = reply
+        pending_request.reply = reply
         self._changed.notify_all()
-        return ReceivedMessage(reply, call.callback)
+        return ReceivedMessage(reply, pending_request.callback)
 
     def _reject(self, error: WireError) -> None:
         if self.rejections.add(error.reason):
@@ -285,7 +285,7 @@ class RpcClient:
         return 0 if self._socket.closed else int(self._socket.getsockopt(zmq.EVENTS))
 
 
-def _remaining_s(started: float, timeout_s: float | None) -> float:
+def _remaining_s(started_at: float, timeout_s: float | None) -> float:
     if timeout_s is None:
         return _RESEND_INTERVAL_S
-    return max(0.0, min(_RESEND_INTERVAL_S, started + timeout_s - time.monotonic()))
+    return max(0.0, min(_RESEND_INTERVAL_S, started_at + timeout_s - time.monotonic()))

@@ -68,28 +68,28 @@ class RejectionCounter:
     def __init__(self) -> None:
         self.count = 0
         self._reason = ""
-        self._last_at = 0.0
+        self._rejected_at = 0.0
 
     def add(self, reason: str) -> bool:
         """Count a rejected input; return True if it should be logged (the 1st, 10th, 100th, ...)."""
         self.count += 1
         self._reason = reason
-        self._last_at = time.monotonic()
+        self._rejected_at = time.monotonic()
         return is_logged(self.count)
 
     def recent_message(self) -> str:
         """Return the newest reason with the count; "" if nothing was rejected in the last seconds."""
-        if not self.count or time.monotonic() - self._last_at > _REPORT_DURATION_S:
+        if not self.count or time.monotonic() - self._rejected_at > _REPORT_DURATION_S:
             return ""
         return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
 
-def set_send_high_water_mark(owner: Socket) -> None:
+def set_send_high_water_mark(zmq_socket: Socket) -> None:
     """Set the high-water mark for sending. Call before bind, because it applies only to new connections.
 
     `byte_window` limits the bytes.
     """
-    owner.setsockopt(zmq.SNDHWM, _SEND_HIGH_WATER_MARK)
+    zmq_socket.setsockopt(zmq.SNDHWM, _SEND_HIGH_WATER_MARK)
 
 
 def receive_high_water_mark(codec: str) -> int:
@@ -100,26 +100,26 @@ def receive_high_water_mark(codec: str) -> int:
     return _IMAGE_HIGH_WATER_MARK if codec == "image" else 1000
 
 
-def set_receive_timeout(owner: Socket) -> None:
+def set_receive_timeout(zmq_socket: Socket) -> None:
     """Set the timeout of a blocking receive to `SHORT_WAIT_S` seconds."""
-    owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
+    zmq_socket.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
 
 
-def bind_free_port(owner: Socket, host: str) -> str:
+def bind_free_port(zmq_socket: Socket, host: str) -> str:
     """Bind to a free port of `host` that the original NEP doesn't use; return the endpoint.
 
     Raises `AddressInUseError` if `host` can't be bound or no such port is found, and
     `TooManyFilesError` if the process is out of file descriptors.
     """
     for _port in range(100):
-        endpoint = bind(owner, f"{host}:*")
+        endpoint = bind(zmq_socket, f"{host}:*")
         if int(endpoint.rpartition(":")[2]) not in ORIGINAL_PORTS:
             return endpoint
-        owner.unbind(endpoint)
+        zmq_socket.unbind(endpoint)
     raise AddressInUseError(f"{host}:*")
 
 
-def bind(owner: Socket, address: str) -> str:
+def bind(zmq_socket: Socket, address: str) -> str:
     """Bind to an address and return the endpoint.
 
     Raises `AddressInUseError` if the address can't be bound, and `TooManyFilesError` if the process is
@@ -127,13 +127,13 @@ def bind(owner: Socket, address: str) -> str:
     """
     check_free_descriptors(_FDS_PER_PORT, f"a port of '{host_of(address)}'")
     try:
-        owner.bind(endpoint_of(address))
+        zmq_socket.bind(endpoint_of(address))
     except zmq.ZMQError as error:
         raise AddressInUseError(address, is_own=error.errno in _IN_USE_ERRORS) from error
-    return owner.getsockopt_string(zmq.LAST_ENDPOINT)
+    return zmq_socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
 
-def connect(owner: Socket, address: str) -> str:
+def connect(zmq_socket: Socket, address: str) -> str:
     """Connect to an address and return the endpoint. Raises `NepError` for an invalid address.
 
     The peer may bind the address later.
@@ -146,7 +146,7 @@ def connect(owner: Socket, address: str) -> str:
             )
         )
     endpoint = endpoint_of(resolve_address(address))
-    owner.connect(endpoint)
+    zmq_socket.connect(endpoint)
     return endpoint
 
 
@@ -170,7 +170,7 @@ def is_remote(endpoint: str) -> bool:
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
-def enable_keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
+def enable_keep_alive(zmq_socket: Socket, endpoint: str, *, has_silence_check: bool = False) -> None:
     """Set socket options that detect within a dozen seconds that a peer's computer has vanished.
 
     Call before connecting or binding. Only needed for other computers, because on the same computer the
@@ -183,18 +183,19 @@ def enable_keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False)
     `RemoteConnection`).
 
     Args:
-        owner: Socket.
+        zmq_socket: Socket of zmq.
         endpoint: Endpoint to connect to or to bind; the port may be "*".
-        is_watched: True if the owner itself closes connections that don't respond.
+        has_silence_check: True if the owner itself closes connections that don't respond.
     """
     has_remote_peer = is_remote(endpoint)
-    owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if has_remote_peer else -1)
-    owner.setsockopt(zmq.TCP_MAXRT, SILENCE_TIMEOUT_MS if has_remote_peer and not is_watched else 0)
-    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS if has_remote_peer else 0)
+    zmq_socket.setsockopt(zmq.TCP_KEEPALIVE, 1 if has_remote_peer else -1)
+    resend_timeout_ms = SILENCE_TIMEOUT_MS if has_remote_peer and not has_silence_check else 0
+    zmq_socket.setsockopt(zmq.TCP_MAXRT, resend_timeout_ms)
+    zmq_socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS if has_remote_peer else 0)
     if has_remote_peer:
-        owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
-        owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
-        owner.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
+        zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
+        zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
+        zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
 
 
 def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
@@ -243,16 +244,16 @@ class RemoteConnection:
     """True if `is_silent` is supported on this system."""
 
     @classmethod
-    def from_frame(cls, received: zmq.Frame) -> RemoteConnection | None:
-        """Return the connection that delivered `received`.
+    def from_frame(cls, frame: zmq.Frame) -> RemoteConnection | None:
+        """Return the connection that delivered `frame`.
 
         Returns None if the peer is on this computer or can't be determined.
         """
         try:
-            host = str(received.get("Peer-Address"))
+            host = str(frame.get("Peer-Address"))
             if os.name != "posix" or not host or host.startswith("127."):
                 return None
-            fd = int(received.get(_SRCFD))
+            fd = int(frame.get(_SRCFD))
             peer = _peer_of(fd)
         except (zmq.ZMQError, OSError):  # closed already
             return None
@@ -270,10 +271,10 @@ class RemoteConnection:
                 if connection.getpeername() != self.peer:
                     return False
                 tcp_info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
-            resent, probes, last_answer_ms = _TCP_INFO.unpack(tcp_info)
+            retransmissions, probes, last_ack_ms = _TCP_INFO.unpack(tcp_info)
         except (OSError, struct.error):
             return False
-        return bool(max(resent, probes) >= _MIN_RETRIES and last_answer_ms >= SILENCE_TIMEOUT_MS)
+        return bool(max(retransmissions, probes) >= _MIN_RETRIES and last_ack_ms >= SILENCE_TIMEOUT_MS)
 
     def close(self) -> None:
         """Close the connection if it is still open; libzmq then releases its queue."""

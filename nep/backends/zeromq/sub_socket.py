@@ -100,7 +100,7 @@ class MessageParser:
         spec: Settings of the subscriber.
         hello: Hello filter of the subscriber.
         sources: Publishers; updated by the parser.
-        leave: Ends the connection to the publisher with this id.
+        disconnect: Ends the connection to the publisher with this id.
         acknowledge: Sends an acknowledgement; called with the publisher id and the newest sequence number.
         shared: Readers of shared memory, or None.
     """
@@ -110,39 +110,39 @@ class MessageParser:
         spec: SubscriberSpec,
         hello: bytes,
         sources: PublisherTracker,
-        leave: Callable[[int], None],
+        disconnect: Callable[[int], None],
         acknowledge: Callable[[int, int], None],
         shared: SharedSources | None = None,
     ) -> None:
-        self._name = spec.topic
+        self._topic_name = spec.topic
         self._msg_type = spec.msg_type
         self._topic = topic_part(spec.topic)
         self._hello = hello
         self._sources = sources
-        self._leave = leave
+        self._disconnect = disconnect
         self._acknowledge = acknowledge
         self._shared = shared
 
-    def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
+    def parse(self, first: bytes, tail: Sequence[_Part]) -> Message | None:
         """Return the message in these parts; None for notices and duplicates.
 
         Args:
             first: First part: a topic, a hello, or a whole message of one part.
-            rest: Remaining parts.
+            tail: Remaining parts.
 
         Raises:
             WireError: The message is malformed.
         """
         is_alone = first == self._hello
-        is_one_part = not rest and first.startswith(self._topic)
+        is_one_part = not tail and first.startswith(self._topic)
         if is_one_part:
-            first, *rest = split_single_part(first)
+            first, *tail = split_single_part(first)
         if not is_alone and first != self._topic:
             raise _topic_error()
-        if is_alone and len(rest) == 1:
-            self._handle_notice(read_header(bytes(rest[0])))
+        if is_alone and len(tail) == 1:
+            self._handle_notice(read_header(bytes(tail[0])))
             return None
-        return self._parse_message(*parse_remaining_parts(rest, is_one_part=is_one_part), is_alone=is_alone)
+        return self._parse_message(*parse_remaining_parts(tail, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
         """Return the messages of a batch, given as one part. Raises `WireError` if the batch is malformed.
@@ -155,7 +155,7 @@ class MessageParser:
         header, _payload, _extension = parse_remaining_parts((header_part, body), is_one_part=True)
         check_batch(header, body)
         single_header = header._replace(flags=0)
-        read = (
+        messages = (
             self._parse_message(
                 single_header._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
                 body[each.begin : each.end],
@@ -164,14 +164,14 @@ class MessageParser:
             )
             for each in parse_entries(body)
         )
-        return [each for each in read if each is not None]
+        return [each for each in messages if each is not None]
 
     def _handle_notice(self, header: Header) -> None:
         source = self._sources.get(header.publisher)
         last = source.last
-        is_possible = self._sources.advance_to(header.publisher, header.seq)
+        is_gap_accepted = self._sources.advance_to(header.publisher, header.seq)
         if header.flags & BYE:
-            self._leave(header.publisher)
+            self._disconnect(header.publisher)
         elif header.flags & OFFER:
             if self._shared is not None:
                 self._shared.open(header.publisher, header.size)
@@ -179,7 +179,7 @@ class MessageParser:
             self._acknowledge(header.publisher, header.seq)
         else:
             source.has_echoed = True
-        if not is_possible:
+        if not is_gap_accepted:
             raise WireError(
                 _("the sequence number jumps from {last} to {seq}").format(last=last, seq=header.seq),
                 code="seq-leap",
@@ -195,20 +195,20 @@ class MessageParser:
             return None
         if not self._sources.count_message(header.publisher, header.seq, is_alone=is_alone):
             return None
-        shared: bytes | memoryview | None = None
+        shared_payload: bytes | memoryview | None = None
         if header.flags & SHARED:
             if self._shared is None:
                 raise WireError(
                     _("the payload is in shared memory that no publisher has offered"), code="shared-memory"
                 )
-            shared = self._shared.read(header.publisher, payload, may_copy=codec.name == "bytes")
-            if shared is None:
+            shared_payload = self._shared.read(header.publisher, payload, may_copy=codec.name == "bytes")
+            if shared_payload is None:
                 self._sources.count_dropped(1)
                 return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
         source.kind = message_kind(
-            self._name,
+            self._topic_name,
             codec.name,
             msg_type,
             is_latched=bool(header.flags & LATCHED),
@@ -222,9 +222,9 @@ class MessageParser:
         else:
             source.form = plain_form
             source.shared_form = source.shared_form if source.shared_form == plain_form | SHARED_FORM else 0
-        if shared is not None:
+        if shared_payload is not None:
             return received_message(
-                source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension
+                source.kind, shared_payload, header.stamp_ns, header.seq, header.publisher, extension
             )
         # a small view must not keep a large receive buffer alive
         is_large = len(payload) >= _MIN_ZERO_COPY_BYTES
@@ -249,9 +249,9 @@ class SubSocket:
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv
-        self._name = spec.topic
+        self._topic_name = spec.topic
         self._topic = topic_part(spec.topic)
-        self._hello = hello_part(spec.id, spec.topic, batches=True)
+        self._hello = hello_part(spec.id, spec.topic, reads_batches=True)
         self._id = spec.id
         self._shared = SharedSources(spec.id, self._confirm_offer)
         self._parser = MessageParser(
@@ -261,7 +261,7 @@ class SubSocket:
         self.payloads: deque[Any] = deque()
         """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
-        self._run: _DecodedRun | None = None
+        self._decoded_run: _DecodedRun | None = None
         self._payload_offset = self._topic_length + HEADER_BYTES
         """Offset of the payload in a message of one part."""
         # sizes at which a payload can't be told apart from the first part of the next message
@@ -300,24 +300,24 @@ class SubSocket:
             if is_endpoint(endpoint):
                 self._connect(source, endpoint)
             else:
-                other = endpoint.startswith("nanomsg://")
+                is_nanomsg = endpoint.startswith("nanomsg://")
                 self._report_problem(
                     source,
                     endpoint,
-                    _("the endpoint belongs to 'nanomsg'") if other else _("not a valid endpoint"),
+                    _("the endpoint belongs to 'nanomsg'") if is_nanomsg else _("not a valid endpoint"),
                 )
 
     def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
         # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
-        for old in self.sources.replaced_publishers(remote):
-            self.sources.mark_closing(old, 0, time.monotonic())
+        for replaced in self.sources.replaced_publishers(remote):
+            self.sources.mark_closing(replaced, 0, time.monotonic())
         existing = self.sources.find(remote.publisher.id)
         if not endpoint or (existing is not None and existing.endpoint == endpoint):
             return
-        for old, source in self.sources.items():
+        for replaced, source in self.sources.items():
             if source.endpoint == endpoint:
-                self.sources.count_missing(old)
-                self.disconnect(old)
+                self.sources.count_missing(replaced)
+                self.disconnect(replaced)
 
     def _connect(self, source: TrackedPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has a new address, or its master has restarted
@@ -351,7 +351,7 @@ class SubSocket:
             shown=shown_endpoint, name=name, why=reason
         )
         if self.rejections.add(source.problem):
-            _logger.warning("subscription to '%s': %s", self._name, source.problem)
+            _logger.warning("subscription to '%s': %s", self._topic_name, source.problem)
 
     @property
     def problem(self) -> str:
@@ -370,11 +370,11 @@ class SubSocket:
 
     def _acknowledge(self, publisher: int, seq: int) -> None:
         # Acknowledges `seq` to a publisher, and assigns it a share of the receive window.
-        bound = WINDOW_BYTES // max(1, self.sources.echo_count)
-        self._send_filter(acknowledgement_part(Acknowledgement(self._id, publisher, seq, bound)))
+        window_bytes = WINDOW_BYTES // max(1, self.sources.echo_count)
+        self._send_filter(acknowledgement_part(Acknowledgement(self._id, publisher, seq, window_bytes)))
 
-    def _confirm_offer(self, shares: OfferAcceptance) -> None:
-        self._send_filter(acceptance_part(shares))
+    def _confirm_offer(self, acceptance: OfferAcceptance) -> None:
+        self._send_filter(acceptance_part(acceptance))
 
     def _send_filter(self, filter_part: bytes) -> None:
         # Reaches all publishers, as a filter that is set and removed at once.
@@ -413,24 +413,24 @@ class SubSocket:
             first: First part of the next message, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, buffer.append
-        cut, body = self._topic_length, self._payload_offset
-        count, uncounted, flags = 0, 0, 0 if may_wait else _DONTWAIT
+        header_offset, payload_offset = self._topic_length, self._payload_offset
+        count, counted_earlier, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
             while count < max_messages and max_bytes > 0:
                 if first is None:
                     first = recv(flags)
                     flags = _DONTWAIT  # all parts of a message are available with its first one
-                if len(first) >= body and first.startswith(topic):
-                    form, size, seq, stamp_ns, publisher = unpack_header_at(first, cut)
+                if len(first) >= payload_offset and first.startswith(topic):
+                    form, size, seq, stamp_ns, publisher = unpack_header_at(first, header_offset)
                     source = find(publisher)
                     if (
                         source
                         and source.form == form
                         and source.last == seq - 1
-                        and len(first) == body + size
+                        and len(first) == payload_offset + size
                     ):
                         message = new_message(Message)
-                        message.kind, message.raw = source.kind, first[body:]
+                        message.kind, message.raw = source.kind, first[payload_offset:]
                         message.stamp_ns = stamp_ns
                         message.seq = source.last = seq
                         message.publisher, message.extension = publisher, NO_EXTENSION
@@ -441,43 +441,45 @@ class SubSocket:
                         first = None
                         continue
                     if form & BATCH_FORM_FLAG:
-                        got, new = self._read_batch(first, buffer)
+                        read_count, uncounted = self._read_batch(first, buffer)
                         # a rejected batch returns 0, so the caller waits as for an empty socket
-                        count, uncounted, max_bytes, first = (
-                            count + got,
-                            uncounted + got - new,
-                            max_bytes - (len(first) if got else 0),
+                        count, counted_earlier, max_bytes, first = (
+                            count + read_count,
+                            counted_earlier + read_count - uncounted,
+                            max_bytes - (len(first) if read_count else 0),
                             None,
                         )
                         continue
-                    other = self._read_shared(first) if form & SHARED_FORM else None
+                    parsed = self._read_shared(first) if form & SHARED_FORM else None
                 else:
-                    other = None
-                first, other = (None, other) if other is not None else self._read_parts(first)
-                if other is not None:
-                    append(other)
+                    parsed = None
+                first, parsed = (None, parsed) if parsed is not None else self._read_parts(first)
+                if parsed is not None:
+                    append(parsed)
                     count += 1
-                    uncounted += 1
-                    max_bytes -= other.size_bytes
+                    counted_earlier += 1
+                    max_bytes -= parsed.size_bytes
         except zmq.Again:
             pass  # the socket is empty
-        self.sources.received += count - uncounted
+        self.sources.received += count - counted_earlier
         return count
 
     def _read_batch(self, first: bytes, buffer: MessageBuffer) -> tuple[int, int]:
         # Returns the number of messages, and how many of them aren't counted yet.
-        body = self._payload_offset
+        payload_offset = self._payload_offset
         form, size, seq, _stamp_ns, publisher = unpack_header_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
-        count = int.from_bytes(first[body : body + 4], "little")
+        count = int.from_bytes(first[payload_offset : payload_offset + 4], "little")
         is_next = source and source.last == seq - 1 and source.form | BATCH_FORM_FLAG == form
-        if not (source and is_next and 0 < count <= MAX_BATCH_MESSAGES and len(first) == body + size):
+        if not (
+            source and is_next and 0 < count <= MAX_BATCH_MESSAGES and len(first) == payload_offset + size
+        ):
             return self._read_any_batch(first, buffer)
         table = table_struct(count)
-        offset = body + table.size
+        offset = payload_offset + table.size
         if offset > len(first):
             return self._read_any_batch(first, buffer)
-        numbers = table.unpack_from(first, body)
+        numbers = table.unpack_from(first, payload_offset)
         sizes = numbers[1 : count + 1]
         if offset + sum(sizes) != len(first):
             return self._read_any_batch(first, buffer)
@@ -485,7 +487,7 @@ class SubSocket:
             raws = [first[offset : (offset := offset + size)] for size in sizes]
             if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, buffer):
                 return count, count
-            offset = body + table.size
+            offset = payload_offset + table.size
         kind, append = source.kind, buffer.append
         for size, stamp_ns in zip(sizes, numbers[count + 1 :], strict=True):
             message = new_message(Message)
@@ -508,7 +510,7 @@ class SubSocket:
         raws: Sequence[bytes],
         buffer: MessageBuffer,
     ) -> bool:
-        # Decodes all but the first message of a batch. Returns False if one can't be decoded.
+        # Decodes all but the first message of a batch. Returns False if a payload can't be decoded.
         kind = source.kind
         decode = kind.decode
         try:
@@ -517,22 +519,22 @@ class SubSocket:
             return False
         buffer.append(received_message(kind, raws[0], stamps_ns[0], seq, publisher))
         source.last = seq + len(raws) - 1
-        self._run = kind, publisher, seq, stamps_ns, raws
+        self._decoded_run = kind, publisher, seq, stamps_ns, raws
         return True
 
     def restore(self, buffer: deque[Message]) -> None:
         """Convert the remaining payloads back to messages and insert them at the front of `buffer`."""
-        if self._run is None:
+        if self._decoded_run is None:
             return
-        kind, publisher, first, stamps_ns, raws = self._run
-        number = len(raws)
+        kind, publisher, first_seq, stamps_ns, raws = self._decoded_run
+        index = len(raws)
         while True:
             try:
                 payload = self.payloads.pop()  # from the right: other threads take from the left
             except IndexError:
                 return
-            number -= 1
-            message = received_message(kind, raws[number], stamps_ns[number], first + number, publisher)
+            index -= 1
+            message = received_message(kind, raws[index], stamps_ns[index], first_seq + index, publisher)
             message.decoded = payload
             buffer.appendleft(message)
 
@@ -568,14 +570,14 @@ class SubSocket:
         buffer.extend(messages)
         return len(messages), 0
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message, or None if the socket is empty.
 
         The fast path of `read_into` is repeated here, because calling it would take a third longer in
         programs that read single messages.
 
         Args:
-            rest: Container to which further messages of the same batch are appended.
+            overflow: Container to which further messages of the same batch are appended.
             may_wait: True to wait up to `SHORT_WAIT_S` for a message.
         """
         if not may_wait and not int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
@@ -601,7 +603,7 @@ class SubSocket:
         if not self.read_into(buffer, 1, 1, first=first):
             return None
         message = buffer.popleft()
-        rest.extend(buffer)
+        overflow.extend(buffer)
         return message
 
     def _read_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
@@ -633,25 +635,25 @@ class SubSocket:
         return self._parse_parts(first, header, data)
 
     def _parse_parts(
-        self, first: bytes, *got: bytes | zmq.Frame | None
+        self, first: bytes, *received: bytes | zmq.Frame | None
     ) -> tuple[bytes | None, Message | None]:
-        # If a message has fewer than three parts, the last part in `got` is already the first of the next
-        # message. It then begins with the topic or the hello, unlike a header, and is returned.
-        read = [each for each in got if each is not None]
-        rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
-        if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
-            following = bytes(rest.pop())
+        # If a message has fewer than three parts, the last part in `received` is already the first of the
+        # next message. It then begins with the topic or the hello, unlike a header, and is returned.
+        received_parts = [each for each in received if each is not None]
+        tail: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in received_parts]
+        if tail and bytes(tail[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
+            next_first_part = bytes(tail.pop())
             self.rejections.add(
-                _("a message must have 3 or 4 parts, but this one has {count}").format(count=len(rest) + 1)
+                _("a message must have 3 or 4 parts, but this one has {count}").format(count=len(tail) + 1)
             )
-            return following, None
-        more = self._has_more()
-        while more:
+            return next_first_part, None
+        has_more = self._has_more()
+        while has_more:
             frame = self._recv(_DONTWAIT, False)
-            rest.append(frame.buffer)
-            more = frame.more
+            tail.append(frame.buffer)
+            has_more = frame.more
         try:
-            return None, self._parser.parse(first, rest)
+            return None, self._parser.parse(first, tail)
         except WireError as error:
             self.rejections.add(error.reason)
             return None, None

@@ -62,7 +62,7 @@ class Readable(Protocol):
 
     fd: int
     rejections: RejectionCounter
-    """Log of rejected messages."""
+    """Counter of rejected messages."""
 
     @property
     def received(self) -> int:
@@ -92,11 +92,11 @@ class Readable(Protocol):
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message, or None if there is none.
 
         Args:
-            rest: Container to which further messages of the same batch are appended.
+            overflow: Container to which further messages of the same batch are appended.
             may_wait: True to wait up to `SHORT_WAIT_S` for a message.
         """
 
@@ -110,7 +110,7 @@ class Readable(Protocol):
 class UnbatchedReader:
     """Base class that implements `Readable.read_into` for sockets without batches."""
 
-    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
+    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message. See `Readable.read`."""
         raise NotImplementedError
 
@@ -172,7 +172,7 @@ class SocketSubscriber(Generic[R]):
         self._readable = readable
         self._read = readable.read
         self._read_into = readable.read_into
-        self._queues_all = spec.keep == "all"
+        self._is_keeping_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """Messages read ahead, which precede those of the inbox. Pop from the left, without the lock."""
         self._sub_socket: SubSocket | None = readable if isinstance(readable, SubSocket) else None
@@ -182,17 +182,17 @@ class SocketSubscriber(Generic[R]):
         self._read_ahead = ReadAhead(spec.max_messages)
         self._may_exceed_bound = spec.max_messages >= 10 * MAX_READ_AHEAD
         """True if the queue is long enough to exceed its limit by a few messages."""
-        self._read_at = 0.0
+        self._last_read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
         self._io_check_at = _INFINITE
-        self._waits_in_socket = False
+        self._should_wait_in_socket = False
         self._lock_requests: deque[None] = deque()
         self._waiters: list[Wakeable] = []
         self._waker: Waker | None = None
-        self._woken: set[Wakeable] = set()
+        self._woken_waiters: set[Wakeable] = set()
         self._problem = ""
-        # `with` is three times faster on the lock than on the condition
+        # entering the lock is three times faster than entering the condition
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
 
@@ -213,12 +213,12 @@ class SocketSubscriber(Generic[R]):
         with self._lock:
             if self.is_closed:
                 return None
-            may_wait = self._waits_in_socket and not self._lock_requests and timeout_s >= SHORT_WAIT_S
+            may_wait = self._should_wait_in_socket and not self._lock_requests and timeout_s >= SHORT_WAIT_S
             message = self._next_locked(may_wait=may_wait)
             if message is not None:
-                self._waits_in_socket = True
+                self._should_wait_in_socket = True
                 return message
-            self._waits_in_socket = False
+            self._should_wait_in_socket = False
             # Under the same lock: the socket is empty, so its descriptor signals the next message.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
@@ -232,8 +232,8 @@ class SocketSubscriber(Generic[R]):
     def _finish_wait(self, waker: Waker, started_s: float) -> Message | None:
         with self._lock:
             self._waiters.remove(waker)
-            if waker in self._woken:
-                self._woken.discard(waker)
+            if waker in self._woken_waiters:
+                self._woken_waiters.discard(waker)
                 waker.clear()
             if self._waker is not None or self.is_closed:
                 waker.close()
@@ -244,7 +244,7 @@ class SocketSubscriber(Generic[R]):
                 return None
             message = self._next_locked()
             # after a longer wait the short one would only delay each message
-            self._waits_in_socket = message is not None and time.monotonic() - started_s < SHORT_WAIT_S
+            self._should_wait_in_socket = message is not None and time.monotonic() - started_s < SHORT_WAIT_S
             return message
 
     # ---- statistics
@@ -298,8 +298,8 @@ class SocketSubscriber(Generic[R]):
         """End the wait that `enter_wait` prepared."""
         with self._lock:
             self._waiters.remove(waker)
-            if waker in self._woken:
-                self._woken.discard(waker)
+            if waker in self._woken_waiters:
+                self._woken_waiters.discard(waker)
             if self.is_closed:  # `close` waits for this
                 self._changed.notify_all()
 
@@ -341,16 +341,16 @@ class SocketSubscriber(Generic[R]):
         if now < self._leased_until and not self.is_closed:
             # without the lock, which a waiting reader holds; a stale value is harmless
             self._io_check_at = due = now + _WAITER_CHECK_INTERVAL_S if self._waiters else self._leased_until
-            return PollState(pause_reading=True, due=due)
+            return PollState(is_reading_paused=True, due=due)
         with self._requested_lock():
             if self.is_closed:
-                return PollState(pause_reading=True)
+                return PollState(is_reading_paused=True)
             if self._waiters or now < self._leased_until:
                 # a reader in a long wait needs fewer checks than one that may stop at any moment
                 self._io_check_at = max(self._leased_until, now + LEASE_S)
                 if self._waiters and now >= self._leased_until:
                     self._io_check_at = now + _WAITER_CHECK_INTERVAL_S
-                return PollState(pause_reading=True, due=self._io_check_at)
+                return PollState(is_reading_paused=True, due=self._io_check_at)
             self._io_check_at = _INFINITE
             batch: list[Message] = []
             if sink is None:
@@ -364,7 +364,9 @@ class SocketSubscriber(Generic[R]):
                 sink(batch)
             except BaseException:  # also SystemExit: the sink thread continues with the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
-        return PollState(pause_reading=True, due=now + _BATCH_INTERVAL_S) if count or batch else PollState()
+        if count or batch:
+            return PollState(is_reading_paused=True, due=now + _BATCH_INTERVAL_S)
+        return PollState()
 
     # ---- closing
 
@@ -430,9 +432,9 @@ class SocketSubscriber(Generic[R]):
             # must check when the lease ends. It is asked once for many reads.
             self._io_check_at = self._leased_until
             self._io.serve_soon(self)
-        if self._queues_all and not self.ready and not self._inbox.messages:
-            span, self._read_at = now - self._read_at, now
-            if span > self._read_ahead.max_interval_s:
+        if self._is_keeping_all and not self.ready and not self._inbox.messages:
+            interval_s, self._last_read_at = now - self._last_read_at, now
+            if interval_s > self._read_ahead.max_interval_s:
                 if self._read_ahead.message_count > 1:
                     self._read_ahead.reset()
                 message = self._read(self.ready, may_wait=may_wait)
@@ -442,7 +444,7 @@ class SocketSubscriber(Generic[R]):
                 self._read_ahead.reset()
         if self.ready:
             return self._drop_excess_locked(self.ready.popleft())
-        if not self._queues_all:
+        if not self._is_keeping_all:
             self._fill_locked()
         elif self._may_exceed_bound and self._inbox.messages:
             self._inbox.move(self.ready, MAX_READ_AHEAD, _READ_AHEAD_BYTES)
@@ -450,8 +452,8 @@ class SocketSubscriber(Generic[R]):
         return self._inbox.pop()
 
     def _drop_excess_locked(self, message: Message | None) -> Message | None:
-        # Returns the oldest of `message` and those behind it for which there is room; counts the others as
-        # dropped.
+        # Drops `message`, and messages from the front of `ready`, until the queue limit is met; returns the
+        # oldest remaining message.
         dropped = 0
         while message is not None and len(self.ready) >= self.spec.max_messages:
             message = self.ready.popleft()
@@ -470,7 +472,7 @@ class SocketSubscriber(Generic[R]):
         return count
 
     def _fill_batch_locked(self, batch: list[Message]) -> int:
-        if self._queues_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
+        if self._is_keeping_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
             return self._read_into(batch, _BATCH_MESSAGES, _BATCH_BYTES)
         count = self._fill_locked()
         batch += self._inbox.pop_all()
@@ -483,7 +485,7 @@ class SocketSubscriber(Generic[R]):
             self._io.serve_soon(self)
 
     def _wake_waiters_locked(self) -> None:
-        self._woken.update(self._waiters)
+        self._woken_waiters.update(self._waiters)
         for waker in self._waiters:
             waker.wake()
 
@@ -495,7 +497,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
         super().__init__(readable, io, spec, on_close)
-        self._closed_early: set[int] | None = set()
+        self._early_closed_ids: set[int] | None = set()
         """Ids of publishers that closed before `connect_listed`; None after `connect_listed`."""
 
     @property
@@ -543,13 +545,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         notification may be handled first.
         """
         with self._requested_lock():
-            closed, self._closed_early = self._closed_early or set(), None
-            self._connect_locked(each for each in remotes if each.publisher.id not in closed)
+            closed_ids, self._early_closed_ids = self._early_closed_ids or set(), None
+            self._connect_locked(each for each in remotes if each.publisher.id not in closed_ids)
 
     def expect_all_messages(self, publisher: int) -> None:
         """Count losses from the first message of a publisher that was created after this subscriber."""
         with self._requested_lock():
-            is_registered = self._closed_early is None
+            is_registered = self._early_closed_ids is None
             if is_registered and not self.is_closed:
                 self._readable.sources.expect_all_messages(publisher)
 
@@ -583,18 +585,18 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 if publisher_id not in listed_ids and source.remote is not None:
                     source.is_silent = True
 
-    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """Handle the removal of a publisher. See `SessionSubscriber.publisher_removed`.
+    def handle_publisher_removed(self, publisher: int, last_seq: int, *, is_closed: bool) -> None:
+        """Handle the removal of a publisher. See `SessionSubscriber.handle_publisher_removed`.
 
         The connection stays open until the publisher's bye, or until the publisher is replaced.
         """
         with self._requested_lock():
-            if is_closed and self._closed_early is not None:
-                self._closed_early.add(publisher)
+            if is_closed and self._early_closed_ids is not None:
+                self._early_closed_ids.add(publisher)
             if is_closed:
-                self._readable.sources.mark_closing(publisher, final, time.monotonic())
+                self._readable.sources.mark_closing(publisher, last_seq, time.monotonic())
             else:
-                self._readable.sources.mark_silent(publisher, final)
+                self._readable.sources.mark_silent(publisher, last_seq)
 
     def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, given by node id."""

@@ -28,7 +28,7 @@ class Subscriptions:
 
     def __init__(self, topic: str, publisher: int) -> None:
         self.counts_at_hello: dict[int, int] = {}
-        """Number of messages at the hello of each connected subscriber, by id."""
+        """Number of messages published before the hello of each connected subscriber, by id."""
         self.hellos: dict[int, bytes] = {}
         """First part of messages addressed to one subscriber alone, by its id."""
         self.legacy_filters: dict[bytes, int] = {}
@@ -41,7 +41,7 @@ class Subscriptions:
         self.shared: SharedPayloads | None = None
         self.rejections = RejectionCounter()
         self._id = publisher
-        self._name = topic
+        self._topic_name = topic
         self._topic = topic_part(topic)
 
     @property
@@ -68,46 +68,46 @@ class Subscriptions:
         self._without_batches.clear()
 
     def handle_event(
-        self, event: bytes, count: int, connection_of: Callable[[], RemoteConnection | None] = lambda: None
+        self, event: bytes, count: int, get_connection: Callable[[], RemoteConnection | None] = lambda: None
     ) -> bytes | None:
         """Handle a subscription event.
 
         Args:
             event: Event from the XPUB socket.
             count: Number of messages published so far.
-            connection_of: Returns the connection that delivered the event; None if the peer is on this
+            get_connection: Returns the connection that delivered the event; None if the peer is on this
                 computer.
 
         Returns:
             Topic frame for the echo if the event is the hello of a new subscriber, else None.
         """
-        is_wanted, subscription = event[:1] == b"\1", event[1:]
+        is_subscribe, subscription = event[:1] == b"\1", event[1:]
         hello = parse_hello(subscription)
         if hello is None:
-            if not self._handle_reply(subscription, is_wanted=is_wanted):
-                self._update_filters(subscription, is_wanted=is_wanted)
+            if not self._handle_reply(subscription, is_subscribe=is_subscribe):
+                self._update_filters(subscription, is_subscribe=is_subscribe)
             return None
-        if hello.topic != self._name:
+        if hello.topic != self._topic_name:
             return None  # a subscriber of another publisher that had this port before
-        if is_wanted:
+        if is_subscribe:
             topic_frame = self._add_subscriber(hello, subscription, count)
             if topic_frame is not None:
-                self._update_connection(hello.subscriber, connection_of())
+                self._update_connection(hello.subscriber, get_connection())
             return topic_frame
         self._remove_subscriber(hello.subscriber)
         return None
 
-    def _handle_reply(self, subscription: bytes, *, is_wanted: bool) -> bool:
+    def _handle_reply(self, subscription: bytes, *, is_subscribe: bool) -> bool:
         # Handles acknowledgements and replies to offers. Returns True for these.
-        read, shares = parse_acknowledgement(subscription), parse_acceptance(subscription)
-        if read is not None:
-            if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
-                self.windows[read.subscriber].acknowledge(read.seq, read.bound_bytes)
-        elif shares is not None:
-            is_valid = is_wanted and shares.publisher == self._id and shares.subscriber in self.windows
-            if is_valid and self.shared is not None:
-                self.shared.confirm(shares)
-        return read is not None or shares is not None
+        ack, acceptance = parse_acknowledgement(subscription), parse_acceptance(subscription)
+        if ack is not None:
+            if is_subscribe and ack.publisher == self._id and ack.subscriber in self.windows:
+                self.windows[ack.subscriber].acknowledge(ack.seq, ack.bound_bytes)
+        elif acceptance is not None:
+            is_own = acceptance.publisher == self._id and acceptance.subscriber in self.windows
+            if is_subscribe and is_own and self.shared is not None:
+                self.shared.confirm(acceptance)
+        return ack is not None or acceptance is not None
 
     def _add_subscriber(self, hello: Hello, subscription: bytes, count: int) -> bytes | None:
         if len(self.counts_at_hello) >= MAX_SUBSCRIBERS and hello.subscriber not in self.counts_at_hello:
@@ -125,17 +125,17 @@ class Subscriptions:
         self._without_batches.discard(hello.subscriber)
         if not hello.reads_batches:
             self._without_batches.add(hello.subscriber)
-        if hello.acknowledges:
+        if hello.acknowledges_echoes:
             self.windows[hello.subscriber] = SendWindow()  # a new connection: nothing is in flight
         return subscription
 
     def _update_connection(self, subscriber: int, connection: RemoteConnection | None) -> None:
         # A hello over a new connection means that the previous connection is abandoned.
-        before = self._remote_connections.pop(subscriber, None)
+        previous = self._remote_connections.pop(subscriber, None)
         if connection is not None:
             self._remote_connections[subscriber] = connection
-            if before is not None and before != connection:
-                before.close()
+            if previous is not None and previous != connection:
+                previous.close()
 
     def close_silent(self) -> None:
         """Close connections to computers that have vanished; libzmq then removes their subscribers."""
@@ -152,16 +152,16 @@ class Subscriptions:
         if self.shared is not None:
             self.shared.discard(subscriber)
 
-    def _update_filters(self, subscription: bytes, *, is_wanted: bool) -> None:
+    def _update_filters(self, subscription: bytes, *, is_subscribe: bool) -> None:
         # XPUB_VERBOSE reports every subscribe, but only the last unsubscribe.
         if not self._topic.startswith(subscription):
             self._reject(f"an invalid subscription of {len(subscription)} bytes")
             return
-        if is_wanted:
+        if is_subscribe:
             self.legacy_filters[subscription] = self.legacy_filters.get(subscription, 0) + 1
         else:
             self.legacy_filters.pop(subscription, None)
 
     def _reject(self, reason: str) -> None:
         if self.rejections.add(reason):
-            _logger.info("'%s' received %s", self._name, self.rejections.recent_message())
+            _logger.info("'%s' received %s", self._topic_name, self.rejections.recent_message())

@@ -123,14 +123,14 @@ class ZeromqTransport:
         self._node = node
         self._shared: SharedContext = shared_context()
         self._io = self._shared.io
-        self._sinks: IoThread | None = None
+        self._sink_io: IoThread | None = None
         self._lock = threading.Lock()
         self._sessions: dict[str, MasterSession] = {}
         self._publishers: dict[int, OwnedPublisher] = {}
         self._subscribers: dict[int, _Subscriber] = {}
         self._busy_wakers: list[Waker] = []
         self._threads = threading.local()
-        self._waiting: WeakSet[ThreadWait] = WeakSet()
+        self._thread_waits: WeakSet[ThreadWait] = WeakSet()
         self._is_closed = False
         self._is_terminated = False
         self._services = ZeromqServices(self._shared, self._session, node.name)
@@ -170,9 +170,9 @@ class ZeromqTransport:
         try:
             reply = session.add_publisher(record, publisher, spec.wait_s)
             publisher.expect((*reply.expected, *reply.hung))
-            absent = publisher.wait_for(reply.expected, HANDSHAKE_TIMEOUT_S)
-            if absent:
-                session.report_missing(spec.id, absent)
+            missing_ids = publisher.wait_for(reply.expected, HANDSHAKE_TIMEOUT_S)
+            if missing_ids:
+                session.report_missing(spec.id, missing_ids)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
             publisher.close(0.0)
             raise
@@ -278,8 +278,8 @@ class ZeromqTransport:
         return subscriber
 
     def _new_readable(self, spec: SubscriberSpec) -> NativeReadable:
-        kind = CheckedSubSocket if spec.msg_type in CHECKED_TYPES else SubSocket
-        return kind(self._new_sub_socket(spec), spec)
+        socket_class = CheckedSubSocket if spec.msg_type in CHECKED_TYPES else SubSocket
+        return socket_class(self._new_sub_socket(spec), spec)
 
     def _create_direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)
@@ -307,11 +307,11 @@ class ZeromqTransport:
             return self._io
         with self._lock:
             self._check_open_locked()
-            if self._sinks is None:
+            if self._sink_io is None:
                 check_free_descriptors(_FDS_PER_THREAD, f"a subscriber of '{spec.topic}'")
-                self._sinks = IoThread(f"nep-sinks-{self._node.name}")
-                self._sinks.start()
-            return self._sinks
+                self._sink_io = IoThread(f"nep-sinks-{self._node.name}")
+                self._sink_io.start()
+            return self._sink_io
 
     def _add_subscriber(self, subscriber: _Subscriber) -> None:
         with self._lock:
@@ -408,7 +408,7 @@ class ZeromqTransport:
 
     def _wake_waits_locked(self) -> None:
         # Call after setting `_is_terminated`.
-        for thread_wait in self._waiting:
+        for thread_wait in self._thread_waits:
             thread_wait.waker.wake()
             if not thread_wait.is_busy:
                 thread_wait.waker.close()
@@ -418,7 +418,7 @@ class ZeromqTransport:
         if thread_wait is None:
             thread_wait = self._threads.waits = ThreadWait()
             with self._lock:
-                self._waiting.add(thread_wait)
+                self._thread_waits.add(thread_wait)
         return thread_wait
 
     def wake(self) -> None:
@@ -426,7 +426,7 @@ class ZeromqTransport:
         with self._lock:
             for waker in self._busy_wakers:
                 waker.wake()
-            for thread_wait in self._waiting:
+            for thread_wait in self._thread_waits:
                 thread_wait.waker.wake()
 
     @contextmanager
@@ -478,7 +478,7 @@ class ZeromqTransport:
             sessions = list(self._sessions.values())
             publishers = list(self._publishers.values())
             subscribers = list(self._subscribers.values())
-            sinks = self._sinks
+            sink_io = self._sink_io
         for publisher in publishers:
             if isinstance(publisher, OriginalPublisher):
                 # flush while the others wait for their subscribers
@@ -495,8 +495,8 @@ class ZeromqTransport:
             publisher.release()
         for session in sessions:
             session.close()
-        if sinks is not None:
-            sinks.close(max(_LEAVE_TIMEOUT_S, deadline - time.monotonic()))
+        if sink_io is not None:
+            sink_io.close(max(_LEAVE_TIMEOUT_S, deadline - time.monotonic()))
         self._shared.release()
 
     def _close_idle_sessions_locked(self) -> None:

@@ -51,7 +51,7 @@ class ParameterForm:
             raise ValueError(_("{where} must be a finite number").format(where=nan_path or _("the value")))
         return plain_value
 
-    def instance(self, plain_value: object) -> object:
+    def create_instance(self, plain_value: object) -> object:
         """Create an instance from a validated plain value."""
         return self._shape.read(plain_value)
 

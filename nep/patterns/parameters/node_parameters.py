@@ -220,7 +220,7 @@ class Parameters:
         # Runs in a thread of the server.
         values = request.get("set", {}) if isinstance(request, Mapping) else None
         if not isinstance(values, Mapping) or not all(isinstance(each, str) for each in values):
-            return {"refused": _("a call to the parameters must be a map; its 'set' maps names to values")}
+            return {"refused": _("the request must be a map whose 'set' maps parameter names to values")}
         try:
             self._set(values, is_own=False)
         except Exception as error:  # noqa: BLE001 - an exception of a callback rejects the change

@@ -61,7 +61,7 @@ class NodeParameter:
     @property
     def typed_value(self) -> object:
         """Value as a new instance of the parameter's class; the plain value if it has no class."""
-        return self.value if self.form is None else self.form.instance(self.value)
+        return self.value if self.form is None else self.form.create_instance(self.value)
 
     def with_value(self, value: object) -> NodeParameter:
         """Return a copy with another value. Raises `ParameterError` if the value is not allowed."""
@@ -199,7 +199,7 @@ def _is_finite(value: object) -> bool:
 def short_repr(value: object) -> str:
     """Return the `repr` of a value, shortened and escaped for use in a message."""
     try:
-        written = repr(value)
+        text = repr(value)
     except Exception:  # noqa: BLE001 - `repr` of any class may raise; ints may have too many digits
-        written = f"a '{type(value).__name__}'"
-    return escaped(shortened(written, _MAX_SHOWN_LENGTH))
+        text = f"a '{type(value).__name__}'"
+    return escaped(shortened(text, _MAX_SHOWN_LENGTH))

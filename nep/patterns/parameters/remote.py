@@ -88,10 +88,10 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
 
     Raises `NepError` if no node or more than one node matches.
     """
-    able = {
+    names_by_id = {
         each.id: each.name for each in graph.nodes.values() if parameters_topic(each.id) in graph.services
     }
-    matching_ids = [id_ for id_, known_names in able.items() if name in {id_, known_names}]
+    matching_ids = [id_ for id_, node_name in names_by_id.items() if name in {id_, node_name}]
     if len(matching_ids) == 1:
         return matching_ids[0]
     if matching_ids:
@@ -102,6 +102,6 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
         )
     if any(name in {each.id, each.name} for each in graph.nodes.values()):
         raise NepError(_("the node '{name}' has declared no parameters").format(name=escaped(name)))
-    known_names = tuple(sorted(set(able.values())))
+    known_names = tuple(sorted(set(names_by_id.values())))
     hint = did_you_mean(name, known_names) if known_names else _("no node has parameters")
     raise NepError(_("no node is named '{name}'; {said}").format(name=escaped(name), said=hint))

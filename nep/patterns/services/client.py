@@ -70,7 +70,7 @@ class Client:
         self._is_forked = False
         self._lock = threading.Lock()
         self._future_thread: _FutureThread | None = None
-        self._sent: Future[object] | None = None
+        self._sent_call: Future[object] | None = None
 
     @property
     def is_connected(self) -> bool:
@@ -144,7 +144,9 @@ class Client:
             self._resolve_timeout(timeout_s),
             lambda outcome: future_thread.add(lambda: self._complete_future(future, outcome)),
         )
-        future.add_done_callback(lambda ended: self._transport.cancel(call) if ended.cancelled() else None)
+        future.add_done_callback(
+            lambda done_future: self._transport.cancel(call) if done_future.cancelled() else None
+        )
         return future
 
     async def acall(self, request: object, timeout_s: TimeLimit = "default") -> object:
@@ -182,24 +184,24 @@ class Client:
 
         Raises `NepError` if the reply to the previous request has not been read.
         """
-        if self._sent is not None:
+        if self._sent_call is not None:
             raise NepError(_("the previous reply hasn't been read; call 'listen_info' first"))
-        self._sent = self.call_async(request)
+        self._sent_call = self.call_async(request)
 
     def listen_info(self) -> object:
         """Return the reply to `send_info`.
 
         Raises the exceptions of `call`, and `NepError` if no request was sent.
         """
-        sent, self._sent = self._sent, None
-        if sent is None:
+        sent_call, self._sent_call = self._sent_call, None
+        if sent_call is None:
             raise NepError(_("no request was sent; call 'send_info' first"))
         done = threading.Event()
-        sent.add_done_callback(lambda _ended: done.set())
+        sent_call.add_done_callback(lambda _future: done.set())
         while not done.wait(WAIT_SLICE_S):
             if self._is_forked:
                 raise self._closed_error()
-        return sent.result()
+        return sent_call.result()
 
     # ---- outcome
 

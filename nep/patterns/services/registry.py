@@ -115,7 +115,7 @@ class ServiceRegistry:
         with self._lock:
             self._servers = (*self._servers, server)
             self.has_servers = True
-        self._close_if_late(server)
+        self._close_if_node_closed(server)
         self._wake()  # a spinning thread serves its calls from now on
         return server
 
@@ -135,7 +135,7 @@ class ServiceRegistry:
         )
         with self._lock:
             self._clients = (*self._clients, client)
-        self._close_if_late(client)
+        self._close_if_node_closed(client)
         return client
 
     def new_surveyor(
@@ -155,14 +155,14 @@ class ServiceRegistry:
         )
         with self._lock:
             self._clients = (*self._clients, surveyor)
-        self._close_if_late(surveyor)
+        self._close_if_node_closed(surveyor)
         return surveyor
 
-    def _close_if_late(self, created: Server | Client | Surveyor) -> None:
+    def _close_if_node_closed(self, server_or_client: Server | Client | Surveyor) -> None:
         # Raises `ClosedError`. The node may have been closed concurrently, without this object in its
         # registry.
         if self._is_closed:
-            created.close()
+            server_or_client.close()
             raise self._closed_error()
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
@@ -190,11 +190,11 @@ class ServiceRegistry:
             )
         return transport
 
-    def _remove(self, closed: Server | Client | Surveyor) -> None:
+    def _remove(self, server_or_client: Server | Client | Surveyor) -> None:
         with self._lock:
-            self._servers = tuple(each for each in self._servers if each is not closed)
+            self._servers = tuple(each for each in self._servers if each is not server_or_client)
             self.has_servers = bool(self._servers)
-            self._clients = tuple(each for each in self._clients if each is not closed)
+            self._clients = tuple(each for each in self._clients if each is not server_or_client)
 
     # ---- spinning
 
@@ -205,15 +205,15 @@ class ServiceRegistry:
             queue for each in self._servers if (queue := each.spin_queue) is not None and not each.is_closed
         ]
 
-    def run(self, node_ends: threading.Event) -> bool:
+    def run(self, stop_event: threading.Event) -> bool:
         """Serve one call per server in the spinning thread; return True if a call was served.
 
         Args:
-            node_ends: Event that stops the method before the next server.
+            stop_event: Event that stops the method before the next server.
         """
         has_run = False
         for server in self._servers:
-            if node_ends.is_set():
+            if stop_event.is_set():
                 break
             if server.spin_queue is not None and not server.is_closed:
                 has_run = server.run_one() or has_run

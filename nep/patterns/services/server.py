@@ -69,7 +69,7 @@ class Server:
         self._is_forked = False
         self._open_request: IncomingCall | None = None
         self._open_request_lock = threading.Lock()
-        self._failures = 0
+        self._failure_count = 0
         self._threads = tuple(
             threading.Thread(target=self._run_thread, name=f"nep-server-{service}-{number}", daemon=True)
             for number in range(1, threads + 1)
@@ -163,10 +163,10 @@ class Server:
 
     def _log_failure(self, error: BaseException) -> Reply:
         # Logged at increasing intervals.
-        self._failures += 1
-        if is_logged(self._failures):
+        self._failure_count += 1
+        if is_logged(self._failure_count):
             _logger.warning(
-                "the callback of '%s' failed (%d so far)", self.service, self._failures, exc_info=error
+                "the callback of '%s' failed (%d so far)", self.service, self._failure_count, exc_info=error
             )
         return _error_reply(error)
 

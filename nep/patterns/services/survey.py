@@ -57,7 +57,7 @@ class Surveyor:
         self._codec = types.request.codec(codec)
         self._on_close = on_close
         self._is_forked = False
-        self._sent: Iterator[object] | None = None
+        self._answers: Iterator[object] | None = None
         self.failures = 0
         """Number of respondents that replied with an error or stopped before replying."""
 
@@ -171,16 +171,16 @@ class Surveyor:
 
         Unread answers of the last question are discarded.
         """
-        self._sent = self.answers(question)
+        self._answers = self.answers(question)
 
     def listen_json(self) -> tuple[bool, object]:
         """Return (True, next answer), or (False, {}) after the time limit or the last answer.
 
         Raises `NepError` if no question was sent.
         """
-        if self._sent is None:
+        if self._answers is None:
             raise NepError(_("no request was sent; call 'send_json' first"))
-        for reply in self._sent:
+        for reply in self._answers:
             return True, reply
         return False, {}
 

@@ -43,7 +43,7 @@ class Alarms:
         self,
         rules: Sequence[AlarmRule] = (),
         history: AlarmHistory | None = None,
-        carriers: Mapping[str, ActionStarter] | None = None,
+        action_starters: Mapping[str, ActionStarter] | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
@@ -53,14 +53,14 @@ class Alarms:
         Args:
             rules: Rules to evaluate.
             history: History to continue; None for an empty one.
-            carriers: Functions that start actions, by kind of action. Actions of other kinds are recorded
-                as failed.
+            action_starters: Functions that start actions, by kind of action. Actions of other kinds are
+                recorded as failed.
             clock: Monotonic clock in seconds.
             clock_s: Clock in seconds since 1970.
         """
         self.evaluator = AlarmEvaluator(rules, clock=clock, clock_s=clock_s)
         self.history = history if history is not None else AlarmHistory()
-        self._action_starters = dict(carriers or {})
+        self._action_starters = dict(action_starters or {})
         self._clock, self._clock_s = clock, clock_s
         self._results: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
         self._retries: dict[tuple[str, str], _Retry] = {}
@@ -107,8 +107,8 @@ class Alarms:
 
     def retry_in_s(self, rule_id: str) -> float | None:
         """Return the seconds until a failed action of a rule is retried, or None if no retry is pending."""
-        dues = [retry.due_at for (id, _kind), retry in self._retries.items() if id == rule_id]
-        return max(0.0, min(dues) - self._clock()) if dues else None
+        due_times = [retry.due_at for (id, _kind), retry in self._retries.items() if id == rule_id]
+        return max(0.0, min(due_times) - self._clock()) if due_times else None
 
     @property
     def is_busy(self) -> bool:
@@ -123,9 +123,9 @@ class Alarms:
         Returns:
             Tuples of the rule, the result as text, and the time of completion (s since 1970).
         """
-        deeds = list(self._action_results)
+        results = list(self._action_results)
         self._action_results.clear()
-        return deeds
+        return results
 
     def tick(self) -> list[AlarmEvent]:
         """Evaluate time-based rules, start actions and due retries, and return the new events."""
@@ -143,9 +143,9 @@ class Alarms:
             record = AlarmRecord(rule.id, cause, event.at_s, is_on=True, was_snoozed=event.is_snoozed)
             self.history.add(record)
         if event.kind == "off":
-            record_now = self.history.current(rule.id)
-            if record_now is not None:
-                record_now.is_on, record_now.duration_s, record_now.count = (
+            current = self.history.current(rule.id)
+            if current is not None:
+                current.is_on, current.duration_s, current.count = (
                     False,
                     event.duration_s,
                     event.count,
@@ -157,14 +157,14 @@ class Alarms:
                 self._start_action(event, action, 1)
 
     def _start_action(self, event: AlarmEvent, action: AlarmAction, tries: int) -> None:
-        carrier = self._action_starters.get(action.kind)
+        start = self._action_starters.get(action.kind)
         self._running_count += 1
-        if carrier is None:
+        if start is None:
             self._results.put((event, action, MAX_TRIES, False, _("this action isn't available here")))
             return
         on_done = partial(self._on_action_done, event, action, tries)
         try:
-            carrier(event, action, on_done)
+            start(event, action, on_done)
         except Exception as error:  # noqa: BLE001  a failing action must not block the next
             on_done(False, str(error) or type(error).__name__)
 

@@ -99,14 +99,14 @@ class AlarmCommands:
 
 
 def _reply_handler(service: str, on_done: DoneCallback) -> Callable[[Future[object]], None]:
-    def on_reply(ended: Future[object]) -> None:
-        error = None if ended.cancelled() else ended.exception()
+    def on_reply(future: Future[object]) -> None:
+        error = None if future.cancelled() else future.exception()
         if isinstance(error, NoServerError):
             on_done(False, _("{service} has no server").format(service=service))
         elif isinstance(error, WaitTimeoutError):
             template = _("{service} didn't reply within {seconds} s")
             on_done(False, template.format(service=service, seconds=number(CALL_TIMEOUT_S)))
-        elif error is not None or ended.cancelled():
+        elif error is not None or future.cancelled():
             on_done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
         else:
             on_done(True, _("{service} replied").format(service=service))

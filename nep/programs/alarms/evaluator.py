@@ -25,7 +25,7 @@ LARGE_MESSAGE_BYTES = 256 * 1024
 """Size in bytes above which a message is decoded only if it is the newest of its batch."""
 MAX_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
-"""Time in seconds after a restart of the master in which no node counts as disconnected.
+"""Time in seconds after a restart of the master in which no node counts as having left.
 
 Nodes register again within this time.
 """
@@ -86,7 +86,7 @@ class _SubscribedTopic:
 
     readers: list[AlarmStateMachine] = field(default_factory=list)
     present_since: float | None = None
-    last: float | None = None
+    last_at: float | None = None
     count: int = 0
     is_undecodable: bool = False
     samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_MAX_SAMPLES))
@@ -113,11 +113,11 @@ class AlarmEvaluator:
         self._clock, self._clock_s = clock, clock_s
         self._lock = threading.Lock()
         self._rules: tuple[AlarmRule, ...] = ()
-        self._tracks: dict[str, AlarmStateMachine] = {}
+        self._state_machines: dict[str, AlarmStateMachine] = {}
         self._subscribed: dict[str, _SubscribedTopic] = {}
         self._losses: dict[str, TopicLosses] = {}
         self._events: deque[AlarmEvent] = deque(maxlen=MAX_EVENTS)
-        self._snoozed_on: set[str] = set()
+        self._on_while_snoozed: set[str] = set()
         """Ids of alarms that turned on while snoozed."""
         self._view: GraphView | None = None
         self._nodes: frozenset[str] = frozenset()
@@ -125,7 +125,7 @@ class AlarmEvaluator:
         self._epoch: int | None = None
         self._epoch_at = 0.0
         self._sampled_at = 0.0
-        self.skipped = 0
+        self.skipped_count = 0
         """Number of large messages that were not decoded."""
         self.has_events = threading.Event()
         """Event that is set when a message turned an alarm on, to wake the thread that calls `tick`."""
@@ -139,47 +139,47 @@ class AlarmEvaluator:
     @property
     def topics(self) -> frozenset[str]:
         """Topics to which the rules need a subscription."""
-        return topics_of([track.rule for track in self._tracks.values()])
+        return topics_of([machine.rule for machine in self._state_machines.values()])
 
     def set_rules(self, rules: Sequence[AlarmRule]) -> None:
         """Replace the rules. The state of rules whose condition is unchanged is preserved."""
         now = self._clock()
         with self._lock:
-            before, self._tracks = self._tracks, {}
+            previous, self._state_machines = self._state_machines, {}
             for rule in rules:
                 if not rule.is_enabled or problem_of(rule) is not None:
                     continue
-                existing = before.get(rule.id)
+                existing = previous.get(rule.id)
                 if existing is not None and _is_same_condition(existing.rule, rule):
                     existing.rule = rule
-                    self._tracks[rule.id] = existing
-                    del before[rule.id]
+                    self._state_machines[rule.id] = existing
+                    del previous[rule.id]
                 else:
-                    self._tracks[rule.id] = AlarmStateMachine(rule)
-            for id, track in before.items():
-                transition = track.turn_off(now)
+                    self._state_machines[rule.id] = AlarmStateMachine(rule)
+            for id, machine in previous.items():
+                transition = machine.turn_off(now)
                 if transition is not None:
-                    self._emit(track, transition)
-                self._snoozed_on.discard(id)
+                    self._emit(machine, transition)
+                self._on_while_snoozed.discard(id)
             self._rules = tuple(rules)
             self._update_topics()
 
     def _update_topics(self) -> None:
-        subscription, self._subscribed = self._subscribed, {}
-        losses, self._losses = self._losses, {}
-        for track in self._tracks.values():
-            condition = track.rule.condition
+        previous_topics, self._subscribed = self._subscribed, {}
+        previous_losses, self._losses = self._losses, {}
+        for machine in self._state_machines.values():
+            condition = machine.rule.condition
             if condition.needs_topic:
                 topic = self._subscribed.get(condition.name)
                 if topic is None:
                     topic = self._subscribed[condition.name] = (
-                        subscription.get(condition.name) or _SubscribedTopic()
+                        previous_topics.get(condition.name) or _SubscribedTopic()
                     )
                     topic.readers = []
                 if condition.is_about_value:
-                    topic.readers.append(track)
+                    topic.readers.append(machine)
             elif condition.kind == "loses":
-                topic_losses = losses.get(condition.name) or TopicLosses()
+                topic_losses = previous_losses.get(condition.name) or TopicLosses()
                 self._losses[condition.name] = topic_losses
 
     # ---- inputs
@@ -189,33 +189,35 @@ class AlarmEvaluator:
         subscription = self._subscribed.get(topic)
         if subscription is None or not messages:
             return
-        payloads, unreadable, skipped = _decode_payloads(messages) if subscription.readers else ([], False, 0)
-        now, is_news = self._clock(), False
+        payloads, is_undecodable, skipped_count = (
+            _decode_payloads(messages) if subscription.readers else ([], False, 0)
+        )
+        now, has_transition = self._clock(), False
         with self._lock:
-            subscription.last = now
+            subscription.last_at = now
             subscription.count += len(messages)
-            subscription.is_undecodable = unreadable
-            self.skipped += skipped
+            subscription.is_undecodable = is_undecodable
+            self.skipped_count += skipped_count
             if subscription.present_since is None:
                 subscription.present_since = now
-            for track in subscription.readers:
+            for machine in subscription.readers:
                 for payload in payloads:
-                    transition = track.read(payload, now)
+                    transition = machine.read(payload, now)
                     if transition is not None:
-                        self._emit(track, transition)
-                        is_news = True
-        if is_news:
+                        self._emit(machine, transition)
+                        has_transition = True
+        if has_transition:
             self.has_events.set()
 
     def update_graph(self, view: GraphView | None) -> None:
         """Evaluate a new snapshot of the graph.
 
         Args:
-            view: Graph; None while the master doesn't reply, so that no node counts as disconnected.
+            view: Graph; None while the master doesn't reply, so that no node counts as having left.
         """
         now = self._clock()
         with self._lock:
-            before, self._view = self._view, view
+            previous, self._view = self._view, view
             if view is None:
                 return
             if view.epoch != self._epoch:
@@ -223,43 +225,43 @@ class AlarmEvaluator:
             nodes = frozenset(node.name for node in view.nodes.values())
             topics = frozenset(name for name, info in view.topics.items() if info.publishers)
             new_nodes, new_topics = nodes - self._nodes, topics - self._topics
-            is_settled = before is not None and now - self._epoch_at >= MASTER_GRACE_S
+            is_settled = previous is not None and now - self._epoch_at >= MASTER_GRACE_S
             self._nodes, self._topics = nodes, topics
             for name, subscription in self._subscribed.items():
                 if subscription.present_since is None and name in topics:
                     subscription.present_since = now
             for name, losses in self._losses.items():
                 losses.add(view.topics.get(name), now)
-            for track in self._tracks.values():
-                self._evaluate_graph(track, new_nodes, new_topics, now, is_settled=is_settled)
+            for machine in self._state_machines.values():
+                self._evaluate_graph(machine, new_nodes, new_topics, now, is_settled=is_settled)
 
     def _evaluate_graph(
         self,
-        track: AlarmStateMachine,
+        machine: AlarmStateMachine,
         nodes: frozenset[str],
         topics: frozenset[str],
         now: float,
         *,
         is_settled: bool,
     ) -> None:
-        kind, name = track.rule.condition.kind, track.rule.condition.name
+        kind, name = machine.rule.condition.kind, machine.rule.condition.name
         transition: Transition | None = None
         if kind == "leaves":
             is_present = name in self._nodes
-            if is_present or (track.was_observed and now - self._epoch_at >= MASTER_GRACE_S):
-                transition = track.observe(not is_present, None, now)
+            if is_present or (machine.was_observed and now - self._epoch_at >= MASTER_GRACE_S):
+                transition = machine.observe(not is_present, None, now)
         elif kind == "comes":
-            track.was_observed = track.was_observed or name in self._nodes
+            machine.was_observed = machine.was_observed or name in self._nodes
             if is_settled and name in nodes:
-                transition = track.trigger(now)
+                transition = machine.trigger(now)
         elif kind == "appears":
             matching = sorted(topic for topic in topics if matches(name, topic))
-            track.was_observed = True
+            machine.was_observed = True
             if is_settled and matching:
-                track.last_value = matching[0][:MAX_CHARACTERS]
-                transition = track.trigger(now)
+                machine.last_value = matching[0][:MAX_CHARACTERS]
+                transition = machine.trigger(now)
         if transition is not None:
-            self._emit(track, transition)
+            self._emit(machine, transition)
 
     def tick(self) -> list[AlarmEvent]:
         """Evaluate time-based conditions and return the events since the last call.
@@ -274,45 +276,49 @@ class AlarmEvaluator:
                 for subscription in self._subscribed.values():
                     if subscription.present_since is not None:
                         subscription.samples.append((now, subscription.count))
-            for track in self._tracks.values():
-                transition = self._evaluate_time(track, now)
+            for machine in self._state_machines.values():
+                transition = self._evaluate_time(machine, now)
                 if transition is not None:
-                    self._emit(track, transition)
-            for id in [id for id in self._snoozed_on if not self._tracks[id].rule.is_snoozed(now_s)]:
-                self._snoozed_on.discard(id)
-                track = self._tracks[id]
-                if track.is_on:
-                    event = AlarmEvent("still", track.rule, now_s, track.last_value, count=track.count)
+                    self._emit(machine, transition)
+            for id in [
+                id for id in self._on_while_snoozed if not self._state_machines[id].rule.is_snoozed(now_s)
+            ]:
+                self._on_while_snoozed.discard(id)
+                machine = self._state_machines[id]
+                if machine.is_on:
+                    event = AlarmEvent("still", machine.rule, now_s, machine.last_value, count=machine.count)
                     self._events.append(event)
             events = list(self._events)
             self._events.clear()
         return events
 
-    def _evaluate_time(self, track: AlarmStateMachine, now: float) -> Transition | None:
-        condition = track.rule.condition
+    def _evaluate_time(self, machine: AlarmStateMachine, now: float) -> Transition | None:
+        condition = machine.rule.condition
         subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
         if condition.kind == "silent" and subscription is not None and subscription.present_since is not None:
-            silent_s = now - max(subscription.present_since, subscription.last or subscription.present_since)
-            return track.observe(silent_s >= condition.for_s, silent_s, now)
+            silent_s = now - max(
+                subscription.present_since, subscription.last_at or subscription.present_since
+            )
+            return machine.observe(silent_s >= condition.for_s, silent_s, now)
         if condition.kind in {"rate_below", "rate_above"} and subscription is not None:
             rate_hz = subscription.rate_hz(_window_s(condition.number), now)
             if rate_hz is not None:
-                return track.compare(rate_hz, now, is_below=condition.kind == "rate_below")
+                return machine.compare(rate_hz, now, is_below=condition.kind == "rate_below")
         elif condition.kind == "loses" and self._view is not None:
             percent = self._losses[condition.name].percent(condition.for_s, now)
             if percent is not None:
-                return track.compare(percent, now, is_below=False)
+                return machine.compare(percent, now, is_below=False)
         elif condition.kind == "leaves" and self._view is None:
             return None  # without a master it is unknown which nodes exist
-        return track.advance(now)
+        return machine.advance(now)
 
-    def _emit(self, track: AlarmStateMachine, transition: Transition) -> None:
-        rule, now_s = track.rule, self._clock_s()
+    def _emit(self, machine: AlarmStateMachine, transition: Transition) -> None:
+        rule, now_s = machine.rule, self._clock_s()
         is_snoozed = rule.is_snoozed(now_s)
         if transition.is_on and is_snoozed:
-            self._snoozed_on.add(rule.id)
+            self._on_while_snoozed.add(rule.id)
         elif not transition.is_on:
-            self._snoozed_on.discard(rule.id)
+            self._on_while_snoozed.discard(rule.id)
         self._events.append(
             AlarmEvent(
                 "on" if transition.is_on else "off",
@@ -331,23 +337,23 @@ class AlarmEvaluator:
         """Return the current state of a rule's alarm; "off" or "faulty" if the rule isn't evaluated."""
         now = self._clock()
         with self._lock:
-            track = self._tracks.get(rule.id)
-            if track is None:  # validate again only if the rule is not evaluated
+            machine = self._state_machines.get(rule.id)
+            if machine is None:  # validate again only if the rule is not evaluated
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
-            condition = track.rule.condition
+            condition = machine.rule.condition
             subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
-            was_seen = track.was_observed or (
+            was_seen = machine.was_observed or (
                 subscription is not None and subscription.present_since is not None
             )
             if condition.is_about_value:
-                was_seen = subscription is not None and subscription.last is not None
-            trouble = track.problem or (
+                was_seen = subscription is not None and subscription.last_at is not None
+            problem = machine.problem or (
                 "unreadable" if subscription is not None and subscription.is_undecodable else ""
             )
-            if track.on_since is not None:
-                return AlarmState("on", track.last_value, now - track.on_since, track.count, trouble)
-            phase: AlarmPhase = "pending" if track.is_pending else "well" if was_seen else "waits"
-            return AlarmState(phase, track.last_value, problem=trouble)
+            if machine.on_since is not None:
+                return AlarmState("on", machine.last_value, now - machine.on_since, machine.count, problem)
+            phase: AlarmPhase = "pending" if machine.is_pending else "well" if was_seen else "waits"
+            return AlarmState(phase, machine.last_value, problem=problem)
 
     @property
     def states(self) -> Mapping[str, AlarmState]:
@@ -365,14 +371,14 @@ def _window_s(limit_hz: float) -> float:
 
 def _decode_payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:
     payloads: list[object] = []
-    unreadable, skipped, newest = False, 0, messages[-1]
+    is_undecodable, skipped_count, newest = False, 0, messages[-1]
     for message in messages:
         if message.size_bytes > LARGE_MESSAGE_BYTES and message is not newest:
-            skipped += 1
+            skipped_count += 1
             continue
         try:
             payloads.append(dict(message.extension) if message.codec == "image" else message.payload)
-            unreadable = False
+            is_undecodable = False
         except DecodeError:
-            unreadable = True
-    return payloads, unreadable, skipped
+            is_undecodable = True
+    return payloads, is_undecodable, skipped_count

@@ -52,10 +52,10 @@ class AlarmRecord:
     was_snoozed: bool = False
     action_results: list[ActionResult] = field(default_factory=list)
 
-    def add(self, deed: ActionResult) -> None:
+    def add(self, result: ActionResult) -> None:
         """Add a completed action, replacing an earlier one of the same kind."""
-        remaining = [each for each in self.action_results if each.kind != deed.kind]
-        self.action_results = [*remaining, deed][-_MAX_ACTION_RESULTS:]
+        remaining = [each for each in self.action_results if each.kind != result.kind]
+        self.action_results = [*remaining, result][-_MAX_ACTION_RESULTS:]
 
 
 class AlarmHistory:
@@ -111,7 +111,7 @@ def record_to_plain(record: AlarmRecord) -> dict[str, object]:
     if record.was_snoozed:
         result["snoozed"] = True
     if record.action_results:
-        result["did"] = [[deed.kind, deed.text] for deed in record.action_results]
+        result["did"] = [[each.kind, each.text] for each in record.action_results]
     return result
 
 
@@ -126,7 +126,7 @@ def record_from_plain(value: object) -> AlarmRecord | None:
     if not isinstance(rule_id, str) or not isinstance(cause, str) or not _is_valid_time(at_s):
         return None
     lasted_s, count, results = value.get("lasted_s"), value.get("count", 1), value.get("did")
-    deeds = [
+    action_results = [
         ActionResult(str(each[0]), shortened(str(each[1]), _MAX_CHARACTERS))
         for each in (results if isinstance(results, list) else [])[:_MAX_ACTION_RESULTS]
         if isinstance(each, list) and len(each) == 2
@@ -138,7 +138,7 @@ def record_from_plain(value: object) -> AlarmRecord | None:
         float(lasted_s) if _is_valid_time(lasted_s) else None,  # type: ignore[arg-type]
         count=count if isinstance(count, int) and not isinstance(count, bool) and count > 0 else 1,
         was_snoozed=value.get("snoozed") is True,
-        action_results=deeds,
+        action_results=action_results,
     )
 
 

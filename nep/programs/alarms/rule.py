@@ -29,7 +29,7 @@ EVENT_KINDS = frozenset({"changes", "appears", "comes"})
 ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
 NAMED_ACTIONS = frozenset({"run", "call", "send"})
 
-MIN_S, MAX_S = 0.1, 86_400.0
+MIN_FOR_S, MAX_FOR_S = 0.1, 86_400.0
 MIN_CALM_S, MAX_CALM_S = 0.5, 3_600.0
 MAX_WINDOW_S = 600.0
 DEFAULT_CALM_S = 2.0
@@ -174,70 +174,70 @@ def new_id() -> str:
 
 def problem_of(rule: AlarmRule) -> RuleProblem | None:
     """Return the first problem of a rule, or None if it is valid."""
-    check = _RuleChecker()
-    _check_condition(rule.condition, check)
-    check.check_number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
+    checker = _RuleChecker()
+    _check_condition(rule.condition, checker)
+    checker.check_number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
         template = _("an alarm can have at most {most} actions; split it into two alarms")
-        check.problems.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
+        checker.problems.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
     for action in rule.actions:
-        _check_action(action, check)
-    return check.problems[0] if check.problems else None
+        _check_action(action, checker)
+    return checker.problems[0] if checker.problems else None
 
 
-def _check_condition(condition: AlarmCondition, check: _RuleChecker) -> None:
+def _check_condition(condition: AlarmCondition, checker: _RuleChecker) -> None:
     if not condition.name:
         key, template = (
             ("node", _("the node name is missing"))
             if condition.is_about_node
             else ("topic", _("the topic name is missing"))
         )
-        check.problems.append(RuleProblem(key, template))
+        checker.problems.append(RuleProblem(key, template))
         return
     if condition.is_about_node:
-        check.check_name("node", check_node_name, condition.name)
+        checker.check_name("node", check_node_name, condition.name)
     else:
-        check.check_name("topic", check_topic, condition.name)
+        checker.check_name("topic", check_topic, condition.name)
         if is_pattern(condition.name) and condition.kind != "appears":
             template = _("wildcards are allowed only with 'appears'; use the name of a topic")
-            check.problems.append(RuleProblem("topic", template))
+            checker.problems.append(RuleProblem("topic", template))
     if condition.is_about_value:
-        check.check_name("value", parse_path, condition.path)
-    _check_limit(condition, check)
-    _check_time(condition, check)
+        checker.check_name("value", parse_path, condition.path)
+    _check_limit(condition, checker)
+    _check_time(condition, checker)
 
 
-def _check_limit(condition: AlarmCondition, check: _RuleChecker) -> None:
+def _check_limit(condition: AlarmCondition, checker: _RuleChecker) -> None:
     limit = condition.limit
     if condition.kind in {"rate_below", "rate_above"}:
-        check.check_number("than", limit, 0.001, 1e6)
+        checker.check_number("than", limit, 0.001, 1e6)
     elif condition.kind == "loses":
-        check.check_number("than", limit, 0, 100)
+        checker.check_number("than", limit, 0, 100)
     elif condition.kind in NUMBER_KINDS:
-        check.check_number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
+        checker.check_number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
     elif condition.kind in KINDS_WITH_LIMIT and not _is_scalar(limit):
-        check.problems.append(RuleProblem("than", _("must be a number, a string, true, false or null")))
-    check.check_number("margin", condition.margin, 0, _MAX_NUMBER)
+        checker.problems.append(RuleProblem("than", _("must be a number, a string, true, false or null")))
+    checker.check_number("margin", condition.margin, 0, _MAX_NUMBER)
 
 
-def _check_time(condition: AlarmCondition, check: _RuleChecker) -> None:
+def _check_time(condition: AlarmCondition, checker: _RuleChecker) -> None:
     if condition.kind == "silent":
-        check.check_number("for_s", condition.for_s, MIN_S, MAX_S)
+        checker.check_number("for_s", condition.for_s, MIN_FOR_S, MAX_FOR_S)
     elif condition.kind == "loses":
-        check.check_number("for_s", condition.for_s, 1, MAX_WINDOW_S)
+        checker.check_number("for_s", condition.for_s, 1, MAX_WINDOW_S)
     else:
-        check.check_number("for_s", condition.for_s, 0, MAX_S)
+        checker.check_number("for_s", condition.for_s, 0, MAX_FOR_S)
 
 
-def _check_action(action: AlarmAction, check: _RuleChecker) -> None:
+def _check_action(action: AlarmAction, checker: _RuleChecker) -> None:
     if action.kind in NAMED_ACTIONS and not action.name:
-        check.problems.append(RuleProblem(action.kind, _("the name is missing")))
+        checker.problems.append(RuleProblem(action.kind, _("the name is missing")))
     elif action.kind == "call":
-        check.check_name("call", check_service, action.name)
+        checker.check_name("call", check_service, action.name)
     elif action.kind == "send":
-        check.check_name("send", check_topic, action.name)
+        checker.check_name("send", check_topic, action.name)
     elif action.kind == "keep":
-        check.check_number("keep_s", action.recording_s, 1, MAX_WINDOW_S)
+        checker.check_number("keep_s", action.recording_s, 1, MAX_WINDOW_S)
 
 
 def _is_scalar(value: object) -> bool:

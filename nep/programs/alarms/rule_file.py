@@ -142,7 +142,7 @@ def parse_alarms(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
             "prints an example"
         )
         raise NepError(template.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
-    return _Reader(path, text, lenient=lenient).parse(json.loads(text))
+    return _Reader(path, text, is_lenient=lenient).parse(json.loads(text))
 
 
 def encode_alarms(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
@@ -205,8 +205,8 @@ class _InvalidAlarmError(Exception):
 class _Reader:
     """Parser of alarm files that tracks the line of each alarm and key for error messages."""
 
-    def __init__(self, path: str, text: str, *, lenient: bool) -> None:
-        self._path, self._text, self._lenient = path, text, lenient
+    def __init__(self, path: str, text: str, *, is_lenient: bool) -> None:
+        self._path, self._text, self._is_lenient = path, text, is_lenient
         self._spans: list[tuple[int, int]] | None = None
 
     def parse(self, value: object) -> AlarmFile:
@@ -227,7 +227,7 @@ class _Reader:
                         index,
                     )
             except _InvalidAlarmError as error:
-                if not self._lenient:
+                if not self._is_lenient:
                     raise NepError(str(error)) from None
                 problems.append(str(error))
             else:
@@ -301,10 +301,10 @@ class _Reader:
                 "is", template.format(kind=shown_kind, did_you_mean=did_you_mean(shown_kind, KINDS)), index
             )
         subject = "node" if kind in NODE_KINDS else "topic"
-        other = "topic" if kind in NODE_KINDS else "node"
-        if other in when:
+        other_subject = "topic" if kind in NODE_KINDS else "node"
+        if other_subject in when:
             template = _("'{kind}' needs a {subject}; write \"{subject}\": ...")
-            self._fail(other, template.format(kind=kind, subject=subject), index)
+            self._fail(other_subject, template.format(kind=kind, subject=subject), index)
         name, path = when.get(subject, ""), when.get("value", "")
         if not isinstance(name, str) or not isinstance(path, str):
             self._fail(subject if not isinstance(name, str) else "value", _("must be a string"), index)
@@ -339,7 +339,8 @@ class _Reader:
         kind = next((key for key in _ACTION_KEYS if isinstance(entry, dict) and key in entry), None)
         if not isinstance(entry, dict) or kind is None:
             template = _(
-                'an action is {simple}, or {{"call": "name", "with": {{}}}}, "send", "run" or "keep_s"'
+                'an action must be {simple}, or an object with the key "call", "send", "run" or "keep_s", '
+                'such as {{"call": "name", "with": {{}}}}'
             )
             self._fail(
                 "do", template.format(simple=", ".join(f'"{each}"' for each in _SIMPLE_ACTIONS)), index

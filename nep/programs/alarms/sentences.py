@@ -17,7 +17,7 @@ from nep.programs.alarms.rule import (
 from nep.text import quotable, shortened
 
 _MAX_DISPLAYED_CHARACTERS = 40
-_NO_ACTION_TEXT = lazy("add it to the alarm list")
+_NO_ACTION_TEXT = lazy("add the alarm to the history")
 
 _CONDITION_TEXTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent for {time}"),
@@ -30,8 +30,8 @@ _CONDITION_TEXTS: Mapping[str, str] = {
     "equals": lazy("{subject} is {limit}"),
     "is_not": lazy("{subject} is not {limit}"),
     "changes": lazy("{subject} changes"),
-    "leaves": lazy("{subject} disconnects"),
-    "comes": lazy("{subject} connects"),
+    "leaves": lazy("{subject} leaves"),
+    "comes": lazy("{subject} joins"),
 }
 _LASTING_CONDITION_TEXTS: Mapping[str, str] = {
     "rate_below": lazy("{subject} has fewer than {limit} for {time}"),
@@ -40,7 +40,7 @@ _LASTING_CONDITION_TEXTS: Mapping[str, str] = {
     "above": lazy("{subject} is above {limit} for {time}"),
     "equals": lazy("{subject} is {limit} for {time}"),
     "is_not": lazy("{subject} is not {limit} for {time}"),
-    "leaves": lazy("{subject} is disconnected for {time}"),
+    "leaves": lazy("{subject} is absent for {time}"),
 }
 _EVENT_TEXTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent"),
@@ -53,8 +53,8 @@ _EVENT_TEXTS: Mapping[str, str] = {
     "equals": lazy("{subject} is {seen}"),
     "is_not": lazy("{subject} is {seen}, not {limit}"),
     "changes": lazy("{subject} changed to {seen}"),
-    "leaves": lazy("{subject} disconnected"),
-    "comes": lazy("{subject} connected"),
+    "leaves": lazy("{subject} left"),
+    "comes": lazy("{subject} joined"),
 }
 _ACTION_TEXTS: Mapping[str, str] = {
     "banner": lazy("show a banner"),

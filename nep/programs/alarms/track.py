@@ -60,7 +60,7 @@ class AlarmStateMachine:
         )
         self._value = _FieldValue(parse_path(condition.path) if condition.is_about_value else ())
         self._is_below = condition.kind == "below"
-        self._bound = condition.number if condition.kind in {"below", "above"} else None
+        self._limit = condition.number if condition.kind in {"below", "above"} else None
         self._true_since: float | None = None
         self._false_since: float | None = None
         self.on_since: float | None = None
@@ -98,16 +98,16 @@ class AlarmStateMachine:
         if value is MISSING:
             self.problem = "missing"
             return None
-        kind, before = self.rule.condition.kind, self._value.last
+        kind, previous = self.rule.condition.kind, self._value.last
         self._value.last = value
         if kind == "changes":
             self.last_value = to_scalar(value)
             self.problem = ""
-            return self.trigger(now) if before is not MISSING and not _are_equal(before, value) else None
+            return self.trigger(now) if previous is not MISSING and not _are_equal(previous, value) else None
         if kind in {"equals", "is_not"}:
             self.problem = ""
-            same = _are_equal(value, self.rule.condition.limit)
-            return self.observe(same is (kind == "equals"), to_scalar(value), now)
+            is_equal = _are_equal(value, self.rule.condition.limit)
+            return self.observe(is_equal is (kind == "equals"), to_scalar(value), now)
         number = _number(value)
         self.problem = "no_number" if number is None else ""
         if number is None:
@@ -116,11 +116,11 @@ class AlarmStateMachine:
         return self.compare(number, now, is_below=kind == "below", observed=observed)
 
     def _is_clearly_false(self, value: object) -> bool:
-        if self._bound is None or self.on_since is not None or self._true_since is not None:
+        if self._limit is None or self.on_since is not None or self._true_since is not None:
             return False
         if type(value) is not float and type(value) is not int:
             return False
-        return value >= self._bound if self._is_below else value <= self._bound
+        return value >= self._limit if self._is_below else value <= self._limit
 
     def compare(
         self, number: float, now: float, *, is_below: bool, observed: Scalar = None
@@ -135,10 +135,10 @@ class AlarmStateMachine:
         """
         limit, margin = self.rule.condition.number, self.rule.condition.margin
         if self.is_on:
-            is_so = number < limit + margin if is_below else number > limit - margin
+            is_met = number < limit + margin if is_below else number > limit - margin
         else:
-            is_so = number < limit if is_below else number > limit
-        return self.observe(is_so, number if observed is None else observed, now)
+            is_met = number < limit if is_below else number > limit
+        return self.observe(is_met, number if observed is None else observed, now)
 
     def trigger(self, now: float) -> Transition | None:
         """Process a momentary event, which turns the alarm on for at least `MIN_EVENT_DURATION_S`.
@@ -149,18 +149,18 @@ class AlarmStateMachine:
         self.observe(False, self.last_value, now)
         return transition
 
-    def observe(self, is_so: bool, observed: Scalar, now: float) -> Transition | None:
+    def observe(self, is_met: bool, observed: Scalar, now: float) -> Transition | None:
         """Process the current truth of the condition; return the transition, or None.
 
         Args:
-            is_so: True if the condition is met.
+            is_met: True if the condition is met.
             observed: Value that was compared.
             now: Monotonic time in seconds.
         """
         transition = self.advance(now)
         self.was_observed = True
         self.last_value = observed
-        if is_so:
+        if is_met:
             if self.is_on and self._false_since is not None:
                 self.count += 1  # false for less than calm_s
             self._false_since = None
@@ -194,8 +194,8 @@ class AlarmStateMachine:
         """Turn the alarm off because its rule is no longer evaluated; return None if the alarm was off."""
         if self.on_since is None:
             return None
-        end = now if self._false_since is None else self._false_since
-        transition = Transition(False, self.last_value, max(0.0, end - self.on_since), self.count)
+        ended_at = now if self._false_since is None else self._false_since
+        transition = Transition(False, self.last_value, max(0.0, ended_at - self.on_since), self.count)
         self.on_since = self._true_since = self._false_since = None
         return transition
 

@@ -33,7 +33,7 @@ def age_start(message: Message, now: float, wall_ns: int) -> tuple[float, AgeBy]
     """
     if message.stamp_ns is None:
         return now, "arrival"
-    on_the_way_s = (wall_ns - message.stamp_ns) / _NS_PER_S
-    if on_the_way_s < -MAX_AHEAD_S or (on_the_way_s > MAX_BEHIND_S and not message.is_latched):
+    latency_s = (wall_ns - message.stamp_ns) / _NS_PER_S
+    if latency_s < -MAX_AHEAD_S or (latency_s > MAX_BEHIND_S and not message.is_latched):
         return now, "arrival"
-    return now - max(0.0, on_the_way_s), "stamp"
+    return now - max(0.0, latency_s), "stamp"

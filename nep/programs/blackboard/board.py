@@ -153,7 +153,7 @@ class Blackboard:
         self._version = 0
         self._is_closed = self._is_forked = False
         self._watches: tuple[BlackboardWatch, ...] = ()
-        self._ignored: frozenset[int] = frozenset()
+        self._ignored_publisher_ids: frozenset[int] = frozenset()
         self._observers: tuple[_Observer, ...] = ()
         self._pending: deque[tuple[_Observer, EntryChange]] = deque()
         self._pending_bytes = 0
@@ -198,11 +198,11 @@ class Blackboard:
         node = self._node
         if node is None:
             raise NepError(_("this blackboard has no node; create it with 'nep.Blackboard(node)'"))
-        lifetime_s = _lifetime(lives_s)
+        lifetime_s = _lifetime_s(lives_s)
         watch = BlackboardWatch(
             topic,
             MessageMapping(key, fields, each),
-            lambda message, found: self._store_message(message, found, lifetime_s),
+            lambda message, values: self._store_message(message, values, lifetime_s),
             is_pattern=is_pattern(check_topic(topic)),
         )
         with self._updated:
@@ -219,7 +219,7 @@ class Blackboard:
     def ignore(self, publisher: int) -> None:
         """Ignore messages of the publisher with this id."""
         with self._updated:
-            self._ignored |= {publisher}
+            self._ignored_publisher_ids |= {publisher}
 
     def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
         """Store a value. Each field of a map is stored under its own key.
@@ -235,7 +235,7 @@ class Blackboard:
             BadKeyError: The key is invalid.
             BadValueError: The value is nested too deeply or too large.
         """
-        names, lifetime_s = parse_key(key), _lifetime(lives_s)
+        names, lifetime_s = parse_key(key), _lifetime_s(lives_s)
         with self._updated:
             now = self._clock()
             entries = [
@@ -255,7 +255,7 @@ class Blackboard:
         return len(removed)
 
     def _store_message(self, message: Message, values: Sequence[PerceivedValue], lifetime_s: float) -> None:
-        if message.publisher in self._ignored:
+        if message.publisher in self._ignored_publisher_ids:
             return
         since, age_by = age_start(message, self._clock(), self._wall_clock_ns())
         problem: NepError | None = None
@@ -475,10 +475,10 @@ class Blackboard:
         """
         with self._updated:
             self._expire_locked()
-            waiting = len(self._pending)
-        calls = 0
+            pending_count = len(self._pending)
+        call_count = 0
         try:
-            while calls < waiting:
+            while call_count < pending_count:
                 with self._updated:
                     if not self._pending:
                         break
@@ -486,12 +486,12 @@ class Blackboard:
                     self._pending_bytes -= change.entry.bytes
                     is_registered = any(each is observer for each in self._observers)
                     now = self._clock()
-                calls += 1
+                call_count += 1
                 if is_registered:
                     observer.callback(BlackboardChange(_public_entry(change.entry, now), change.cause))
         finally:
             self._schedule_delivery()
-        return calls
+        return call_count
 
     def _expire_locked(self) -> float:
         # Call with the lock held. Returns the current time.
@@ -582,7 +582,7 @@ class Blackboard:
         return f"Blackboard({len(self._entries)} keys)"
 
 
-def _lifetime(lives_s: object) -> float:
+def _lifetime_s(lives_s: object) -> float:
     checked_s = check_optional_time_limit("lives_s", lives_s)
     return math.inf if checked_s is None else check_period("lives_s", checked_s)
 
@@ -612,11 +612,11 @@ def _compose(entries: Sequence[StoredEntry], key: Key) -> object:
         return deep_copy(entries[0].value)
     result: dict[str, object] = {}
     for entry in entries:
-        *names, last = entry.key[len(key) :]
+        *names, last_name = entry.key[len(key) :]
         branch = result
         for name in names:
-            after = branch.setdefault(name, {})
-            if isinstance(after, dict):  # always true: no value is stored above another
-                branch = after
-        branch[last] = deep_copy(entry.value)
+            child = branch.setdefault(name, {})
+            if isinstance(child, dict):  # always true: no value is stored above another
+                branch = child
+        branch[last_name] = deep_copy(entry.value)
     return result

@@ -54,8 +54,8 @@ class StoredEntry:
     """Approximate memory use of the entry in bytes."""
 
     def __post_init__(self) -> None:
-        names = _NAME_BYTES * len(self.key) + sum(map(len, self.key))
-        object.__setattr__(self, "bytes", _ENTRY_BYTES + names + size_of(self.value))
+        key_bytes = _NAME_BYTES * len(self.key) + sum(map(len, self.key))
+        object.__setattr__(self, "bytes", _ENTRY_BYTES + key_bytes + size_of(self.value))
 
     def age_s(self, now: float) -> float:
         """Return the age in seconds at `now`.
@@ -89,7 +89,8 @@ class Entries:
         self._max_keys = max_keys
         self._max_bytes = max_bytes
         self._tree = _Tree()
-        self._by_age: OrderedDict[Key, StoredEntry] = OrderedDict()
+        self._entries_by_key: OrderedDict[Key, StoredEntry] = OrderedDict()
+        """Entries by key; the least recently updated entry is the first."""
         self._expiry_heap: list[tuple[float, Key]] = []
         self._expiry_of: dict[Key, float] = {}
         self.bytes = 0
@@ -97,7 +98,7 @@ class Entries:
         self.outdated = 0
 
     def __len__(self) -> int:
-        return len(self._by_age)
+        return len(self._entries_by_key)
 
     @property
     def next_expiry(self) -> float:
@@ -107,7 +108,7 @@ class Entries:
     def rebuilt_copy(self) -> Entries:
         """Return a copy with a new tree, because a fork may have interrupted an update of the tree."""
         copy = Entries(self._max_keys, self._max_bytes)
-        for entry in list(self._by_age.values()):
+        for entry in list(self._entries_by_key.values()):
             copy.store(entry, -math.inf)
         copy.dropped, copy.outdated = self.dropped, self.outdated
         return copy
@@ -116,7 +117,7 @@ class Entries:
 
     def get(self, key: Key) -> StoredEntry | None:
         """Return the entry of a key, or None. Keys below it are ignored."""
-        return self._by_age.get(key)
+        return self._entries_by_key.get(key)
 
     def entries_below(self, key: Key) -> Iterator[StoredEntry]:
         """Yield the entry of a key, or the entries of all keys below it."""
@@ -128,9 +129,9 @@ class Entries:
 
     def entries_matching(self, pattern: Key) -> Iterator[StoredEntry]:
         """Yield the entries whose keys match a pattern, in tree order."""
-        beginning = literal_prefix(pattern)
-        entries = self.entries_below(beginning)
-        if pattern == (*beginning, "**"):
+        prefix = literal_prefix(pattern)
+        entries = self.entries_below(prefix)
+        if pattern == (*prefix, "**"):
             return entries
         return (each for each in entries if key_matches(pattern, each.key))
 
@@ -154,23 +155,23 @@ class Entries:
         if entry.bytes > self._max_bytes:
             template = _("the value needs {size} bytes, but at most {most} are allowed")
             raise BadValueError(key_text(entry.key), template.format(size=entry.bytes, most=self._max_bytes))
-        before = self.get(entry.key)
-        if entry.expires_at <= now or (before is not None and _is_newer(before, entry, now)):
+        stored = self.get(entry.key)
+        if entry.expires_at <= now or (stored is not None and _is_newer(stored, entry, now)):
             self.outdated += 1
             return []
         changes: list[EntryChange] = []
-        if before is None:
+        if stored is None:
             for conflict in self._conflicting_entries(entry.key):
                 self._pop(conflict.key)
                 changes.append(EntryChange(conflict, "replaced"))
             changes.append(EntryChange(entry, "new"))
         else:
-            self.bytes -= before.bytes
-            if not is_same(before.value, entry.value):
+            self.bytes -= stored.bytes
+            if not is_same(stored.value, entry.value):
                 changes.append(EntryChange(entry, "changed"))
         self._insert(entry)
-        while len(self._by_age) > self._max_keys or self.bytes > self._max_bytes:
-            changes.append(EntryChange(self._pop(next(iter(self._by_age))), "dropped"))
+        while len(self._entries_by_key) > self._max_keys or self.bytes > self._max_bytes:
+            changes.append(EntryChange(self._pop(next(iter(self._entries_by_key))), "dropped"))
             self.dropped += 1
         return changes
 
@@ -186,14 +187,14 @@ class Entries:
         """Remove expired entries; return the changes."""
         changes = []
         while self._expiry_heap and self._expiry_heap[0][0] <= now:
-            end, key = heapq.heappop(self._expiry_heap)
-            if self._expiry_of.get(key) != end:  # superseded by an earlier expiry
+            expires_at, key = heapq.heappop(self._expiry_heap)
+            if self._expiry_of.get(key) != expires_at:  # superseded by an earlier expiry
                 continue
             del self._expiry_of[key]
             entry = self.get(key)
             if entry is None or math.isinf(entry.expires_at):
                 continue
-            if entry.expires_at > now:  # it was updated since
+            if entry.expires_at > now:  # the entry was updated in the meantime
                 self._add_expiry(entry)
             else:
                 changes.append(EntryChange(self._pop(key), "expired"))
@@ -204,22 +205,22 @@ class Entries:
         for name in key:
             if isinstance(subtree, StoredEntry):
                 return [subtree]
-            after = subtree.get(name)
-            if after is None:
+            child = subtree.get(name)
+            if child is None:
                 return []
-            subtree = after
+            subtree = child
         return [subtree] if isinstance(subtree, StoredEntry) else list(_entries_in(subtree))
 
     def _insert(self, entry: StoredEntry) -> None:
         branch = self._tree
         for name in entry.key[:-1]:
-            after = branch.setdefault(name, _Tree())
-            if isinstance(after, StoredEntry):  # unreachable: conflicting entries were removed
+            child = branch.setdefault(name, _Tree())
+            if isinstance(child, StoredEntry):  # unreachable: conflicting entries were removed
                 raise TypeError(entry.key)
-            branch = after
+            branch = child
         branch[entry.key[-1]] = entry
-        self._by_age[entry.key] = entry
-        self._by_age.move_to_end(entry.key)
+        self._entries_by_key[entry.key] = entry
+        self._entries_by_key.move_to_end(entry.key)
         self.bytes += entry.bytes
         if not math.isinf(entry.expires_at):
             self._add_expiry(entry)
@@ -228,12 +229,14 @@ class Entries:
         if entry.expires_at >= self._expiry_of.get(entry.key, math.inf):
             return
         if (
-            len(self._expiry_heap) > 2 * len(self._by_age) + _MAX_STALE_EXPIRIES
+            len(self._expiry_heap) > 2 * len(self._entries_by_key) + _MAX_STALE_EXPIRIES
         ):  # drop stale heap entries of deleted keys
             self._expiry_of = {
-                each.key: each.expires_at for each in self._by_age.values() if each.expires_at < math.inf
+                each.key: each.expires_at
+                for each in self._entries_by_key.values()
+                if each.expires_at < math.inf
             }
-            self._expiry_heap = [(end, key) for key, end in self._expiry_of.items()]
+            self._expiry_heap = [(expires_at, key) for key, expires_at in self._expiry_of.items()]
             heapq.heapify(self._expiry_heap)
             if entry.key in self._expiry_of:
                 return
@@ -241,14 +244,14 @@ class Entries:
         heapq.heappush(self._expiry_heap, (entry.expires_at, entry.key))
 
     def _pop(self, key: Key) -> StoredEntry:
-        entry = self._by_age.pop(key)
+        entry = self._entries_by_key.pop(key)
         self.bytes -= entry.bytes
         path = [self._tree]
         for name in key[:-1]:
-            after = path[-1][name]
-            if isinstance(after, StoredEntry):  # unreachable: it would have been replaced
+            child = path[-1][name]
+            if isinstance(child, StoredEntry):  # unreachable: it would have been replaced
                 raise TypeError(key)
-            path.append(after)
+            path.append(child)
         for branch, name in zip(reversed(path), reversed(key), strict=True):
             del branch[name]
             if branch:
@@ -256,12 +259,11 @@ class Entries:
         return entry
 
 
-def _is_newer(before: StoredEntry, entry: StoredEntry, now: float) -> bool:
-    # True if the stored `before` is newer: `entry` was latched or took a slower path. Messages of one
-    # publisher arrive in order, whatever its clock does; `before` may be in the future if our clock was set
-    # back.
-    return entry.age_by == before.age_by == "stamp" and (
-        entry.publisher != before.publisher and entry.age_start < before.age_start <= now
+def _is_newer(stored: StoredEntry, entry: StoredEntry, now: float) -> bool:
+    # True if `stored` is newer: `entry` was latched or took a slower path. Messages of one publisher arrive
+    # in order, whatever its clock does; `stored` may be in the future if our clock was set back.
+    return entry.age_by == stored.age_by == "stamp" and (
+        entry.publisher != stored.publisher and entry.age_start < stored.age_start <= now
     )
 
 

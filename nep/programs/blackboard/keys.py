@@ -88,7 +88,7 @@ def key_matches(pattern: Key, key: Key) -> bool:
 
 def literal_prefix(pattern: Key) -> Key:
     """Return the names of a pattern before its first wildcard; all names if it has none."""
-    for number, name in enumerate(pattern):
+    for index, name in enumerate(pattern):
         if name in _WILDCARDS:
-            return pattern[:number]
+            return pattern[:index]
     return pattern

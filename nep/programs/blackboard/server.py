@@ -3,10 +3,10 @@
 Changes are published on the topic `/NAME/changes` as maps with "blackboard", "key", "value", "cause" and
 details of the value. The services are:
 
-- `NAME/get` takes "key" and replies "found", "value" and "age_s"; or takes "pattern" and replies "entries"
-  and the number of omitted entries, "more". "max_age_s" excludes older values.
+- `NAME/get` takes "key" and replies with "found", "value" and "age_s"; or takes "pattern" and replies with
+  "entries" and the number of omitted entries, "more". "max_age_s" excludes older values.
 - `NAME/set` takes "key" and "value", or a map "values"; "lives_s" is optional.
-- `NAME/keys` takes "pattern" and replies "keys" and "more".
+- `NAME/keys` takes "pattern" and replies with "keys" and "more".
 
 For an invalid request, the caller gets a `ServiceError`. NaN is sent as `null`, because JSON lacks NaN.
 """
@@ -62,8 +62,8 @@ class BlackboardServer:
     def __init__(self, node: Node, board: Blackboard, name: str = DEFAULT_NAME) -> None:
         self._board = board
         self._name = name
-        self._changes = node.new_pub(f"/{name.lstrip('/')}/changes", "json")
-        board.ignore(self._changes.id)
+        self._change_publisher = node.new_pub(f"/{name.lstrip('/')}/changes", "json")
+        board.ignore(self._change_publisher.id)
         self._servers = [
             node.new_server(service_name(name, operation), handler)
             for operation, handler in (("get", self._get), ("set", self._set), ("keys", self._keys))
@@ -74,7 +74,7 @@ class BlackboardServer:
         change_map = {"blackboard": self._name, "cause": change.cause, **_entry_to_map(change.entry)}
         if change.is_gone:
             change_map["value"] = None
-        self._changes.publish(change_map)
+        self._change_publisher.publish(change_map)
 
     def _get(self, request: object) -> object:
         fields = _checked_request(request)
@@ -89,20 +89,20 @@ class BlackboardServer:
         return {"found": True, "value": _to_sendable(value), "age_s": _finite_or_none(self._board.age_s(key))}
 
     def _entries(self, pattern: str, max_age_s: float) -> object:
-        young = [
+        recent_entries = [
             board_entry
             for board_entry in self._board.snapshot(pattern).values()
             if board_entry.age_s <= max_age_s
         ]
         entries: list[object] = []
-        room = _MAX_REPLY_BYTES
-        for board_entry in young[:MAX_ENTRIES]:
+        remaining_bytes = _MAX_REPLY_BYTES
+        for board_entry in recent_entries[:MAX_ENTRIES]:
             entry = _entry_to_map(board_entry)
-            room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
-            if room < 0 and entries:
+            remaining_bytes -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
+            if remaining_bytes < 0 and entries:
                 break
             entries.append(entry)
-        return {"entries": entries, "more": len(young) - len(entries)}
+        return {"entries": entries, "more": len(recent_entries) - len(entries)}
 
     def _set(self, request: object) -> object:
         fields = _checked_request(request)
@@ -127,7 +127,7 @@ class BlackboardServer:
         self._remove_callback()
         for server in self._servers:
             server.close()
-        self._changes.close()
+        self._change_publisher.close()
 
     def __enter__(self) -> Self:
         return self
@@ -172,7 +172,7 @@ def _to_sendable(value: object) -> object:
     except (TypeError, ValueError, RecursionError):
         try:
             return ascii(value)
-        except Exception:  # noqa: BLE001 - a value may be of any class, or have more digits than are written
+        except Exception:  # noqa: BLE001 - any class may raise; ints have a digit limit
             return type(value).__name__
     return value
 

@@ -47,19 +47,19 @@ def _has_only_numbers(value: list[object] | tuple[object, ...]) -> bool:
 
 def size_of(value: object) -> int:
     """Return the approximate memory use of a value in bytes."""
-    size, waiting = 0, [value]
-    while waiting:
-        each = waiting.pop()
+    size, pending = 0, [value]
+    while pending:
+        each = pending.pop()
         if isinstance(each, list | tuple):
             size += sys.getsizeof(each)
             if _has_only_numbers(each):
                 size += _NUMBER_BYTES * len(each)
             else:
-                waiting += each
+                pending += each
         elif isinstance(each, Mapping):
             size += sys.getsizeof(each)
-            waiting += each
-            waiting += each.values()
+            pending += each
+            pending += each.values()
         else:
             nbytes = getattr(each, "nbytes", None)  # nbytes: an array may be a view, which is small by itself
             size += nbytes if isinstance(nbytes, int) else sys.getsizeof(each, _ITEM_BYTES)

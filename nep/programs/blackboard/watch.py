@@ -59,7 +59,7 @@ class MessageMapping:
             raise WrongTypeError(_("'fields' must be a list of names, not a string"))
         pairs = fields.items() if isinstance(fields, Mapping) else [(name, name) for name in fields or ()]
         self._fields = (
-            None if fields is None else [(parse_key(source), parse_key(two)) for source, two in pairs]
+            None if fields is None else [(parse_key(source), parse_key(name)) for source, name in pairs]
         )
 
     def items(self, payload: object) -> Sequence[object]:
@@ -89,19 +89,20 @@ class MessageMapping:
             item: Item returned by `items`.
 
         Raises:
-            NepError: A field that is part of the key has no name or number in the item.
+            NepError: A field that is part of the key is missing in the item, or is neither text
+                nor an integer.
         """
         perception = None if self._fields is not None else parse_perception(item)
         if perception is not None:
-            beginning = () if self._key is None else self._key_for(item)
-            for key, value in leaves(perception.values, (*beginning, *parse_key(perception.primitive))):
+            prefix = () if self._key is None else self._key_for(item)
+            for key, value in leaves(perception.values, (*prefix, *parse_key(perception.primitive))):
                 yield PerceivedValue(key, value, perception.robot)
             return
-        beginning = topic_to_key(topic) if self._key is None else self._key_for(item)
+        prefix = topic_to_key(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
         robot_name = robot if isinstance(robot, str) else ""
         for field_key, value in self._selected_fields(item):
-            for key, leaf in leaves(value, (*beginning, *field_key)):
+            for key, leaf in leaves(value, (*prefix, *field_key)):
                 yield PerceivedValue(key, leaf, robot_name)
 
     def _selected_fields(self, item: object) -> Iterator[tuple[Key, object]]:
@@ -117,7 +118,7 @@ class MessageMapping:
         if not self._has_placeholders:
             return self._key or ()
         return tuple(
-            _PLACEHOLDER.sub(lambda found: _name_from_field(item, found[1]), name) for name in self._key or ()
+            _PLACEHOLDER.sub(lambda match: _name_from_field(item, match[1]), name) for name in self._key or ()
         )
 
 
@@ -154,7 +155,7 @@ class BlackboardWatch:
     def __init__(
         self,
         topic: str,
-        reading: MessageMapping,
+        mapping: MessageMapping,
         store: Callable[[Message, Sequence[PerceivedValue]], None],
         *,
         is_pattern: bool,
@@ -166,7 +167,7 @@ class BlackboardWatch:
         """Number of messages that could not be decoded or stored completely; the reason is logged."""
         self.problem = ""
         """Reason why the last message was rejected; "" if it was stored."""
-        self._mapping = reading
+        self._mapping = mapping
         self._store = store
         self._is_pattern = is_pattern
         self._subscriber: Subscriber | None = None

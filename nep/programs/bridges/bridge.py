@@ -67,8 +67,8 @@ class Bridge:
         self._routes: tuple[Route, ...] = ()
         self._route_keys: set[tuple[SideName, str, str]] = set()
         self._is_full = False
-        self._others = OtherBridges(self.id)
-        self._warned: set[str] = set()
+        self._other_bridges = OtherBridges(self.id)
+        self._warned_bridge_ids: set[str] = set()
         self._closed = threading.Event()
         self.own_nodes: frozenset[str] = frozenset()
         """Ids of the bridge's two nodes."""
@@ -125,8 +125,8 @@ class Bridge:
         deadline = time.monotonic() + timeout_s
         while not all(side.is_guard_ready for side in self.sides.values()) and time.monotonic() < deadline:
             self._closed.wait(_WAIT_SLICE_S)
-        refusals = (each.denial_reason for each in self._routes if not each.is_from_pattern)
-        return tuple(dict.fromkeys(filter(None, refusals)))
+        reasons = (each.denial_reason for each in self._routes if not each.is_from_pattern)
+        return tuple(dict.fromkeys(filter(None, reasons)))
 
     def status(self) -> dict[str, object]:
         """Return the configuration and message counts in the form published on `/nep/bridges`."""
@@ -179,7 +179,7 @@ class Bridge:
 
     def _route_end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
         side_configuration, end = self.configuration.side(side), topic.end(side)
-        echoes = self._loop_guards.setdefault((side, name), LoopGuard())
+        loop_guard = self._loop_guards.setdefault((side, name), LoopGuard())
         guard = self.sides[side].guard
         return RouteEnd(
             side,
@@ -188,7 +188,7 @@ class Bridge:
             name,
             end.msg_type,
             end.qos,
-            echoes,
+            loop_guard,
             guard,
         )
 
@@ -247,25 +247,23 @@ class Bridge:
     def on_status(self, side: SideName, message: Message) -> None:
         """Process the status of another bridge. Runs in a thread of the side's node."""
         with suppress(DecodeError):
-            self._others.add_status(side, message.payload, time.monotonic())
+            self._other_bridges.add_status(side, message.payload, time.monotonic())
 
     def _check_other_bridges(self) -> None:
         # Warns of duplicate messages, and stops routes that would loop.
-        keeps_trails = any(
-            side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
-        )
-        others = self._others.parallel_bridges(time.monotonic())
+        has_trails = any(side.backend.has_extensions for side in (self.configuration.a, self.configuration.b))
+        others = self._other_bridges.parallel_bridges(time.monotonic())
         for route in self._routes:
             origin, end = route.origin, route.end
-            back: RouteKey = (end.side, end.topic, origin.topic)
-            stronger = [other for other in others if other.id < self.id and back in other.routes]
-            route.rival = stronger[0].name if stronger and not keeps_trails else ""
-            same: RouteKey = (origin.side, origin.topic, end.topic)
+            reverse_route: RouteKey = (end.side, end.topic, origin.topic)
+            rivals = [other for other in others if other.id < self.id and reverse_route in other.routes]
+            route.rival = rivals[0].name if rivals and not has_trails else ""
+            same_route: RouteKey = (origin.side, origin.topic, end.topic)
             for other in others:
-                if {same, back} & other.routes and other.id not in self._warned:
-                    self._warned.add(other.id)
+                if {same_route, reverse_route} & other.routes and other.id not in self._warned_bridge_ids:
+                    self._warned_bridge_ids.add(other.id)
                     _logger.warning(
-                        "the bridge '%s' also forwards '%s' and '%s': messages arrive twice or loop; "
+                        "the bridge '%s' also connects '%s' and '%s': messages arrive twice or loop; "
                         "stop one of the two",
                         other.name,
                         origin.topic,

@@ -67,10 +67,10 @@ class TopicEnd:
 
     def matched_part(self, topic: str) -> str:
         """Return the part of a topic that the wildcard matches, or "" if the pattern doesn't match."""
-        before, wildcard, after = self.name.partition(self.wildcard or "*")
-        part = topic.removeprefix(before).removesuffix(after)
-        is_whole = wildcard and part and topic == before + part + after
-        return part if is_whole and (wildcard == "**" or "/" not in part) else ""
+        prefix, wildcard, suffix = self.name.partition(self.wildcard or "*")
+        part = topic.removeprefix(prefix).removesuffix(suffix)
+        is_match = wildcard and part and topic == prefix + part + suffix
+        return part if is_match and (wildcard == "**" or "/" not in part) else ""
 
     def with_part(self, part: str) -> str:
         """Return the name with the wildcard replaced by `part`; the name itself if it has no wildcard."""
@@ -250,9 +250,9 @@ def check_different_networks(a: SideConfiguration, b: SideConfiguration) -> None
 
 
 def _parse_side_and_topic(text: str) -> tuple[SideConfiguration, str]:
-    backend, separator, rest = text.partition("@")
+    backend, separator, master_and_topic = text.partition("@")
     if separator and ":" not in backend:
-        master, colon, topic = rest.rpartition(":")
+        master, colon, topic = master_and_topic.rpartition(":")
     else:
         master = ""
         backend, colon, topic = text.partition(":")

@@ -44,13 +44,13 @@ class _Status(NamedTuple):
     """Status of a bridge received on one of our sides.
 
     Attributes:
-        at: Time of arrival (monotonic, s).
+        received_at: Time of arrival (monotonic, s).
         name: Name of the bridge.
         side: The other bridge's name ("a" or "b") of the side on which the status was published.
         routes: Routes of the bridge, with the names that it gives to the sides.
     """
 
-    at: float
+    received_at: float
     name: str
     side: str
     routes: frozenset[tuple[str, str, str]]
@@ -72,8 +72,8 @@ class OtherBridges:
         """Process a status received on a side of this bridge. An invalid status is ignored."""
         if not isinstance(status, Mapping):
             return
-        id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
-        if not (isinstance(id_, str) and isinstance(name, str) and on in SIDES):
+        id_, name, other_side = (status.get(key) for key in ("id", "bridge", "side"))
+        if not (isinstance(id_, str) and isinstance(name, str) and other_side in SIDES):
             return
         if id_ == self._own_id or len(id_) > _MAX_ID_LENGTH:
             return
@@ -81,7 +81,7 @@ class OtherBridges:
             statuses = self._statuses[side]
             statuses.pop(id_, None)
             statuses[id_] = _Status(
-                now, name[:_MAX_ID_LENGTH], str(on), frozenset(_parse_routes(status.get("routes")))
+                now, name[:_MAX_ID_LENGTH], str(other_side), frozenset(_parse_routes(status.get("routes")))
             )
             while len(statuses) > _MAX_BRIDGES:
                 statuses.popitem(last=False)
@@ -89,14 +89,14 @@ class OtherBridges:
     def parallel_bridges(self, now: float) -> list[OtherBridge]:
         """Return the bridges whose status was received recently on both sides."""
         with self._lock:
-            on_a, on_b = ({**self._statuses[side]} for side in SIDES)
+            statuses_a, statuses_b = ({**self._statuses[side]} for side in SIDES)
         bridges = []
-        for id_, a in on_a.items():
-            b = on_b.get(id_)
-            if b is None or a.side == b.side or now - min(a.at, b.at) > _EXPIRY_S:
+        for id_, a in statuses_a.items():
+            b = statuses_b.get(id_)
+            if b is None or a.side == b.side or now - min(a.received_at, b.received_at) > _EXPIRY_S:
                 continue
             sides: dict[str, SideName] = {a.side: "a", b.side: "b"}
-            routes = frozenset((sides[origin], topic, to) for origin, topic, to in a.routes)
+            routes = frozenset((sides[origin], topic, end_topic) for origin, topic, end_topic in a.routes)
             bridges.append(OtherBridge(id_, a.name, routes))
         return bridges
 
@@ -107,6 +107,6 @@ def _parse_routes(routes: object) -> Iterator[tuple[str, str, str]]:
             continue
         origin, end = route.get("from"), route.get("to")
         if isinstance(origin, Mapping) and isinstance(end, Mapping):
-            side, topic, to = origin.get("side"), origin.get("topic"), end.get("topic")
-            if side in SIDES and isinstance(topic, str) and isinstance(to, str):
-                yield str(side), topic, to
+            side, topic, end_topic = origin.get("side"), origin.get("topic"), end.get("topic")
+            if side in SIDES and isinstance(topic, str) and isinstance(end_topic, str):
+                yield str(side), topic, end_topic

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 
-_MAX_CATCH_UP = 0.1
+_MAX_CATCH_UP_PERIODS = 0.1
 
 
 class RateLimit:
@@ -29,7 +29,7 @@ class RateLimit:
         """Take the next slot and return True, or return False if it is too early."""
         if now < self.next_at:
             return False
-        self.next_at = max(self.next_at, now - _MAX_CATCH_UP * self._period_s) + self._period_s
+        self.next_at = max(self.next_at, now - _MAX_CATCH_UP_PERIODS * self._period_s) + self._period_s
         return True
 
 
@@ -41,23 +41,23 @@ class Pacer:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._order = itertools.count()
-        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        self._call_numbers = itertools.count()
+        self._scheduled_calls: list[tuple[float, int, Callable[[], None]]] = []
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self._is_closed = False
 
-    def call_at(self, due: float, call: Callable[[], None]) -> None:
+    def call_at(self, due: float, callback: Callable[[], None]) -> None:
         """Schedule a call without blocking. Does nothing after `close`.
 
         Args:
             due: Time of the call (monotonic, s).
-            call: Function to call in the timer thread.
+            callback: Function to call in the timer thread.
         """
         with self._changed:
             if self._is_closed:
                 return
-            heapq.heappush(self._due, (due, next(self._order), call))
+            heapq.heappush(self._scheduled_calls, (due, next(self._call_numbers), callback))
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 self._thread.start()
@@ -82,8 +82,8 @@ class Pacer:
                     self._changed.wait(remaining_s)
                 if self._is_closed:
                     return
-                call = heapq.heappop(self._due)[2]
-            call()
+                callback = heapq.heappop(self._scheduled_calls)[2]
+            callback()
 
     def _remaining_s(self) -> float | None:
-        return max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
+        return max(0.0, self._scheduled_calls[0][0] - time.monotonic()) if self._scheduled_calls else None

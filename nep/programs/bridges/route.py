@@ -62,7 +62,6 @@ class RouteEnd:
     qos: str = ""
     loop_guard: LoopGuard = field(default_factory=LoopGuard)
     guard: MotionGuard | None = field(default=None, compare=False)
-    """Motion guard of the robots on this side; None if all messages may be published."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class _BufferedSink:
         self.is_open = is_open
         self.is_muted = False
         self._on_messages = on_messages
-        self._buffered: list[Message] = []
+        self._buffered_messages: list[Message] = []
         self._lock = threading.Lock()
 
     def receive(self, messages: Sequence[Message]) -> None:
@@ -113,14 +112,14 @@ class _BufferedSink:
             if self.is_muted:
                 return
             if not self.is_open:
-                self._buffered.extend(messages)
+                self._buffered_messages.extend(messages)
                 return
         self._on_messages(messages)
 
     def open(self) -> None:
         with self._lock:
-            self._on_messages(self._buffered)
-            self._buffered = []
+            self._on_messages(self._buffered_messages)
+            self._buffered_messages = []
             self.is_open = True
 
     def mute(self) -> None:
@@ -162,28 +161,31 @@ class Route:
         """True if the route was created by a pattern."""
         self.idle_since: float | None = None
         """Time (monotonic, s) since which the topic has no publisher except bridges; None if it has one."""
-        self.troubles: dict[SideName, str] = {}
+        self.connection_problems: dict[SideName, str] = {}
         """Current reasons why the route can't subscribe or publish, by side."""
         self.rival = ""
-        """Name of another bridge that forwards these messages; then this route is inactive."""
+        """Name of another bridge that forwards the topic in the opposite direction; "" if there is none.
+
+        While there is one, this route is inactive, because messages would loop.
+        """
         self._bridge = bridge
         self._own_publisher_ids = own_publishers
         self._wake = wake
         self._clock = clock
         self._pacer = pacer
         self._subscriber_counts: dict[Publisher, int] = {}
-        self._limit = RateLimit(max_rate_hz) if max_rate_hz else None
+        self._rate_limit = RateLimit(max_rate_hz) if max_rate_hz else None
         self._pending: Message | None = None
         self._lock = threading.RLock()
         self._backlog = Inbox("all", MAX_BACKLOG_MESSAGES, _MAX_BACKLOG_BYTES)
         self._subscriber: Subscriber | None = None
         self._sink: _BufferedSink | None = None
-        self._waits_for_type = False
+        self._is_waiting_for_type = False
         self._is_closed = False
-        self._lost_by_previous: int | None = 0
+        self._previously_lost: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._absent_since: dict[tuple[bool, int | None], float] = {}
-        self._form: TopicFormat | None = None
+        self._format: TopicFormat | None = None
         self._supports_extension = end.backend.has_extensions
         self._received = self._sent = self._bytes = 0
         self._thinned = self._failed = self._dropped = self._returned = 0
@@ -207,13 +209,13 @@ class Route:
             )
 
     def _lost_count(self) -> int | None:
-        now = 0 if self._subscriber is None else self._subscriber.lost
-        return None if now is None or self._lost_by_previous is None else now + self._lost_by_previous
+        lost = 0 if self._subscriber is None else self._subscriber.lost
+        return None if lost is None or self._previously_lost is None else lost + self._previously_lost
 
     @property
     def connection_problem(self) -> str:
         """Current reason why the route can't subscribe or publish; "" if it can."""
-        return next(iter(self.troubles.copy().values()), "")
+        return next(iter(self.connection_problems.copy().values()), "")
 
     @property
     def is_subscribed(self) -> bool:
@@ -223,7 +225,7 @@ class Route:
     @property
     def is_ready(self) -> bool:
         """True if the route has subscribed, or will as soon as its topic has a publisher with a type."""
-        return self._subscriber is not None or self._waits_for_type
+        return self._subscriber is not None or self._is_waiting_for_type
 
     @property
     def needs_publisher(self) -> bool:
@@ -233,14 +235,14 @@ class Route:
     @property
     def needs_type(self) -> bool:
         """True if messages are waiting and the message type for publishing them is not decided yet."""
-        return self._form is None and not self.end.msg_type and self.needs_publisher
+        return self._format is None and not self.end.msg_type and self.needs_publisher
 
     @property
     def denial_reason(self) -> str:
         """Reason why the motion guard denies publishing; "" if publishing is allowed."""
         if self.end.guard is None:
             return ""
-        msg_type = self.end.msg_type if self._form is None else self._form.msg_type
+        msg_type = self.end.msg_type if self._format is None else self._format.msg_type
         return self.end.guard.denial_reason(self.end.topic, msg_type)
 
     # ---- called in the thread of the origin's side
@@ -261,7 +263,7 @@ class Route:
         known_type = published_type(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
             msg_type = self.origin.msg_type or known_type or default_type(self.origin.backend)
-            self._waits_for_type = not msg_type
+            self._is_waiting_for_type = not msg_type
             if not msg_type:
                 return
             sink = _BufferedSink(self._on_messages, is_open=True)
@@ -273,23 +275,23 @@ class Route:
 
     def _resubscribe(self, node: Node, msg_type: str) -> None:
         # Keeps a subscription that receives messages: not every back end insists on the type.
-        old, old_sink = self._subscriber, self._sink
-        if old is None or old_sink is None or _has_received(old):
+        old_subscriber, old_sink = self._subscriber, self._sink
+        if old_subscriber is None or old_sink is None or _has_received(old_subscriber):
             return
         sink = _BufferedSink(self._on_messages, is_open=False)
-        new = self._new_sub(node, msg_type, sink)
-        if _has_received(old):  # a message arrived meanwhile
+        new_subscriber = self._new_sub(node, msg_type, sink)
+        if _has_received(old_subscriber):  # a message arrived meanwhile
             sink.mute()
-            new.close()
+            new_subscriber.close()
             return
         old_sink.mute()
-        lost = old.lost
+        lost = old_subscriber.lost
         with self._lock:
-            self._lost_by_previous = (
-                None if lost is None or self._lost_by_previous is None else self._lost_by_previous + lost
+            self._previously_lost = (
+                None if lost is None or self._previously_lost is None else self._previously_lost + lost
             )
-            self._subscriber, self._sink = new, sink
-        old.close()
+            self._subscriber, self._sink = new_subscriber, sink
+        old_subscriber.close()
         sink.open()
 
     def _new_sub(self, node: Node, msg_type: str, sink: _BufferedSink) -> Subscriber:
@@ -300,7 +302,7 @@ class Route:
     def unsubscribe(self) -> None:
         """Unsubscribe, and forward the message that the rate limit delays, if any."""
         with self._lock:
-            subscriber, self._limit = self._subscriber, None
+            subscriber, self._rate_limit = self._subscriber, None
         if subscriber is not None:
             subscriber.close()
         self._forward_pending()
@@ -336,27 +338,27 @@ class Route:
         trail = read_trail(message.extension)
         if not trail.may_forward(self.end.network, self._bridge):
             return True
-        is_nameless = message.publisher is None and not trail.bridges
-        return is_nameless and self.origin.loop_guard.is_echo(message.raw, now)
+        is_unidentified = message.publisher is None and not trail.bridges
+        return is_unidentified and self.origin.loop_guard.is_echo(message.raw, now)
 
     def _limit_rate(self, message: Message, now: float) -> None:
-        if self._limit is None:
+        if self._rate_limit is None:
             self._forward(message)
         elif self._pending is not None:
             self._thinned += 1
             self._pending = message
-        elif self._limit.try_acquire(now):
+        elif self._rate_limit.try_acquire(now):
             self._forward(message)
         else:
             self._pending = message
-            self._pacer.call_at(self._limit.next_at, self._forward_pending)
+            self._pacer.call_at(self._rate_limit.next_at, self._forward_pending)
 
     def _forward_pending(self) -> None:
         with self._lock:
             message, self._pending = self._pending, None
             if message is not None:
-                if self._limit is not None:
-                    self._limit.try_acquire(max(self._clock(), self._limit.next_at))
+                if self._rate_limit is not None:
+                    self._rate_limit.try_acquire(max(self._clock(), self._rate_limit.next_at))
                 self._forward(message)
 
     def _forward(self, message: Message) -> None:
@@ -408,24 +410,24 @@ class Route:
                 if message is None:
                     return
                 key = self._publisher_key(message)
-            form = self._format_for(message, view, own_nodes)
-            publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
+            topic_format = self._format_for(message, view, own_nodes)
+            publisher = node.new_pub(self.end.topic, topic_format.msg_type, latched=key[0], qos=self.end.qos)
             with self._lock:
                 self._own_publisher_ids.add(publisher.id)
-                is_late = self._is_closed
-                if not is_late:
+                is_closed = self._is_closed
+                if not is_closed:
                     self._publishers[key] = publisher
-            if is_late:
+            if is_closed:
                 publisher.close()
                 return
 
     def _format_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> TopicFormat:
-        if self._form is None:
+        if self._format is None:
             msg_type = self.end.msg_type or type_for(
                 message, self.end.backend, view.topics.get(self.end.topic), own_nodes
             )
-            self._form = TopicFormat(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
-        return self._form
+            self._format = TopicFormat(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
+        return self._format
 
     def close_stale_publishers(self, origin: GraphView, now: float) -> None:
         """Close the publishers of latched messages whose original publisher has left the graph.
@@ -435,24 +437,24 @@ class Route:
             now: Monotonic time in seconds.
         """
         topic_info = origin.topics.get(self.origin.topic)
-        ids = {each.id for each in topic_info.publishers} if topic_info is not None else set()
-        ended = []
+        publisher_ids = {each.id for each in topic_info.publishers} if topic_info is not None else set()
+        stale_publishers = []
         with self._lock:
             for key in list(self._publishers):
-                if not key[0] or key[1] is None or key[1] in ids:
+                if not key[0] or key[1] is None or key[1] in publisher_ids:
                     self._absent_since.pop(key, None)
                 elif now - self._absent_since.setdefault(key, now) >= _PUBLISHER_EXPIRY_S:
                     del self._absent_since[key]
-                    ended.append(self._publishers.pop(key))
-                    self._subscriber_counts.pop(ended[-1], None)
-        for publisher in ended:
+                    stale_publishers.append(self._publishers.pop(key))
+                    self._subscriber_counts.pop(stale_publishers[-1], None)
+        for publisher in stale_publishers:
             publisher.close()
 
     # ---- sending
 
     def _send(self, publisher: Publisher, message: Message) -> None:
-        form = self._form
-        if form is None:  # set by `open_publishers` before the first publisher
+        topic_format = self._format
+        if topic_format is None:  # set by `open_publishers` before the first publisher
             return
         if self.end.guard is not None:
             subscriber_count = publisher.subscribers
@@ -464,23 +466,23 @@ class Route:
                 self._fail(reason)
                 return
         try:
-            if form.matches(message):
+            if topic_format.matches(message):
                 try:
                     self._publish(publisher, message, Encoded(message.raw, message.extension))
                 except EncodeError:  # the other side's codec is stricter: decode and encode again
-                    self._publish(publisher, message, form.codec.encode(message.payload))
+                    self._publish(publisher, message, topic_format.codec.encode(message.payload))
             else:
-                self._publish(publisher, message, self._convert(publisher, message, form))
+                self._publish(publisher, message, self._convert(publisher, message, topic_format))
         except ClosedError:
             self._dropped += 1
         except Exception as error:  # noqa: BLE001 - payloads and third-party back ends may raise anything
             self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
 
-    def _convert(self, publisher: Publisher, message: Message, form: TopicFormat) -> Encoded:
+    def _convert(self, publisher: Publisher, message: Message, topic_format: TopicFormat) -> Encoded:
         subscriber = self._subscriber
         payload = message.payload if subscriber is None else subscriber.decoded(message)
         try:
-            return form.encode(payload)
+            return topic_format.encode(payload)
         except Exception as error:
             publisher.refuse(payload, error)
             raise
@@ -488,16 +490,16 @@ class Route:
     def _publish(self, publisher: Publisher, message: Message, encoded: Encoded) -> None:
         extension = {key: value for key, value in (encoded.extension or {}).items() if key != TRAIL_KEY}
         self.end.loop_guard.record_sent(encoded.data, self._clock())
-        refused = publisher.refused
+        refused_before = publisher.refused
         if self._supports_extension:
             publisher.publish_bytes(encoded.data, {**extension, TRAIL_KEY: self._trail(message).to_plain()})
-            if publisher.refused == refused:
+            if publisher.refused == refused_before:
                 self._count_sent(message)
                 return
             self._supports_extension = False  # a back end that wrongly claims to support extensions
-            refused = publisher.refused
+            refused_before = publisher.refused
         publisher.publish_bytes(encoded.data, extension or None)
-        if publisher.refused == refused:
+        if publisher.refused == refused_before:
             self._count_sent(message)
         else:
             self._fail(publisher.problem)

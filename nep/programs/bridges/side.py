@@ -118,32 +118,32 @@ class BridgeSide:
         if self._thread is not None:
             self._thread.join(max(0.0, timeout_s))
 
-    # ---- run in its thread
+    # ---- in the side's thread
 
     def _run(self, owner: SideOwner) -> None:
         while not self._is_closing:
             self._wake_event.clear()
             now = time.monotonic()
-            undecided = self._undecided_routes(owner)
+            undecided_routes = self._undecided_routes(owner)
             is_due = now >= self._poll_at or (
-                bool(undecided) and now >= self._poll_at - _GRAPH_POLL_S + _EARLY_POLL_S
+                bool(undecided_routes) and now >= self._poll_at - _GRAPH_POLL_S + _EARLY_POLL_S
             )
             if is_due:
                 self._poll_graph(owner)
                 self._poll_at = time.monotonic() + _GRAPH_POLL_S
             if self.view is not None:
-                self._update_routes(owner, self.view, undecided, is_due=is_due)
+                self._update_routes(owner, self.view, undecided_routes, is_due=is_due)
                 if is_due and owner.publishes_status_on(self, self.view):
                     self._subscribe_to_bridges(owner)
                     self._publish_status({**owner.status(), "side": self.name})
-            is_early = self.view is not None and self._undecided_routes(owner)
-            poll_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if is_early else 0.0)
+            has_undecided = self.view is not None and self._undecided_routes(owner)
+            poll_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if has_undecided else 0.0)
             self._wake_event.wait(max(0.0, poll_at - time.monotonic()))
 
     def _undecided_routes(self, owner: SideOwner) -> list[Route]:
         # Their type depends on the current publishers, so the graph is polled first.
         routes = (each for each in owner.routes if each.end.side == self.name)
-        return [each for each in routes if each.needs_type and self.name not in each.troubles]
+        return [each for each in routes if each.needs_type and self.name not in each.connection_problems]
 
     def _poll_graph(self, owner: SideOwner) -> None:
         try:
@@ -175,34 +175,34 @@ class BridgeSide:
                 route.close_stale_publishers(view, time.monotonic())
 
     def _update_routes(
-        self, owner: SideOwner, view: GraphView, undecided: Sequence[Route], *, is_due: bool
+        self, owner: SideOwner, view: GraphView, undecided_routes: Sequence[Route], *, is_due: bool
     ) -> None:
-        # Failed routes are retried with the next poll. `undecided`: routes whose first message arrived before
-        # the last poll; others wait for the next one.
+        # Failed routes are retried with the next poll. The first message of an undecided route arrived before
+        # the last poll; other routes wait for the next one.
         for route in owner.routes:
             if self._is_closing:
                 return
-            if self.name in route.troubles and not is_due:
+            if self.name in route.connection_problems and not is_due:
                 continue
             if route.origin.side == self.name:
                 self._try_update(route, partial(route.subscribe, self.node, view, owner.own_nodes))
             elif route.needs_publisher and (
-                not route.needs_type or (is_due and self._can_decide_type(route, undecided))
+                not route.needs_type or (is_due and self._can_decide_type(route, undecided_routes))
             ):
                 self._try_update(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
 
-    def _can_decide_type(self, route: Route, undecided: Sequence[Route]) -> bool:
-        return route in undecided or self.name in route.troubles
+    def _can_decide_type(self, route: Route, undecided_routes: Sequence[Route]) -> bool:
+        return route in undecided_routes or self.name in route.connection_problems
 
-    def _try_update(self, route: Route, make: Callable[[], None]) -> None:
+    def _try_update(self, route: Route, update: Callable[[], None]) -> None:
         try:
-            make()
+            update()
         except ClosedError:
             return
         except Exception as error:  # noqa: BLE001 - see `_poll_graph`
             reason = _error_text(error)
-            if reason != route.troubles.get(self.name):
-                route.troubles[self.name] = reason
+            if reason != route.connection_problems.get(self.name):
+                route.connection_problems[self.name] = reason
                 _logger.warning(
                     "'%s' on side %s is not forwarded to '%s' yet: %s",
                     route.origin.topic,
@@ -211,7 +211,7 @@ class BridgeSide:
                     reason,
                 )
             return
-        route.troubles.pop(self.name, None)
+        route.connection_problems.pop(self.name, None)
 
     def _subscribe_to_bridges(self, owner: SideOwner) -> None:
         def on_messages(messages: Sequence[Message]) -> None:

@@ -197,12 +197,12 @@ class _Reader:
         self, section: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
     ) -> BridgeTopic:
         self._check_keys(section, _TOPIC_KEYS, "topics", number)
-        on_a, on_b = (self._text(section, side, "topics", number) for side in SIDES)
-        on_a, on_b = on_a or on_b, on_b or on_a
-        if not on_a:
+        a_name, b_name = (self._text(section, side, "topics", number) for side in SIDES)
+        a_name, b_name = a_name or b_name, b_name or a_name
+        if not a_name:
             self._fail("a", "topics", _('the topic name is missing; write a = "/a/topic"'), number)
         key = "b" if section.get("b") else "a"
-        self._checked(lambda: check_topic_names(on_a, on_b), key, "topics", number)
+        self._checked(lambda: check_topic_names(a_name, b_name), key, "topics", number)
         direction = self._text(section, "direction", "topics", number, default="both")
         parsed_direction = self._checked(lambda: parse_direction(direction), "direction", "topics", number)
         ends = [
@@ -211,7 +211,7 @@ class _Reader:
                 self._type(section, side, number),
                 self._qos(section, f"{side}_qos", number, configuration.backend),
             )
-            for name, side, configuration in ((on_a, "a", a), (on_b, "b", b))
+            for name, side, configuration in ((a_name, "a", a), (b_name, "b", b))
         ]
         return BridgeTopic(ends[0], ends[1], parsed_direction, self._rate(section, number))
 
@@ -316,8 +316,8 @@ class _Reader:
     def _line_of(self, key: str, table_name: str, number: int) -> int:
         table, topic_index, table_line = "", -1, 0
         name = re.escape(key)
-        assigned = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
-        dotted = re.compile(rf"\s*{re.escape(table_name or key)}\s*[.=]")
+        assignment = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
+        dotted_key = re.compile(rf"\s*{re.escape(table_name or key)}\s*[.=]")
         for line_number, line in enumerate(self._lines, 1):
             match = _TABLE_HEADER.match(line)
             if match is not None:
@@ -325,12 +325,12 @@ class _Reader:
                 topic_index += table == "topics"
                 if not table_name and table == key:
                     return line_number
-            is_here = table == table_name and (table_name != "topics" or topic_index == number)
-            if is_here and match is not None:
+            is_in_table = table == table_name and (table_name != "topics" or topic_index == number)
+            if is_in_table and match is not None:
                 table_line = line_number
-            elif is_here and assigned.match(line):
+            elif is_in_table and assignment.match(line):
                 return line_number
-            elif not table and not table_line and dotted.match(line):
+            elif not table and not table_line and dotted_key.match(line):
                 table_line = line_number
         return table_line
 

@@ -66,9 +66,13 @@ def type_for(
 ) -> str:
     """Return the message type for publishing messages like `message` on a topic without configured type.
 
-    A topic must not have two types, so the topic's existing type is used if other nodes use the topic,
-    and either only this back end knows that type and the message may be a map, or another node
-    publishes with the same codec. Otherwise the message's own type is used.
+    A topic must not have two types. Therefore, the topic's existing type is used if other nodes use the
+    topic and one of these conditions is met:
+
+    - Only this back end knows the existing type, and the message may be a map.
+    - Another node publishes the topic, with the codec of the message.
+
+    Otherwise, the message's own type is used.
 
     Args:
         message: Message to forward.
@@ -79,17 +83,17 @@ def type_for(
     own_type = _message_type(message, backend)
     if topic_info is None or topic_info.msg_type in _UNKNOWN_TYPES:
         return own_type
-    members = {each.node_id for each in topic_info.publishers} | {
+    node_ids = {each.node_id for each in topic_info.publishers} | {
         each.node_id for each in topic_info.subscribers
     }
     codec = _codec_name(backend, topic_info.msg_type)
-    if members <= set(own_nodes) or not codec:
+    if node_ids <= set(own_nodes) or not codec:
         return own_type
     if codec not in CODECS:
         return own_type if message.codec in _CODECS_WITHOUT_FIELDS else topic_info.msg_type
     is_published = any(each.node_id not in own_nodes for each in topic_info.publishers)
-    is_same = is_published and codec == _codec_name(backend, own_type)
-    return topic_info.msg_type if is_same else own_type
+    has_same_codec = is_published and codec == _codec_name(backend, own_type)
+    return topic_info.msg_type if has_same_codec else own_type
 
 
 def _message_type(message: Message, backend: Backend) -> str:

@@ -79,7 +79,7 @@ class LoopGuard:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._sent: OrderedDict[bytes, tuple[int, float]] = OrderedDict()
+        self._sent_counts: OrderedDict[bytes, tuple[int, float]] = OrderedDict()
         self._is_enabled = True
 
     def disable(self) -> None:
@@ -87,7 +87,7 @@ class LoopGuard:
         if self._is_enabled:
             self._is_enabled = False
             with self._lock:
-                self._sent.clear()
+                self._sent_counts.clear()
 
     def record_sent(self, data: bytes | memoryview, now: float) -> None:
         """Record the bytes of a message that is being sent.
@@ -99,10 +99,10 @@ class LoopGuard:
         if self._is_enabled:
             key = _digest(data)
             with self._lock:
-                count, _at = self._sent.pop(key, (0, 0.0))
-                self._sent[key] = count + 1, now
-                while len(self._sent) > _MAX_ECHOES:
-                    self._sent.popitem(last=False)
+                count, _at = self._sent_counts.pop(key, (0, 0.0))
+                self._sent_counts[key] = count + 1, now
+                while len(self._sent_counts) > _MAX_ECHOES:
+                    self._sent_counts.popitem(last=False)
 
     def is_echo(self, data: bytes | memoryview, now: float) -> bool:
         """Return True if a received message is the echo of a sent one; the record is then removed.
@@ -113,11 +113,11 @@ class LoopGuard:
         """
         key = _digest(data)
         with self._lock:
-            count, sent_at = self._sent.pop(key, (0, 0.0))
+            count, sent_at = self._sent_counts.pop(key, (0, 0.0))
             if not count or now - sent_at > ECHO_WINDOW_S:
                 return False
             if count > 1:
-                self._sent[key] = count - 1, sent_at
+                self._sent_counts[key] = count - 1, sent_at
             return True
 
 

@@ -63,13 +63,13 @@ class AdapterProcess:
             raise AdapterError(
                 _("can't start '{command}': {error}").format(command=" ".join(command), error=error)
             ) from error
-        reads, writes = self._process.stdout, self._process.stdin
-        if reads is None or writes is None:
+        stdout, stdin = self._process.stdout, self._process.stdin
+        if stdout is None or stdin is None:
             raise AdapterError(
                 _("'{command}' has no standard input or output").format(command=" ".join(command))
             )
-        self.output: IO[bytes] = reads
-        self.input: IO[bytes] = writes
+        self.output: IO[bytes] = stdout
+        self.input: IO[bytes] = stdin
 
     def wait(self, timeout_s: float) -> int | None:
         """Return the exit code, or None if the adapter is still running after `timeout_s` seconds."""
@@ -94,16 +94,16 @@ class Adapter:
     A thread reads the adapter's output.
 
     Args:
-        lines: Streams of the adapter.
+        streams: Streams of the adapter.
     """
 
-    def __init__(self, lines: AdapterStreams) -> None:
-        self.streams = lines
+    def __init__(self, streams: AdapterStreams) -> None:
+        self.streams = streams
         self.events: list[Mapping[str, Any]] = []
         """Messages received by the adapter's subscribers, in the order of the events."""
         self._replies: dict[int, Mapping[str, Any]] = {}
-        self._incoming: deque[bytes | None] = deque()
-        self._count = 0
+        self._incoming_lines: deque[bytes | None] = deque()
+        self._request_count = 0
         self.has_ended = False
         self._reader = threading.Thread(target=self._read, daemon=True, name="nep wire check")
         self._reader.start()
@@ -111,8 +111,8 @@ class Adapter:
     def _read(self) -> None:
         with suppress(OSError, ValueError):  # closed by `stop`
             while line := self.streams.output.readline(_MAX_LINE_BYTES):
-                self._incoming.append(line)
-        self._incoming.append(None)
+                self._incoming_lines.append(line)
+        self._incoming_lines.append(None)
 
     def send_request(self, do: str, **members: object) -> int:
         """Send a request without waiting for the reply.
@@ -127,22 +127,22 @@ class Adapter:
         Raises:
             AdapterError: The adapter's standard input is closed.
         """
-        self._count += 1
-        line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
+        self._request_count += 1
+        line = json.dumps({"id": self._request_count, "do": do, **members}).encode() + b"\n"
         try:
             self.streams.input.write(line)
             self.streams.input.flush()
         except (OSError, ValueError) as error:
             raise AdapterError(_("can't write to the adapter: {error}").format(error=error)) from error
-        return self._count
+        return self._request_count
 
-    def reply(self, number: int) -> Mapping[str, Any] | None:
+    def reply(self, request_id: int) -> Mapping[str, Any] | None:
         """Return the reply to a request, or None if it has not arrived yet.
 
         Raises `AdapterError` if the reply is an error.
         """
         self.pump()
-        reply = self._replies.get(number)
+        reply = self._replies.get(request_id)
         if reply is None:
             return None
         if "error" in reply:
@@ -153,8 +153,8 @@ class Adapter:
 
     def pump(self) -> None:
         """Process the lines received so far. Raises `AdapterError` for a line that is not a JSON object."""
-        while self._incoming:
-            line = self._incoming.popleft()
+        while self._incoming_lines:
+            line = self._incoming_lines.popleft()
             if line is None:
                 self.has_ended = True
                 continue

@@ -42,9 +42,9 @@ class Bench:
         self.subscribers: list[ScriptedSubscriber] = []
         self.connect_delay_s: float | None = 0.0
         """Delay before the tester's subscribers connect to a listed publisher; None if they don't connect."""
-        self._connecting: list[tuple[float, ScriptedSubscriber, str]] = []
-        self._opened: list[tuple[str, Mapping[str, Any]]] = []
-        self._numbers = itertools.count(1)
+        self._pending_connections: list[tuple[float, ScriptedSubscriber, str]] = []
+        self._close_requests: list[tuple[str, Mapping[str, Any]]] = []
+        self._topic_numbers = itertools.count(1)
         try:
             self.adapter = Adapter(start(self.master.address))
         except BaseException:
@@ -69,9 +69,9 @@ class Bench:
         for peer in self._peers():
             peer.pump()
         now = time.monotonic()
-        for due in [each for each in self._connecting if each[0] <= now]:
-            self._connecting.remove(due)
-            due[1].connect(due[2])
+        for connection in [each for each in self._pending_connections if each[0] <= now]:
+            self._pending_connections.remove(connection)
+            connection[1].connect(connection[2])
         self.adapter.pump()
 
     def wait_until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
@@ -133,11 +133,11 @@ class Bench:
         """
         return self.wait_for_reply(self.adapter.send_request(do, **members), do)
 
-    def wait_for_reply(self, number: int, do: str) -> Mapping[str, Any]:
+    def wait_for_reply(self, request_id: int, do: str) -> Mapping[str, Any]:
         """Wait for the reply to a request that `Adapter.send_request` sent, and return the reply.
 
         Args:
-            number: Id of the request.
+            request_id: Id of the request.
             do: Name of the request, for the error message.
 
         Raises:
@@ -146,7 +146,7 @@ class Bench:
         replies: list[Mapping[str, Any]] = []
 
         def has_finished() -> bool:
-            reply = self.adapter.reply(number)
+            reply = self.adapter.reply(request_id)
             if reply is not None:
                 replies.append(reply)
             return reply is not None or self.adapter.has_ended
@@ -163,7 +163,7 @@ class Bench:
 
     def new_topic(self) -> str:
         """Return the name of an unused topic."""
-        return f"/check/{next(self._numbers)}"
+        return f"/check/{next(self._topic_numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
         """Open a publisher in the adapter and return its id.
@@ -177,7 +177,7 @@ class Bench:
             AdapterError: The adapter reported an error, exited, or did not reply with an id.
         """
         reply = self.call("publisher", topic=topic, type=msg_type, **members)
-        return self._add_opened("close_publisher", "pub", reply)
+        return self._add_close_request("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
         """Open a subscriber in the adapter and return its id.
@@ -191,13 +191,13 @@ class Bench:
             AdapterError: The adapter reported an error, exited, or did not reply with an id.
         """
         reply = self.call("subscriber", topic=topic, type=msg_type, **members)
-        return self._add_opened("close_subscriber", "sub", reply)
+        return self._add_close_request("close_subscriber", "sub", reply)
 
-    def _add_opened(self, closes: str, name: str, reply: Mapping[str, Any]) -> int:
+    def _add_close_request(self, close_request: str, name: str, reply: Mapping[str, Any]) -> int:
         number = reply.get(name)
         if not isinstance(number, int):
             raise AdapterError(_("the adapter's reply has no '{name}'").format(name=name))
-        self._opened.append((closes, {name: number}))
+        self._close_requests.append((close_request, {name: number}))
         return number
 
     def close_pub(self, number: int) -> None:
@@ -209,7 +209,7 @@ class Bench:
         self._close("close_subscriber", {"sub": number})
 
     def _close(self, do: str, members: Mapping[str, Any]) -> None:
-        self._opened = [each for each in self._opened if each != (do, members)]
+        self._close_requests = [each for each in self._close_requests if each != (do, members)]
         self.call(do, **members)
 
     def events(self, sub: int) -> list[Mapping[str, Any]]:
@@ -300,25 +300,25 @@ class Bench:
             self.require(other.has_disconnected, "connection", 10.0)
 
     def create_publisher(
-        self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
+        self, topic: str, msg_type: str = "json", *, should_echo: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:
         """Create a publisher of the tester.
 
         Args:
             topic: Name of the topic.
             msg_type: Message type.
-            echoes: Reply to hellos with echoes.
-            is_listed: Register the publisher at the master.
+            should_echo: True to reply to hellos with echoes.
+            is_listed: True to register the publisher at the master.
         """
-        created = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
-        self.publishers.append(created)
+        publisher = ScriptedPublisher(self._context, topic, msg_type, should_echo=should_echo)
+        self.publishers.append(publisher)
         if is_listed:
-            self.register_publisher(created)
-        return created
+            self.register_publisher(publisher)
+        return publisher
 
-    def register_publisher(self, created: ScriptedPublisher) -> None:
+    def register_publisher(self, publisher: ScriptedPublisher) -> None:
         """Register a publisher of the tester at the master."""
-        self.master.submit(AddPublisher(created.node, created.record))
+        self.master.submit(AddPublisher(publisher.node, publisher.record))
 
     def create_subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None
@@ -331,13 +331,13 @@ class Bench:
             level: Hello level; None to send no hello.
             endpoint: Endpoint to connect to; None to register at the master instead.
         """
-        created = ScriptedSubscriber(self._context, topic, msg_type, level)
-        self.subscribers.append(created)
+        subscriber = ScriptedSubscriber(self._context, topic, msg_type, level)
+        self.subscribers.append(subscriber)
         if endpoint is None:
-            self.master.submit(AddSubscriber(created.node, created.record))
+            self.master.submit(AddSubscriber(subscriber.node, subscriber.record))
         else:
-            created.connect(endpoint)
-        return created
+            subscriber.connect(endpoint)
+        return subscriber
 
     def create_subscribed_publisher(
         self, topic: str, msg_type: str = "json"
@@ -358,19 +358,19 @@ class Bench:
             due = time.monotonic() + self.connect_delay_s * self.scale
             for subscriber in self.subscribers:
                 if subscriber.topic == record.topic and subscriber.node.id == message.to:
-                    self._connecting.append((due, subscriber, record.endpoints[0]))
+                    self._pending_connections.append((due, subscriber, record.endpoints[0]))
 
     # ---- between rules and at the end
 
-    def discard_opened(self) -> None:
-        """Don't close the adapter's current publishers and subscribers in `clear`; the rule closes them."""
-        self._opened.clear()
+    def discard_close_requests(self) -> None:
+        """Exclude the adapter's current publishers and subscribers from `clear`; the rule closes them."""
+        self._close_requests.clear()
 
     def clear(self) -> None:
         """Close all publishers and subscribers that a rule opened; the adapter keeps running."""
         self.master.reply_filter = lambda _request, reply: reply
         self.connect_delay_s = 0.0
-        self._connecting.clear()
+        self._pending_connections.clear()
         for peer in self._peers():
             if peer.node.id in self.master.graph.members:
                 self.master.submit(Leave(peer.node.id))
@@ -380,8 +380,8 @@ class Bench:
         for subscriber in self.subscribers:
             subscriber.socket.close(0)
         self.subscribers.clear()
-        while self._opened:
-            do, members = self._opened.pop()
+        while self._close_requests:
+            do, members = self._close_requests.pop()
             self.call(do, **members)
         for publisher in self.publishers:
             publisher.socket.close(0)

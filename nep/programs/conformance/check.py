@@ -35,12 +35,12 @@ class Outcome:
     Attributes:
         rule: Rule that was checked.
         status: "passed", "failed" or "skipped".
-        observed: Description of the failure, or reason for skipping; "" if passed.
+        observation: Description of the failure, or reason for skipping; "" if passed.
     """
 
     rule: Rule
     status: Status
-    observed: str = ""
+    observation: str = ""
 
     def to_plain(self) -> dict[str, object]:
         """Return the result as a JSON-serializable dict, for ``--json``."""
@@ -48,7 +48,7 @@ class Outcome:
             "id": self.rule.id,
             "status": self.status,
             "requirement": _(self.rule.requirement),
-            "seen": self.observed,
+            "seen": self.observation,
             "section": f"docs/{self.rule.location}",
         }
 
@@ -58,11 +58,11 @@ def select_rules(ids: Iterable[str]) -> list[Rule]:
 
     Returns all rules if `ids` is empty. Raises `KeyError` for an unknown id.
     """
-    requested = list(ids)
-    for rule_id in requested:
+    requested_ids = list(ids)
+    for rule_id in requested_ids:
         if rule_id not in RULES:
             raise KeyError(rule_id)
-    selected = [rule_id for rule_id in RULES.values() if not requested or rule_id.id in requested]
+    selected = [each for each in RULES.values() if not requested_ids or each.id in requested_ids]
     return sorted(selected, key=lambda each: _MODULES.index(each.check.__module__.rpartition(".")[2]))
 
 
@@ -92,11 +92,11 @@ def check(start: AdapterStarter, rules: Iterable[Rule], scale: float = 1.0) -> I
 
 
 def _check_rule(rule: Rule, bench: Bench) -> Outcome:
-    announced = bench.features.get("features", ())
-    lacking = [each for each in rule.features if each not in announced]
-    if lacking:
+    announced_features = bench.features.get("features", ())
+    missing_features = [each for each in rule.features if each not in announced_features]
+    if missing_features:
         return Outcome(
-            rule, "skipped", _("the adapter doesn't announce '{feature}'").format(feature=lacking[0])
+            rule, "skipped", _("the adapter doesn't announce '{feature}'").format(feature=missing_features[0])
         )
     try:
         rule.check(bench)

@@ -30,7 +30,7 @@ class OtherSocket:
         self._handshake = _GREETING + bytes([4, len(body)]) + body
         self._clients: list[sockets.socket] = []
         self._listener = sockets.socket()
-        if sys.platform != "win32":  # there, the port's owner would stay the listener
+        if sys.platform != "win32":  # on Windows, the option allows binding a port in use
             self._listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
         self._listener.setblocking(False)
         try:

@@ -13,7 +13,7 @@ import zmq
 from nep.errors import WireError
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.ports import bind_again
-from nep.protocol.batch import BATCH_FORM_FLAG, encode_batch, read_parts
+from nep.protocol.batch import BATCH_FORM_FLAG, encode_batch, parse_parts
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import (
     BYE,
@@ -73,11 +73,11 @@ class ScriptedPublisher:
         context: ZeroMQ context.
         topic: Name of the topic.
         msg_type: Message type.
-        echoes: Reply to hellos with echoes.
+        should_echo: True to reply to hellos with echoes.
     """
 
-    def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
-        self.topic, self.echoes = topic, echoes
+    def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, should_echo: bool) -> None:
+        self.topic, self.should_echo = topic, should_echo
         self._context = context
         self.socket = self._new_socket()
         port = self.socket.bind_to_random_port("tcp://127.0.0.1")
@@ -125,17 +125,17 @@ class ScriptedPublisher:
         while not self.socket.closed and self.socket.poll(0):
             event = self.socket.recv()
             now = time.monotonic()
-            noted = FilterChange(now, event[:1] == b"\1", event[1:])
-            self.filters.append(noted)
-            hello = parse_hello(noted.prefix)
+            change = FilterChange(now, event[:1] == b"\1", event[1:])
+            self.filters.append(change)
+            hello = parse_hello(change.prefix)
             if hello is None or hello.topic != self.topic:
                 continue
-            if noted.is_added:
-                self.hellos[noted.prefix] = hello
-                if self.echoes:
-                    self.send_echo(noted.prefix)
+            if change.is_added:
+                self.hellos[change.prefix] = hello
+                if self.should_echo:
+                    self.send_echo(change.prefix)
             else:
-                self.hellos.pop(noted.prefix, None)
+                self.hellos.pop(change.prefix, None)
 
     def send_echo(self, hello: bytes) -> None:
         """Reply to a hello with an echo that carries the sequence number of the last message."""
@@ -208,12 +208,16 @@ class ScriptedSubscriber:
         self.socket.linger, self.socket.sndhwm, self.socket.rcvhwm = 0, 0, 0
         self.socket.subscribe(topic_part(topic))
         self.hello = hello_part(
-            self.record.id, topic, one_part=level == 1, acknowledges_echoes=level == 2, batches=level == 3
+            self.record.id,
+            topic,
+            reads_one_part=level == 1,
+            acknowledges_echoes=level == 2,
+            reads_batches=level == 3,
         )
         if level is not None:
             self.socket.subscribe(self.hello)
         self.received: list[list[bytes]] = []
-        self.times: list[float] = []
+        self.arrival_times: list[float] = []
         self.endpoint = ""
 
     def connect(self, endpoint: str) -> None:
@@ -232,7 +236,7 @@ class ScriptedSubscriber:
         """Receive all pending messages."""
         while not self.socket.closed and self.socket.poll(0):
             self.received.append(self.socket.recv_multipart())
-            self.times.append(time.monotonic())
+            self.arrival_times.append(time.monotonic())
 
     @property
     def notices(self) -> list[Notice]:
@@ -240,15 +244,15 @@ class ScriptedSubscriber:
 
         Malformed ones are omitted.
         """
-        parsed = []
-        for received_at, parts in zip(self.times, self.received, strict=True):
+        notices = []
+        for received_at, parts in zip(self.arrival_times, self.received, strict=True):
             if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
                 try:
                     header = read_header(parts[1])
                 except WireError:
                     continue
-                parsed.append(Notice(received_at, parts[0], header, parts[2] if len(parts) > 2 else None))
-        return parsed
+                notices.append(Notice(received_at, parts[0], header, parts[2] if len(parts) > 2 else None))
+        return notices
 
     @property
     def echoes(self) -> list[Notice]:
@@ -271,4 +275,4 @@ class ScriptedSubscriber:
 
         Raises `WireError` for malformed parts.
         """
-        return [each for parts in self.raw_messages for each in read_parts(parts)]
+        return [each for parts in self.raw_messages for each in parse_parts(parts)]

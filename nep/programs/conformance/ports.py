@@ -42,6 +42,6 @@ def retry_bind(bind: Callable[[], object]) -> None:
 @contextmanager
 def closed_port() -> Iterator[str]:
     """Reserve a port at which connections are rejected, and yield its endpoint."""
-    with sockets.socket() as reserved:
-        reserved.bind(("127.0.0.1", 0))
-        yield f"tcp://127.0.0.1:{reserved.getsockname()[1]}"
+    with sockets.socket() as reserved_socket:
+        reserved_socket.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{reserved_socket.getsockname()[1]}"

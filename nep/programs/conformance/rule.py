@@ -52,8 +52,8 @@ def rule(
     The arguments are the attributes of `Rule`.
     """
 
-    def register(judge: RuleCheck) -> RuleCheck:
-        RULES[id] = Rule(id, requirement, section, judge, features, is_last)
-        return judge
+    def register(check: RuleCheck) -> RuleCheck:
+        RULES[id] = Rule(id, requirement, section, check, features, is_last)
+        return check
 
     return register

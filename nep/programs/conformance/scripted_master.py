@@ -146,10 +146,10 @@ class ScriptedMaster:
         body = parts[-1]
         request = _parse_request(sender, parts)
         self.received.append(request)
-        received = decode_request(body)
-        if isinstance(received.request, WireError):
+        decoded = decode_request(body)
+        if isinstance(decoded.request, WireError):
             epoch, revision = self.graph.epoch, self.graph.revision
-            error = received.request
+            error = decoded.request
             self._reply(
                 request,
                 OutgoingMessage(
@@ -157,7 +157,7 @@ class ScriptedMaster:
                 ),
             )
             return
-        for message in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
+        for message in self.graph.apply(decoded.request, decoded.call, 0.0, sender, is_foreign=True):
             if message.call is None:
                 self._push(message)
             else:

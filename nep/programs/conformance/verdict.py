@@ -42,9 +42,9 @@ def time_limit(seconds: float) -> Iterator[None]:
     """Raise `BrokenRuleError` if the `with` block takes longer than `seconds`."""
     started_s = time.monotonic()
     yield
-    took_s = time.monotonic() - started_s
-    if took_s > seconds:
-        raise broken_rule_error(_("the operation took {seconds:.1f} s").format(seconds=took_s))
+    duration_s = time.monotonic() - started_s
+    if duration_s > seconds:
+        raise broken_rule_error(_("the operation took {seconds:.1f} s").format(seconds=duration_s))
 
 
 def printable(value: object) -> str:

@@ -47,7 +47,7 @@ else:
 
 
 PORT_PURPOSES: Mapping[int, str] = {
-    7000: lazy("used by programs of nep up to 0.5.4.5, nep-js and C#"),
+    7000: lazy("which programs of nep up to 0.5.4.5, nep-js and C# connect to"),
     50000: lazy("which programs of nep 0.5.4.8 connect to"),
     7777: lazy("from which tools of the original NEP read the topics"),
     12345: lazy("which shuts down programs of the original NEP"),
@@ -95,23 +95,27 @@ def collect_in_steps(
     yield ("clock", "versions"), facts
     facts = replace(facts, loopback_problem=loopback_problem())
     yield ("loopback",), facts
-    state = (_("Ports of programs of the original NEP"), default_file(0).parent)
-    facts = replace(facts, folders=tuple(_folder_fact(purpose, path) for purpose, path in (state, *folders)))
+    port_folder = (_("The ports assigned to programs of the original NEP"), default_file(0).parent)
+    facts = replace(
+        facts, folders=tuple(_folder_fact(purpose, path) for purpose, path in (port_folder, *folders))
+    )
     yield ("folders",), facts
     facts = replace(
         facts,
         packages=tuple(_packages()),
         original_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
-        shadow=_shadowing_file(working_folder or Path.cwd(), package),
+        shadowing_file=_shadowing_file(working_folder or Path.cwd(), package),
         path_package=namesakes.path_python_package(),
         node_packages=namesakes.node_packages(working_folder or Path.cwd()),
     )
     yield ("packages",), facts
-    facts, master_pid, listening = _collect_master(facts)
+    facts, master_pid, pid_by_port = _collect_master(facts)
     yield ("masters", "alerts", "clocks"), facts
-    joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF_VALUES
-    ports = tuple(_port_fact(port, purpose, listening, master_pid) for port, purpose in PORT_PURPOSES.items())
-    facts = replace(facts, ports=ports, is_gateway_enabled=joins)
+    is_gateway_enabled = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF_VALUES
+    ports = tuple(
+        _port_fact(port, purpose, pid_by_port, master_pid) for port, purpose in PORT_PURPOSES.items()
+    )
+    facts = replace(facts, ports=ports, is_gateway_enabled=is_gateway_enabled)
     yield ("ports", "originals"), facts
     holder = facts.master_port.holder if facts.master_port is not None else None
     facts = replace(
@@ -123,27 +127,27 @@ def collect_in_steps(
 
 def _collect_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
     address = facts.address
-    number = int(address.rpartition(":")[2])
-    view, answered_s, is_known = _query_graph(address)
-    listening = processes.listening_ports()
-    master_port = _port_fact(number, "the master's", listening) if _is_own_address(address) else None
+    port = int(address.rpartition(":")[2])
+    view, reply_time_s, is_host_known = _query_graph(address)
+    pid_by_port = processes.listening_ports()
+    master_port = _port_fact(port, "the master's", pid_by_port) if _is_own_address(address) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
-    elsewhere = view is None and master_port is not None and master_port.is_taken
-    is_far = view is None and is_known and master_port is None
+    is_port_taken = view is None and master_port is not None and master_port.is_taken
+    is_remote = view is None and is_host_known and master_port is None
     updated = replace(
         facts,
         view=view,
-        reply_time_s=answered_s,
+        reply_time_s=reply_time_s,
         master_port=master_port,
-        masters=processes.master_processes(listening, number),
+        masters=processes.master_processes(pid_by_port, port),
         clocks=tuple(_clocks(view)),
         master_install=installs.install_of(master_pid) if master_pid is not None else None,
-        is_host_known=is_known,
-        replying_address=_replying_address(address) if elsewhere else "",
-        reach_failure=probe_endpoint(f"tcp://{address}") if is_far else None,
+        is_host_known=is_host_known,
+        replying_address=_replying_address(address) if is_port_taken else "",
+        reach_failure=probe_endpoint(f"tcp://{address}") if is_remote else None,
     )
-    return updated, master_pid, listening
+    return updated, master_pid, pid_by_port
 
 
 def _replying_address(address: str) -> str:
@@ -190,10 +194,10 @@ def _is_own_address(address: str) -> bool:
 
 
 def _port_fact(
-    port: int, purpose: str, listening: Mapping[int, int | None], master_pid: int | None = None
+    port: int, purpose: str, pid_by_port: Mapping[int, int | None], master_pid: int | None = None
 ) -> PortFact:
-    if port in listening:
-        return PortFact(port, purpose, True, processes.process_fact(listening[port], master_pid))
+    if port in pid_by_port:
+        return PortFact(port, purpose, True, processes.process_fact(pid_by_port[port], master_pid))
     return PortFact(port, purpose, not processes.is_free(port))
 
 
@@ -235,18 +239,18 @@ def _shadowing_file(folder: Path, package: Path) -> str:
 
 
 def _file_fact(master_pid: int | None) -> FileFact:
-    opened = limit = None
+    open_count = limit = None
     if master_pid is not None:
-        opened, limit = processes.open_files(master_pid)
+        open_count, limit = processes.open_files(master_pid)
     if sys.platform == "win32":
-        return FileFact(None, None, opened, limit)
+        return FileFact(None, None, open_count, limit)
     import resource  # noqa: PLC0415 - not on Windows
 
     soft, hard = (
         None if each == resource.RLIM_INFINITY else each
         for each in resource.getrlimit(resource.RLIMIT_NOFILE)
     )
-    return FileFact(soft, hard, opened, limit)
+    return FileFact(soft, hard, open_count, limit)
 
 
 def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
@@ -258,23 +262,23 @@ def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
     for pid, name in name_by_pid.items():
         if pid is None:
             continue
-        opened, limit = processes.open_files(pid)
+        open_count, limit = processes.open_files(pid)
         limit = limit or descriptors.descriptor_limit()  # macOS reports only the limit of this process
-        if opened is not None and limit is not None:
-            yield ProgramFact(pid, name, opened, limit)
+        if open_count is not None and limit is not None:
+            yield ProgramFact(pid, name, open_count, limit)
 
 
 def _folder_fact(purpose: str, path: Path) -> FolderFact:
-    existing = path
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
+    existing_folder = path
+    while not existing_folder.exists() and existing_folder != existing_folder.parent:
+        existing_folder = existing_folder.parent
     try:
-        with tempfile.TemporaryFile(dir=existing):
+        with tempfile.TemporaryFile(dir=existing_folder):
             pass
-        free = psutil.disk_usage(str(existing)).free
+        free_bytes = psutil.disk_usage(str(existing_folder)).free
     except OSError as error:
         return FolderFact(str(path), purpose, (error.strerror or str(error)).lower())
-    problem = _("the disk is full") if free < _MIN_FREE_BYTES else ""
+    problem = _("the disk is full") if free_bytes < _MIN_FREE_BYTES else ""
     return FolderFact(str(path), purpose, problem)
 
 

@@ -38,23 +38,27 @@ def diagnose(
     """
     findings_by_check: dict[str, tuple[Finding, ...]] = {}
     facts: Facts | None = None
-    count = len(CHECKS) + bool(topic)
+    check_count = len(CHECKS) + bool(topic)
     for names, facts in collect_in_steps(address, folders=folders):
         findings_by_check.update((name, tuple(CHECKS[name](facts))) for name in names)
         if on_progress is not None:
-            on_progress(_merge_findings(findings_by_check), len(findings_by_check), count)
-    missed = collect_topic(topic, address) if topic and facts is not None and facts.view is not None else None
-    result = _merge_findings(findings_by_check, topic_findings(missed) if missed is not None else ())
+            on_progress(_merge_findings(findings_by_check), len(findings_by_check), check_count)
+    topic_facts = (
+        collect_topic(topic, address) if topic and facts is not None and facts.view is not None else None
+    )
+    result = _merge_findings(
+        findings_by_check, topic_findings(topic_facts) if topic_facts is not None else ()
+    )
     if on_progress is not None:
-        on_progress(result, count, count)
+        on_progress(result, check_count, check_count)
     return result
 
 
 def _merge_findings(
-    findings_by_check: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()
+    findings_by_check: dict[str, tuple[Finding, ...]], about_topic: Sequence[Finding] = ()
 ) -> tuple[Finding, ...]:
-    topic_ids = {each.id for each in about}
+    topic_ids = {each.id for each in about_topic}
     general = [
         each for name in CHECKS for each in findings_by_check.get(name, ()) if each.id not in topic_ids
     ]
-    return sort_findings([*about, *general])
+    return sort_findings([*about_topic, *general])

@@ -31,7 +31,7 @@ MIN_VALID_TIME_S = 1_704_067_200.0
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Derive all findings from the facts, worst first."""
-    return sort_findings(finding for part in CHECKS.values() for finding in part(facts))
+    return sort_findings(finding for check in CHECKS.values() for finding in check(facts))
 
 
 def sort_findings(unsorted: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -54,9 +54,9 @@ def report_text(results: Sequence[Finding]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
+def to_plain(results: Sequence[Finding]) -> list[dict[str, object]]:
     """Convert findings to JSON-serializable dicts, for `--json`."""
-    return [asdict(finding) for finding in found]
+    return [asdict(finding) for finding in results]
 
 
 def _package_findings(facts: Facts) -> Iterator[Finding]:
@@ -70,8 +70,8 @@ def _package_findings(facts: Facts) -> Iterator[Finding]:
                 "are named “nep”."
             ).format(version=package.version),
             _(
-                "Uninstall it and reinstall NEP Studio. Use a separate Python environment for programs of "
-                "the original NEP."
+                "Uninstall the original package and reinstall NEP Studio. Use a separate Python environment "
+                "for programs of the original NEP."
             ),
             command="pip uninstall -y nep && pip install --force-reinstall --no-deps nep-studio",
         )
@@ -85,12 +85,12 @@ def _package_findings(facts: Facts) -> Iterator[Finding]:
             _("Reinstall NEP Studio."),
             command="pip install --force-reinstall --no-deps nep-studio",
         )
-    if facts.shadow:
+    if facts.shadowing_file:
         yield Finding(
             "package:shadow",
             "warning",
             _("{file} hides the package “nep” from programs that start in this folder.").format(
-                file=facts.shadow
+                file=facts.shadowing_file
             ),
             _("Rename that file."),
         )
@@ -119,15 +119,15 @@ def _python_namesake_findings(facts: Facts) -> Iterator[Finding]:
 
 
 def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
-    imported, *hidden = packages
-    own_package = next((each for each in hidden if each.is_ours), None)
-    if imported.is_ours:
+    imported_package, *hidden_packages = packages
+    own_package = next((each for each in hidden_packages if each.is_ours), None)
+    if imported_package.is_ours:
         return Finding(
             "package:nep-js",
             "ok",
             _(
                 "JavaScript programs in this folder import nep-js {version} of NEP Studio from {folder}."
-            ).format(version=imported.version, folder=imported.location),
+            ).format(version=imported_package.version, folder=imported_package.location),
         )
     if own_package is not None:
         return Finding(
@@ -136,9 +136,13 @@ def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
             _(
                 "JavaScript programs in this folder import another project's nep-js {version} from "
                 "{folder} instead of NEP Studio's in {hidden}."
-            ).format(version=imported.version, folder=imported.location, hidden=own_package.location),
+            ).format(
+                version=imported_package.version,
+                folder=imported_package.location,
+                hidden=own_package.location,
+            ),
             _("Uninstall the other package, or keep programs of the original NEP in a separate folder."),
-            command=f'npm uninstall --prefix "{Path(imported.location).parent.parent}" nep-js',
+            command=f'npm uninstall --prefix "{Path(imported_package.location).parent.parent}" nep-js',
         )
     return Finding(
         "package:nep-js",
@@ -146,7 +150,7 @@ def _node_package_finding(packages: Sequence[PackageFact]) -> Finding:
         _(
             "JavaScript programs in this folder import nep-js {version} from {folder}, which isn't "
             "part of NEP Studio."
-        ).format(version=imported.version, folder=imported.location),
+        ).format(version=imported_package.version, folder=imported_package.location),
         _(
             "Programs of the original NEP connect through the gateway. For other programs, install the file "
             "nep-js-….tgz of NEP Studio's release in this folder."
@@ -168,15 +172,15 @@ def _file_findings(facts: Facts) -> Iterator[Finding]:
         )
     elif files.soft_limit is not None:
         yield Finding("files", "ok", _("Open-file limit: {files}.").format(files=files.soft_limit))
-    opened, limit = files.master_open_count, files.master_limit
-    if opened is not None and limit is not None and opened > FILES_WARNING_RATIO * limit:
+    open_count, limit = files.master_open_count, files.master_limit
+    if open_count is not None and limit is not None and open_count > FILES_WARNING_RATIO * limit:
         yield Finding(
             "files:master",
             "warning",
             _(
                 "The master has {opened} of at most {limit} files open. At the limit, no more programs can "
                 "connect."
-            ).format(opened=opened, limit=limit),
+            ).format(opened=open_count, limit=limit),
             _("Stop the master and start it from a terminal with a higher limit."),
             command="ulimit -n 8192 && nep master",
         )

@@ -149,7 +149,8 @@ class Facts:
         is_gateway_enabled: True if the gateway is enabled.
         packages: Packages named nep or nep-studio in this Python environment.
         original_files: Names of files of the original NEP in the folder `nep_folder`.
-        shadow: File that hides the package `nep` from programs started in this folder; "" if there is none.
+        shadowing_file: File that hides the package `nep` from programs started in this folder; "" if there is
+            none.
         files: Limits on open files.
         folders: Folders that must be writable.
         clocks: Computers whose clocks are ahead.
@@ -179,7 +180,7 @@ class Facts:
     is_gateway_enabled: bool = True
     packages: tuple[PackageFact, ...] = ()
     original_files: tuple[str, ...] = ()
-    shadow: str = ""
+    shadowing_file: str = ""
     files: FileFact = field(default_factory=lambda: FileFact(None, None))
     folders: tuple[FolderFact, ...] = ()
     clocks: tuple[ClockFact, ...] = ()

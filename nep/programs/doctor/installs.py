@@ -43,14 +43,16 @@ def install_of(pid: int) -> Install | None:
     """Return the installation from which a process was started, or None if unknown."""
     try:
         process = psutil.Process(pid)
-        active = process.environ().get("VIRTUAL_ENV", "")
-        environment = environment_of(process.cmdline(), process.exe(), process.cwd(), active)
+        active_environment = process.environ().get("VIRTUAL_ENV", "")
+        environment = environment_of(process.cmdline(), process.exe(), process.cwd(), active_environment)
     except psutil.Error:
         return None
     return install_in(environment) if environment is not None else None
 
 
-def environment_of(command: Sequence[str], executable: str, folder: str, active: str = "") -> Path | None:
+def environment_of(
+    command: Sequence[str], executable: str, folder: str, active_environment: str = ""
+) -> Path | None:
     """Return the folder of a program's Python environment, or None for a frozen program.
 
     The interpreter of a virtual environment is a link, whose target the operating system reports as the
@@ -60,7 +62,7 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
         command: Command line of the program.
         executable: Executable that the operating system reports.
         folder: Folder in which the program was started.
-        active: Activated virtual environment (VIRTUAL_ENV), or "".
+        active_environment: Activated virtual environment (VIRTUAL_ENV), or "".
     """
     program = command[0] if command else ""
     if not Path(program).stem.lower().startswith("python"):
@@ -68,7 +70,7 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
     if not Path(program).stem.lower().startswith("python"):
         return None  # frozen by an installer: it contains its Python
     if Path(program).name == program:
-        return Path(active) if active else Path(executable).parent.parent
+        return Path(active_environment) if active_environment else Path(executable).parent.parent
     return Path(folder, program).parent.parent
 
 
@@ -80,8 +82,8 @@ def install_in(environment: Path) -> Install | None:
     if len(info_folders) != 1:
         return None
     try:
-        since_s = (info_folders[0] / "METADATA").stat().st_mtime
+        installed_s = (info_folders[0] / "METADATA").stat().st_mtime
         version = metadata.Distribution.at(info_folders[0]).version
     except (OSError, KeyError, TypeError):  # incomplete installation
         return None
-    return Install(version, since_s, str(environment))
+    return Install(version, installed_s, str(environment))

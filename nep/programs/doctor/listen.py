@@ -67,17 +67,17 @@ def probe_endpoint(endpoint: str) -> ReachFailure:
 def _collect(node: Node, topic: str, address: str) -> TopicFacts:
     view = node.graph(_GRAPH_TIMEOUT_S)
     info = view.topics.get(topic)
-    others = {name: each.rate_hz for name, each in view.topics.items() if each.publishers}
+    rate_by_topic = {name: each.rate_hz for name, each in view.topics.items() if each.publishers}
     if info is None or not info.publishers:
         return TopicFacts(
             topic,
             time.time(),
             address,
             bool(view.listens),
-            other_topics=others,
+            other_topics=rate_by_topic,
             services=tuple(view.services),
         )
-    received, refused, unreadable, listened_s = _listen(node, info)
+    received, rejected, decode_problem, listen_duration_s = _listen(node, info)
     view = node.graph(_GRAPH_TIMEOUT_S)  # includes alerts raised while subscribed
     info = view.topics.get(topic, info)
     return TopicFacts(
@@ -86,39 +86,41 @@ def _collect(node: Node, topic: str, address: str) -> TopicFacts:
         address,
         bool(view.listens),
         _publishers(view, info, address),
-        others,
+        rate_by_topic,
         tuple(view.services),
         tuple(each for each in view.alerts if each.id in {f"type:{topic}", f"encode:{topic}"}),
-        listened_s,
+        listen_duration_s,
         received,
-        refused,
-        unreadable,
+        rejected,
+        decode_problem,
     )
 
 
 def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
     start_s = time.monotonic()
     with node.new_sub(info.name, info.msg_type, wildcards=False) as subscriber:
-        message, unreadable = subscriber.receive(_LISTEN_DURATION_S), ""
+        message, decode_problem = subscriber.receive(_LISTEN_DURATION_S), ""
         if message is not None:
             try:
                 message.kind.decode(message.raw, message.extension)
             except nep.errors.NepError as error:
-                unreadable = str(error)
-        return subscriber.received, subscriber.refused, unreadable, time.monotonic() - start_s
+                decode_problem = str(error)
+        return subscriber.received, subscriber.refused, decode_problem, time.monotonic() - start_s
 
 
 def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[PublisherFact, ...]:
-    tried: dict[str, ReachFailure] = {}
-    return tuple(_publisher(view, each, address, tried) for each in info.publishers)
+    failure_by_endpoint: dict[str, ReachFailure] = {}
+    return tuple(_publisher(view, each, address, failure_by_endpoint) for each in info.publishers)
 
 
 def _publisher(
-    view: GraphView, publisher: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+    view: GraphView, publisher: PublisherInfo, address: str, failure_by_endpoint: dict[str, ReachFailure]
 ) -> PublisherFact:
     node = view.nodes.get(publisher.node_id)
     is_native = node is None or node.generation == "native"
-    endpoint, reach_failure = _endpoint_and_reach(publisher, address, tried) if is_native else ("", "")
+    endpoint, reach_failure = (
+        _endpoint_and_reach(publisher, address, failure_by_endpoint) if is_native else ("", "")
+    )
     services = [
         name
         for name, service in view.services.items()
@@ -137,7 +139,7 @@ def _publisher(
 
 
 def _endpoint_and_reach(
-    publisher: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+    publisher: PublisherInfo, address: str, failure_by_endpoint: dict[str, ReachFailure]
 ) -> tuple[str, ReachFailure]:
     # Each endpoint is tried once.
     if not publisher.endpoints:
@@ -145,9 +147,9 @@ def _endpoint_and_reach(
     endpoint = reachable_endpoint(publisher.endpoints, address)
     if not endpoint:
         return publisher.endpoints[0], "elsewhere"
-    if endpoint not in tried and len(tried) < _MAX_ENDPOINTS_TRIED:
-        tried[endpoint] = probe_endpoint(endpoint)
-    return endpoint, tried.get(endpoint, "")
+    if endpoint not in failure_by_endpoint and len(failure_by_endpoint) < _MAX_ENDPOINTS_TRIED:
+        failure_by_endpoint[endpoint] = probe_endpoint(endpoint)
+    return endpoint, failure_by_endpoint.get(endpoint, "")
 
 
 def _last_message_s(view: GraphView, publisher: PublisherInfo) -> float | None:

@@ -31,21 +31,23 @@ def node_packages(program_folder: Path, environ: Mapping[str, str] = os.environ)
         environ: Environment variables.
     """
     folder = program_folder.absolute()
-    modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
-    more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
-    packages = (_node_package(each / "nep-js") for each in dict.fromkeys((*modules, *more)))
+    module_folders = [
+        each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"
+    ]
+    extra_folders = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
+    packages = (_node_package(each / "nep-js") for each in dict.fromkeys((*module_folders, *extra_folders)))
     return tuple(each for each in packages if each is not None)
 
 
 def _node_package(folder: Path) -> PackageFact | None:
     try:
-        described = json.loads((folder / "package.json").read_text(encoding="utf-8"))
+        manifest = json.loads((folder / "package.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None
-    if not isinstance(described, dict):
+    if not isinstance(manifest, dict):
         return None
-    is_ours = isinstance(described.get("nep"), dict)  # clients/javascript/package.json has it
-    return PackageFact("nep-js", str(described.get("version", "")), str(folder), is_ours)
+    is_ours = isinstance(manifest.get("nep"), dict)  # as in clients/javascript/package.json
+    return PackageFact("nep-js", str(manifest.get("version", "")), str(folder), is_ours)
 
 
 def path_python_package(
@@ -67,10 +69,10 @@ def path_python_package(
     if environment == own_environment.resolve():
         return None
     name = Path(python).resolve().name
-    names = (name, "python3") if name.startswith("python3.") else ("python3*",)
+    folder_names = (name, "python3") if name.startswith("python3.") else ("python3*",)
     is_virtual = (environment / "pyvenv.cfg").exists()
-    users = [] if is_virtual else [(home or Path.home()) / ".local"]
-    return next(_original_packages((*users, environment), names), None)
+    user_folders = [] if is_virtual else [(home or Path.home()) / ".local"]
+    return next(_original_packages((*user_folders, environment), folder_names), None)
 
 
 def _original_packages(environments: Iterable[Path], names: Iterable[str]) -> Iterator[PackageFact]:

@@ -86,7 +86,10 @@ def _hung_finding(facts: Facts, holder: ProcessFact) -> Finding:
         _("The master at {master} doesn't reply; it is hung or suspended.").format(
             master=_master_text(facts, holder)
         ),
-        _("Stop it and start a new one. Programs that are already connected keep exchanging messages."),
+        _(
+            "Stop the master and start a new one. Programs that are already connected keep exchanging "
+            "messages."
+        ),
         command=_kill_command(facts, holder),
     )
 
@@ -109,7 +112,7 @@ def _port_taken_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
 
 
 def _not_running_finding(facts: Facts) -> Finding:
-    number = facts.address.rpartition(":")[2]
+    port = facts.address.rpartition(":")[2]
     return Finding(
         "master:none",
         "error",
@@ -117,7 +120,7 @@ def _not_running_finding(facts: Facts) -> Finding:
             address=facts.address
         ),
         _("Start a master."),
-        command="nep master" if number == "7780" else f"nep master --port {number}",
+        command="nep master" if port == "7780" else f"nep master --port {port}",
     )
 
 
@@ -156,26 +159,28 @@ def _unreachable_finding(facts: Facts) -> Finding:
             "NEP Studio isn't responding there, or another program uses that port. Restart NEP Studio "
             "on that computer."
         )
-    holes = {"address": facts.address, "host": host, "port": port}
-    return Finding("master:unreached", "error", message.format(**holes), fix.format(**holes))
+    fields = {"address": facts.address, "host": host, "port": port}
+    return Finding("master:unreached", "error", message.format(**fields), fix.format(**fields))
 
 
 def _running_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
     view = facts.view
-    people = ""
+    counts_text = ""
     if view is not None:
         # skip nep's own topics that have only subscribers, such as log records
-        live = [name for name, info in view.topics.items() if info.publishers or not name.startswith("/nep/")]
+        topic_names = [
+            name for name, info in view.topics.items() if info.publishers or not name.startswith("/nep/")
+        ]
         nodes = ngettext("{count} node", "{count} nodes", len(view.nodes)).format(count=len(view.nodes))
-        topics = ngettext("{count} topic", "{count} topics", len(live)).format(count=len(live))
-        people = f"{nodes}, {topics}"
+        topics = ngettext("{count} topic", "{count} topics", len(topic_names)).format(count=len(topic_names))
+        counts_text = f"{nodes}, {topics}"
     if holder is not None and holder.started_s is not None:
-        since = duration_text(facts.now_s - holder.started_s)
+        uptime_text = duration_text(facts.now_s - holder.started_s)
         template = _("A master has been running at {master} for {since}: {people}")
     else:
-        since = ""
+        uptime_text = ""
         template = _("A master is running at {master}: {people}")
-    message = template.format(master=_master_text(facts, holder), since=since, people=people)
+    message = template.format(master=_master_text(facts, holder), since=uptime_text, people=counts_text)
     if facts.reply_time_s is not None and facts.reply_time_s > SLOW_REPLY_S:
         return Finding(
             "master:slow",
@@ -214,8 +219,8 @@ def _version_mismatch_findings(facts: Facts, holder: ProcessFact | None) -> Iter
             own=own_version,
         ),
         _(
-            "Stop it. If Studio is open, it starts a new master; otherwise, run “nep master”. Programs "
-            "that are already connected keep exchanging messages."
+            "Stop that master. If Studio is open, it starts a new one; otherwise, run “nep master”. "
+            "Programs that are already connected keep exchanging messages."
         ),
         command=_kill_command(facts, holder),
     )
@@ -251,15 +256,15 @@ def original_program_findings(facts: Facts) -> Iterator[Finding]:
     for node in nodes:
         if node.generation in UNSUPPORTED_VERSIONS:
             yield unsupported_finding(f"original:{node.id}", node.name, node.generation)
-    served = [node for node in nodes if node.generation not in UNSUPPORTED_VERSIONS]
-    if served:
-        names = ", ".join(f"{node.name} ({_wire_name(node.generation)})" for node in served)
+    supported_nodes = [node for node in nodes if node.generation not in UNSUPPORTED_VERSIONS]
+    if supported_nodes:
+        names = ", ".join(f"{node.name} ({_wire_name(node.generation)})" for node in supported_nodes)
         template = ngettext(
             "{count} program of the original NEP: {names}.",
             "{count} programs of the original NEP: {names}.",
-            len(served),
+            len(supported_nodes),
         )
-        yield Finding("originals", "info", template.format(count=len(served), names=names))
+        yield Finding("originals", "info", template.format(count=len(supported_nodes), names=names))
 
 
 def alert_findings(facts: Facts) -> Iterator[Finding]:
@@ -295,7 +300,7 @@ def _master_text(facts: Facts, holder: ProcessFact | None) -> str:
 
 def _holder_text(holder: ProcessFact | None) -> str:
     if holder is None:
-        return _("an unknown program")
+        return _("An unknown program")
     return with_process(f"“{holder.name}”", holder.pid)
 
 

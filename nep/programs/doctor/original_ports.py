@@ -22,13 +22,15 @@ def port_findings(facts: Facts) -> Iterator[Finding]:
             _("Programs of the original NEP can't connect because the gateway is off (NEP_GATEWAY=0)."),
         )
         return
-    checked = [port for port in facts.ports if port.port != KILL_PORT]
-    own_ports = [port for port in checked if port.is_taken and _belongs_to_master(facts, port)]
-    conflicts = [port for port in checked if port.is_taken and port not in own_ports]
-    airplay = [port for port in conflicts if _is_airplay(facts, port)]
-    yield from map(_airplay_finding, airplay)
-    yield from _taken_findings([port for port in conflicts if port not in airplay])
-    yield from _free_findings([port for port in checked if not port.is_taken and facts.view is not None])
+    checked_ports = [port for port in facts.ports if port.port != KILL_PORT]
+    own_ports = [port for port in checked_ports if port.is_taken and _belongs_to_master(facts, port)]
+    conflicts = [port for port in checked_ports if port.is_taken and port not in own_ports]
+    airplay_ports = [port for port in conflicts if _is_airplay(facts, port)]
+    yield from map(_airplay_finding, airplay_ports)
+    yield from _taken_findings([port for port in conflicts if port not in airplay_ports])
+    yield from _free_findings(
+        [port for port in checked_ports if not port.is_taken and facts.view is not None]
+    )
     if own_ports:
         template = ngettext(
             "The master uses port {ports}, which programs of the original NEP connect to.",
@@ -62,7 +64,7 @@ def _airplay_finding(port: PortFact) -> Finding:
         "ports:airplay",
         "warning",
         _("The AirPlay Receiver uses port 7000, {purpose}.").format(purpose=_(port.purpose)),
-        _("Turn it off in System Settings, under General > AirDrop & Handoff."),
+        _("Turn off AirPlay Receiver in System Settings, under General > AirDrop & Handoff."),
     )
 
 
@@ -110,7 +112,8 @@ def _kill_port_finding(port: PortFact) -> Finding:
         f"port:{KILL_PORT}",
         "info",
         _(
-            "{program} uses port 12345, where programs of the original NEP listen for the shutdown message."
+            "Port 12345, where programs of the original NEP listen for the shutdown message, is in use by "
+            "{program}."
         ).format(program=_holder_text(port.holder)),
     )
 

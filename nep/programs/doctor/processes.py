@@ -29,7 +29,7 @@ def listening_ports() -> dict[int, int | None]:
     """Return the process ids by listening TCP port; None where the system doesn't report the process."""
     try:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
-    except psutil.AccessDenied:  # macOS: all connections for root only, own ones for everyone
+    except psutil.AccessDenied:  # on macOS, only root may query all connections
         connections = _own_connections()
     return port_holders(connections)
 
@@ -42,17 +42,17 @@ def port_holders(connections: Iterable[object]) -> dict[int, int | None]:
     Args:
         connections: Entries of `psutil.net_connections()`.
     """
-    at_loopback: dict[int, int | None] = {}
-    elsewhere: dict[int, int | None] = {}
+    loopback_pids: dict[int, int | None] = {}
+    other_pids: dict[int, int | None] = {}
     for connection in connections:
         if getattr(connection, "status", "") != psutil.CONN_LISTEN:
             continue
         local = getattr(connection, "laddr", None)
         port = getattr(local, "port", None)
         if isinstance(port, int):
-            pid_by_port = at_loopback if getattr(local, "ip", "") in _LOOPBACK_ADDRESSES else elsewhere
+            pid_by_port = loopback_pids if getattr(local, "ip", "") in _LOOPBACK_ADDRESSES else other_pids
             pid_by_port[port] = getattr(connection, "pid", None) or pid_by_port.get(port)
-    return elsewhere | at_loopback
+    return other_pids | loopback_pids
 
 
 def _own_connections() -> Iterable[object]:
@@ -105,13 +105,13 @@ def process_fact(pid: int | None, master_pid: int | None = None) -> ProcessFact 
 
 
 def master_processes(
-    ports: Mapping[int, int | None], usual: int
+    ports: Mapping[int, int | None], usual_port: int
 ) -> tuple[tuple[ProcessFact, int | None], ...]:
     """Return the processes that run a master, each with its port (None if ambiguous).
 
     Args:
         ports: Process ids by listening port.
-        usual: Usual port of a master; the process at this port comes first.
+        usual_port: Usual port of a master; the process at this port comes first.
     """
     ports_by_pid: dict[int, list[int]] = {}
     for port, pid in ports.items():
@@ -121,15 +121,15 @@ def master_processes(
     for pid, own_ports in ports_by_pid.items():
         process = process_fact(pid)
         if process is not None and process.is_master:
-            masters.append((process, _master_port(own_ports, usual)))
-    return tuple(sorted(masters, key=lambda each: (each[1] != usual, each[1] or 0)))
+            masters.append((process, _master_port(own_ports, usual_port)))
+    return tuple(sorted(masters, key=lambda each: (each[1] != usual_port, each[1] or 0)))
 
 
-def _master_port(ports: Sequence[int], usual: int) -> int | None:
-    nearest = sorted(ports, key=lambda port: abs(port - usual))
+def _master_port(ports: Sequence[int], usual_port: int) -> int | None:
+    nearest = sorted(ports, key=lambda port: abs(port - usual_port))
     return (
         nearest[0]
-        if nearest and (abs(nearest[0] - usual) <= _MAX_PORT_DISTANCE or len(nearest) == 1)
+        if nearest and (abs(nearest[0] - usual_port) <= _MAX_PORT_DISTANCE or len(nearest) == 1)
         else None
     )
 
@@ -146,12 +146,12 @@ def open_files(pid: int) -> tuple[int | None, int | None]:
     """Return the number of a process's open files, and its limit; None where unknown."""
     try:
         process = psutil.Process(pid)
-        opened = process.num_fds() if hasattr(process, "num_fds") else None
+        open_count = process.num_fds() if hasattr(process, "num_fds") else None
         rlimit = getattr(process, "rlimit", None)
         limit = rlimit(psutil.RLIMIT_NOFILE)[0] if rlimit is not None else None
     except psutil.Error:
         return None, None
-    return opened, limit if limit is not None and limit > 0 else None
+    return open_count, limit if limit is not None and limit > 0 else None
 
 
 def _command_line(process: psutil.Process) -> list[str]:

@@ -52,16 +52,18 @@ def closest_topic(topic: str, names: Iterable[str]) -> str | None:
     """
     names = [name for name in names if name != topic]
     normalized_topic = _normalized(topic)
-    same = [name for name in names if _normalized(name) == normalized_topic]
-    if same:
-        return same[0]
-    same_suffix = [
+    equal_names = [name for name in names if _normalized(name) == normalized_topic]
+    if equal_names:
+        return equal_names[0]
+    names_with_same_suffix = [
         name for name in names if _normalized(name).rpartition("/")[2] == normalized_topic.rpartition("/")[2]
     ]
-    if len(same_suffix) == 1:
-        return same_suffix[0]
-    by_bare = {_normalized(name): name for name in names}
-    return next((by_bare[match] for match in get_close_matches(normalized_topic, list(by_bare), n=1)), None)
+    if len(names_with_same_suffix) == 1:
+        return names_with_same_suffix[0]
+    originals = {_normalized(name): name for name in names}
+    return next(
+        (originals[match] for match in get_close_matches(normalized_topic, list(originals), n=1)), None
+    )
 
 
 def _normalized(topic: str) -> str:
@@ -82,11 +84,11 @@ def _unpublished_findings(facts: TopicFacts) -> Iterator[Finding]:
         topics = sorted(
             name for name in facts.other_topics if not name.startswith("/nep/")
         )  # hide nep's own topics
-        listed = topics[:_MAX_NAMES]
-        if not listed:
+        listed_topics = topics[:_MAX_NAMES]
+        if not listed_topics:
             hint = _("Start the program that publishes it. No other topics are published either.")
-        more = len(topics) - len(listed)
-        names = [*listed, _("{count} more").format(count=more)] if more else listed
+        more_count = len(topics) - len(listed_topics)
+        names = [*listed_topics, _("{count} more").format(count=more_count)] if more_count else listed_topics
         yield Finding(
             "topic:nobody", "error", message, hint.format(topics=format_list(names) if names else "")
         )
@@ -148,8 +150,8 @@ def _unreachable_finding(publisher: PublisherFact) -> Finding:
     else:
         message = _("“{node}” publishes at {place} ({host}), but this computer has no route to that address.")
         fix = _("Check that both computers are on the same network.")
-    holes = {"node": publisher.node, "host": publisher.host, "place": address}
-    return Finding(f"topic:address:{publisher.node}", "error", message.format(**holes), fix.format(**holes))
+    fields = {"node": publisher.node, "host": publisher.host, "place": address}
+    return Finding(f"topic:address:{publisher.node}", "error", message.format(**fields), fix.format(**fields))
 
 
 def _silence_findings(facts: TopicFacts, publisher: PublisherFact) -> Iterator[Finding]:
@@ -216,7 +218,7 @@ def _arrival_findings(facts: TopicFacts, *, is_explained: bool) -> Iterator[Find
         yield Finding(
             "topic:blocked",
             "error",
-            _("{nodes} sends {topic}, but no messages were received in {seconds} s.").format(
+            _("{topic} is published by {nodes}, but no messages were received in {seconds} s.").format(
                 topic=facts.topic,
                 nodes=_publisher_text(facts.publishers),
                 seconds=number(facts.listen_duration_s, ".1f"),

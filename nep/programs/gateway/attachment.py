@@ -65,7 +65,7 @@ class GatewayAttachment:
         raise_open_file_limit()
         address = master.address
 
-        def make_node() -> Node:
+        def create_node() -> Node:
             return Node("gateway", master=address, generation="gateway", wait_s=_JOIN_TIMEOUT_S)
 
         def submit(request: Request) -> Reply | None:
@@ -77,9 +77,11 @@ class GatewayAttachment:
         def report(alerts: tuple[Alert, ...]) -> None:
             submit(ReportAlerts("gateway", alerts))
 
-        native = NativeNetwork(make_node, GraphRegistrar(submit, master.epoch), report)
+        native = NativeNetwork(create_node, GraphRegistrar(submit, master.epoch), report)
         file = self._file or default_file(int(address.rpartition(":")[2]))
-        self._gateway = Gateway(native, SystemProcesses(), file, ports=self._ports, boot=psutil.boot_time())
+        self._gateway = Gateway(
+            native, SystemProcesses(), file, ports=self._ports, boot_time_s=psutil.boot_time()
+        )
         self._gateway.start()
 
     def changed(self, view: GraphView) -> None:
@@ -96,20 +98,20 @@ class NativeNetwork:
     """Connection of the gateway to the native network (see `GatewayNetwork`).
 
     Args:
-        make_node: Creates the node when the first topic is forwarded, so that a master without original
+        create_node: Creates the node when the first topic is forwarded, so that a master without original
             programs has no gateway node.
-        listing: Registrar of original programs in the graph.
+        registrar: Registrar of original programs in the graph.
         report: Publishes the current alerts.
     """
 
     def __init__(
         self,
-        make_node: Callable[[], Node],
-        listing: GraphRegistrar,
+        create_node: Callable[[], Node],
+        registrar: GraphRegistrar,
         report: Callable[[tuple[Alert, ...]], None],
     ) -> None:
-        self._make_node = make_node
-        self._registrar = listing
+        self._create_node = create_node
+        self._registrar = registrar
         self._report = report
         self._node: Node | None = None
         self._inbox: NativeInbox | None = None
@@ -118,7 +120,7 @@ class NativeNetwork:
         self._own_publisher_ids: frozenset[int] = frozenset()
         self._alerts: dict[str, Alert] = {}
         self._retry_at: dict[str, float] = {}
-        self._dropped = 0
+        self._reported_drop_count = 0
 
     # ---- messages
 
@@ -129,7 +131,7 @@ class NativeNetwork:
     def publish(self, topic: str, codec: str, data: bytes) -> None:
         """Publish data of an original program. The first call opens the publisher.
 
-        If the publisher can't be opened, the data is dropped, an alert is reported, and a call after
+        If the publisher can't be opened, the data is dropped and an alert is reported. The first call after
         one second tries again.
 
         Args:
@@ -181,14 +183,14 @@ class NativeNetwork:
             if image_codec.raw_layout(message.extension.get("encoding")) is None:
                 parse_header(message.data)  # reject decompression bombs: original programs decode anything
                 return message.data
-            created = image_codec.encode(message.payload)
-            if image_codec.raw_layout((created.extension or {}).get("encoding")) is not None:
+            encoded = image_codec.encode(message.payload)
+            if image_codec.raw_layout((encoded.extension or {}).get("encoding")) is not None:
                 raise EncodeError(
                     "image",
                     "array",
                     _("they support only JPEG and PNG, which can't store this number type"),
                 )
-            return created.data
+            return encoded.data
         except (DecodeError, EncodeError) as error:
             self.report(
                 f"message:{message.topic}",
@@ -205,14 +207,14 @@ class NativeNetwork:
                 if message.publisher not in self._own_publisher_ids:
                     self._inbox.post(message)
 
-    def _open(self, topic: str, make: Callable[[Node], _SocketT]) -> _SocketT | None:
+    def _open(self, topic: str, create: Callable[[Node], _SocketT]) -> _SocketT | None:
         id = f"topic:{topic}"
         if time.monotonic() < self._retry_at.get(topic, 0.0):
             return None
         try:
             if self._node is None:
-                self._node = self._make_node()
-            created = make(self._node)
+                self._node = self._create_node()
+            endpoint = create(self._node)
         except NepError as error:
             now = time.monotonic()
             self._retry_at = {each: retry_at for each, retry_at in self._retry_at.items() if retry_at > now}
@@ -228,7 +230,7 @@ class NativeNetwork:
             return None
         self._retry_at.pop(topic, None)
         self.resolve(id)
-        return created
+        return endpoint
 
     # ---- graph and alerts
 
@@ -239,16 +241,16 @@ class NativeNetwork:
     def tick(self) -> None:
         """Send statistics to the master and report dropped messages. Call once a second."""
         self._registrar.renew()
-        if self._inbox is not None and self._inbox.dropped != self._dropped:
-            lost = self._inbox.dropped - self._dropped
-            self._dropped = self._inbox.dropped
+        if self._inbox is not None and self._inbox.dropped != self._reported_drop_count:
+            dropped_count = self._inbox.dropped - self._reported_drop_count
+            self._reported_drop_count = self._inbox.dropped
             self.report(
                 "gateway:full",
                 ngettext(
                     "{count} message didn't reach programs of the original NEP in the last second",
                     "{count} messages didn't reach programs of the original NEP in the last second",
-                    lost,
-                ).format(count=lost),
+                    dropped_count,
+                ).format(count=dropped_count),
             )
         else:
             self.resolve("gateway:full")

@@ -162,7 +162,7 @@ def escape_for_javascript(data: bytes, topic: str) -> bytes:
     if not topic_bytes or topic_bytes not in data:
         return data
     escaped = "".join(f"\\u{unit:04x}" for unit in _utf16_units(topic[0])).encode()
-    spot = re.compile(
+    topic_start = re.compile(
         rb"\\u[0-9a-fA-F]{4}|\\.|(?P<first>%b(?=%b))"
         % (re.escape(topic[0].encode()), re.escape(topic[1:].encode())),
         re.DOTALL,
@@ -172,7 +172,7 @@ def escape_for_javascript(data: bytes, topic: str) -> bytes:
         text = token.group()
         if text[:1] != b'"':
             return text
-        inner = spot.sub(lambda hit: escaped if hit.group("first") else hit.group(), text[1:-1])
+        inner = topic_start.sub(lambda match: escaped if match.group("first") else match.group(), text[1:-1])
         return b'"' + inner + b'"'
 
     return _JSON_TOKEN.sub(rewrite, data)
@@ -191,8 +191,8 @@ def escape_for_csharp(data: bytes) -> bytes:
 
 
 def _utf16_units(letter: str) -> tuple[int, ...]:
-    packed = letter.encode("utf-16-be", "surrogatepass")
-    return tuple(int.from_bytes(packed[offset : offset + 2], "big") for offset in range(0, len(packed), 2))
+    encoded = letter.encode("utf-16-be", "surrogatepass")
+    return tuple(int.from_bytes(encoded[offset : offset + 2], "big") for offset in range(0, len(encoded), 2))
 
 
 def _decode_base64(data: bytes) -> bytes:
@@ -217,10 +217,10 @@ def _replace_nan(data: bytes) -> bytes:
         return data  # not valid JSON: the subscriber's decoder reports it
     try:
         return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
-    except UnicodeEncodeError:  # half of a surrogate pair: only possible as an ASCII escape
+    except UnicodeEncodeError:  # an unpaired surrogate: JSON can contain it only as an ASCII escape
         return json.dumps(value, separators=(",", ":")).encode()
 
 
-def _parse_finite(written: str) -> float | None:
-    number = float(written)
+def _parse_finite(text: str) -> float | None:
+    number = float(text)
     return number if math.isfinite(number) else None

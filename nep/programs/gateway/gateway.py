@@ -23,7 +23,7 @@ from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.system.descriptors import RESERVED_DESCRIPTORS, has_free_descriptors
 from nep.system.forks import close_in_child, notify_after_fork
 
-_MAINTENANCE_S = 1.0
+_MAINTENANCE_INTERVAL_S = 1.0
 """Interval in seconds at which exited programs are removed and ports that were in use are retried."""
 _MAX_SOCKETS = 8192
 _FILES_PER_PAIR = 20
@@ -61,33 +61,33 @@ class Gateway:
     Runs in one thread and binds to the loopback address only.
 
     Args:
-        outside: Native network.
+        network: Native network.
         processes: Information about the processes of this computer.
         file: File that stores the ports of programs, so that the programs stay connected after a restart of
             the gateway; None to store nothing.
         ports: Fixed ports of the gateway (default: `Ports()`).
-        boot: Boot time of this computer (s since 1970).
+        boot_time_s: Boot time of this computer (s since 1970).
     """
 
     def __init__(
         self,
-        outside: GatewayNetwork,
+        network: GatewayNetwork,
         processes: Processes,
         file: Path | None = None,
         *,
         ports: Ports | None = None,
-        boot: float = 0.0,
+        boot_time_s: float = 0.0,
     ) -> None:
-        self._network = outside
+        self._network = network
         self._processes = processes
-        self._port_map = PortMap(file, boot)
+        self._port_map = PortMap(file, boot_time_s)
         self._inbox = NativeInbox()
         self._ready = threading.Event()
         self._stopping = threading.Event()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
-        self._relay = Relay(self._context, outside, outside, self._program_names)
-        self._request_server = RequestServer(self._context, ports or Ports(), outside, self._assign_port)
+        self._relay = Relay(self._context, network, network, self._program_names)
+        self._request_server = RequestServer(self._context, ports or Ports(), network, self._assign_port)
         self._programs = ProgramTable(self._port_map, processes, self._relay.pair)
         self._poller: zmq.Poller | None = None
         self._request_sockets: dict[zmq.Socket[bytes], int] = {}
@@ -146,20 +146,22 @@ class Gateway:
         if self._poller is None:
             self._poller = self._new_poller()
         wait_s = max(0.0, self._maintain_at - time.monotonic())
-        ready = [socket for socket, _ in self._poller.poll(int(wait_s * 1000) + 1)]
-        changed: set[TopicLine] = set()
-        for pair in {id(pair): pair for pair in map(self._pairs.get, ready) if pair is not None}.values():
+        ready_sockets = [socket for socket, _ in self._poller.poll(int(wait_s * 1000) + 1)]
+        changed_lines: set[TopicLine] = set()
+        for pair in {
+            id(pair): pair for pair in map(self._pairs.get, ready_sockets) if pair is not None
+        }.values():
             if self._relay.serve(pair):
-                changed.add(pair.line)
-        for socket in ready:
+                changed_lines.add(pair.line)
+        for socket in ready_sockets:
             if socket in self._request_sockets:
                 self._request_server.reply(socket, self._request_sockets[socket])
         for message in self._inbox.pop_all():
             data = self._network.data_of(message)
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)
-        if changed:
-            self._programs.update(changed)
+        if changed_lines:
+            self._programs.update(changed_lines)
             self._publish_state()
         if time.monotonic() >= self._maintain_at:
             self._maintain()
@@ -174,7 +176,7 @@ class Gateway:
         return poller
 
     def _maintain(self) -> None:
-        self._maintain_at = time.monotonic() + _MAINTENANCE_S
+        self._maintain_at = time.monotonic() + _MAINTENANCE_INTERVAL_S
         self._relay.tick()
         self._programs.update()
         if self._programs.remove_ended():
@@ -272,10 +274,10 @@ class Gateway:
 
     def _registration(self, request: Request, line: TopicLine) -> Registration:
         pid = request.pid
-        started = self._processes.started(pid) if pid is not None else None
+        started_s = self._processes.start_time_s(pid) if pid is not None else None
         language = request.language or (self._processes.language(pid) if pid is not None else None)
         return Registration(
-            line, request.node, request.socket, request.msg_type, request.generation, language, pid, started
+            line, request.node, request.socket, request.msg_type, request.generation, language, pid, started_s
         )
 
     def _save(self) -> None:

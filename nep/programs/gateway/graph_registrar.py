@@ -61,7 +61,7 @@ class GraphRegistrar:
     Args:
         submit: Executes a request in the master.
         epoch: Epoch of the master.
-        load_of: Returns the CPU load meter of the process with an id.
+        load_of: Returns the CPU load meter of a process, given its id.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class GraphRegistrar:
         self._load_of = load_of
         self._loads: dict[str, CpuLoad] = {}
         self._joins: dict[str, Join] = {}
-        self._since: dict[str, int] = {}
+        self._first_seen_ns: dict[str, int] = {}
         self._counts: dict[Key, _TopicCount] = {}
         self._stat_keys: dict[int, Key] = {}
 
@@ -86,17 +86,17 @@ class GraphRegistrar:
             key: Topic and codec.
             size_bytes: Size of the message.
         """
-        counted = self._counts.setdefault(key, _TopicCount())
-        counted.messages += 1
-        counted.bytes += size_bytes
-        counted.last_ns = time.time_ns()
+        topic_count = self._counts.setdefault(key, _TopicCount())
+        topic_count.messages += 1
+        topic_count.bytes += size_bytes
+        topic_count.last_ns = time.time_ns()
 
     def set_programs(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these programs, and unregister all others."""
         joins = {program.node_id: self._join_request(program) for program in programs}
-        for node_id in [shown_id for shown_id in self._joins if shown_id not in joins]:
+        for node_id in [known_id for known_id in self._joins if known_id not in joins]:
             del self._joins[node_id]
-            self._since.pop(node_id, None)
+            self._first_seen_ns.pop(node_id, None)
             self._loads.pop(node_id, None)
             self._submit(Leave(node_id))
         for node_id, join in joins.items():
@@ -125,7 +125,7 @@ class GraphRegistrar:
         return self._loads[node_id].ratio()
 
     def _join_request(self, program: OriginalProgram) -> Join:
-        since_ns = self._since.setdefault(program.node_id, time.time_ns())
+        first_seen_ns = self._first_seen_ns.setdefault(program.node_id, time.time_ns())
         language = program.language or ""
         node = NodeRecord(
             program.node_id,
@@ -136,7 +136,7 @@ class GraphRegistrar:
             program.pid,
             _LANGUAGES.get(language, escaped(language)),
             program.generation,
-            since_ns,
+            first_seen_ns,
         )
         links = [link for link in program.links if _is_valid_link(link)]
         return Join(
@@ -162,12 +162,14 @@ class GraphRegistrar:
                 if link.role == "publisher":
                     id_by_key.setdefault((link.topic, link.codec), _stable_id(program, link))
         self._stat_keys = {publisher_id: key for key, publisher_id in id_by_key.items()}
-        self._counts = {key: counted for key, counted in self._counts.items() if key in id_by_key}
+        self._counts = {key: topic_count for key, topic_count in self._counts.items() if key in id_by_key}
 
     def _publisher_count(self, record: PublisherRecord) -> PublisherCount:
         key = self._stat_keys.get(record.id)
-        counted = self._counts.get(key, _TopicCount()) if key is not None else _TopicCount()
-        return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
+        topic_count = self._counts.get(key, _TopicCount()) if key is not None else _TopicCount()
+        return PublisherCount(
+            record.id, topic_count.messages, topic_count.bytes, topic_count.messages, topic_count.last_ns
+        )
 
 
 def _publisher_record(id: int, link: TopicLink) -> PublisherRecord:

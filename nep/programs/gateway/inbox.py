@@ -45,14 +45,14 @@ class NativeInbox:
 
     def post(self, message: Message) -> None:
         """Queue a message and wake the reader, or drop the message if the queue is full."""
-        size = message.size_bytes
+        size_bytes = message.size_bytes
         with self._lock:
-            if len(self._messages) >= self._max_messages or self._size_bytes + size > self._max_bytes:
+            if len(self._messages) >= self._max_messages or self._size_bytes + size_bytes > self._max_bytes:
                 self._dropped += 1
                 return
             was_empty = not self._messages
             self._messages.append(message)
-            self._size_bytes += size
+            self._size_bytes += size_bytes
         if was_empty:
             self.wake()
 

@@ -87,12 +87,12 @@ class PortMap:
 
     Args:
         file: File with stored assignments, which `save` replaces; None to store nothing.
-        boot: Boot time of this computer (s since 1970); earlier registrations are not loaded.
+        boot_time_s: Boot time of this computer (s since 1970); earlier registrations are not loaded.
     """
 
-    def __init__(self, file: Path | None, boot: float = 0.0) -> None:
+    def __init__(self, file: Path | None, boot_time_s: float = 0.0) -> None:
         self._file = file
-        self._boot = boot
+        self._boot_time_s = boot_time_s
         self._ports: dict[TopicLine, int] = {}
         self._registrations: dict[tuple[str, TopicLine, str], Registration] = {}
         if file is not None:
@@ -118,9 +118,9 @@ class PortMap:
         Args:
             is_used: Returns True if a program uses the line.
         """
-        assigned = {port: line for line, port in self._ports.items()}
-        yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in assigned)
-        yield from (port for port, line in assigned.items() if not is_used(line))
+        line_by_port = {port: line for line, port in self._ports.items()}
+        yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in line_by_port)
+        yield from (port for port, line in line_by_port.items() if not is_used(line))
 
     def assign(self, line: TopicLine, port: int) -> None:
         """Assign a base port to a line, and remove its assignment to another line."""
@@ -151,18 +151,18 @@ class PortMap:
             return
         document = {
             "version": _VERSION,
-            "boot": self._boot,
+            "boot": self._boot_time_s,
             "lines": [{**asdict(line), "port": port} for line, port in self._ports.items()],
             "programs": [asdict(registration) for registration in self._registrations.values()],
         }
         self._file.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=self._file.parent, prefix=self._file.name)
+        descriptor, temporary_name = tempfile.mkstemp(dir=self._file.parent, prefix=self._file.name)
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
                 json.dump(document, stream)
-            replace_file(Path(name), self._file)
+            replace_file(Path(temporary_name), self._file)
         except OSError:
-            Path(name).unlink(missing_ok=True)
+            Path(temporary_name).unlink(missing_ok=True)
             raise
 
     def _load(self, file: Path) -> None:
@@ -174,7 +174,7 @@ class PortMap:
                 port = entry["port"]
                 if isinstance(port, int) and FIRST_PORT <= port <= LAST_PORT:
                     self._ports[_parse_line(entry)] = port
-            if abs(document["boot"] - self._boot) > _BOOT_TIME_TOLERANCE_S:
+            if abs(document["boot"] - self._boot_time_s) > _BOOT_TIME_TOLERANCE_S:
                 return
             for entry in document["programs"]:
                 registration = _parse_registration(entry)
@@ -204,7 +204,7 @@ def default_file(port: int) -> Path:
 def _parse_line(entry: Mapping[str, object]) -> TopicLine:
     topic, framing, codec, mode = (entry[key] for key in ("topic", "framing", "codec", "mode"))
     if not isinstance(topic, str) or not isinstance(codec, str):
-        raise TypeError("a line is not of text")
+        raise TypeError("the topic or codec of a line is not a string")
     framings: tuple[Framing, ...] = get_args(Framing)
     modes: tuple[Mode, ...] = get_args(Mode)
     return TopicLine(topic, framings[framings.index(framing)], codec, modes[modes.index(mode)])

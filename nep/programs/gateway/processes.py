@@ -17,7 +17,7 @@ else:
 class Processes(Protocol):
     """Interface to the processes of this computer, which tests replace."""
 
-    def started(self, pid: int) -> float | None:
+    def start_time_s(self, pid: int) -> float | None:
         """Return the start time of a process (s since 1970).
 
         Returns None if the process doesn't exist, and 0 if access is denied.
@@ -26,13 +26,13 @@ class Processes(Protocol):
     def language(self, pid: int) -> str | None:
         """Return the programming language of a process according to its interpreter, or None if unknown."""
 
-    def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
+    def is_connected(self, pid: int, port: int, *, is_bound_by_process: bool) -> bool | None:
         """Return True if a process has an established connection over a port, None if access is denied.
 
         Args:
             pid: Process id. If there is no such process, the result is False.
             port: Port number.
-            binds: True if the process itself binds the port.
+            is_bound_by_process: True if the process itself binds the port.
         """
 
 
@@ -66,7 +66,7 @@ _INTERPRETERS = {
 class SystemProcesses:
     """Implementation of `Processes` with psutil."""
 
-    def started(self, pid: int) -> float | None:
+    def start_time_s(self, pid: int) -> float | None:
         """Return the start time of a process (s since 1970).
 
         Returns None if the process doesn't exist or is a zombie, and 0 if access is denied.
@@ -89,13 +89,13 @@ class SystemProcesses:
             return None
         return next((language for prefix, language in _INTERPRETERS.items() if name.startswith(prefix)), None)
 
-    def is_connected(self, pid: int, port: int, *, binds: bool) -> bool | None:
+    def is_connected(self, pid: int, port: int, *, is_bound_by_process: bool) -> bool | None:
         """Return True if a process has an established connection over a port, None if access is denied.
 
         Args:
             pid: Process id. If there is no such process, the result is False.
             port: Port number.
-            binds: True if the process itself binds the port.
+            is_bound_by_process: True if the process itself binds the port.
         """
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")
@@ -104,7 +104,7 @@ class SystemProcesses:
         except psutil.AccessDenied:
             return None
         for connection in connections:
-            end = connection.laddr if binds else connection.raddr
+            end = connection.laddr if is_bound_by_process else connection.raddr
             if getattr(end, "port", None) == port and connection.status == psutil.CONN_ESTABLISHED:
                 return True
         return False

@@ -85,8 +85,9 @@ class ProgramTable:
         self._processes = processes
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
-        self._joined: set[Registration] = set()
-        self._openings: dict[Registration, tuple[int, float]] = {}
+        self._once_connected: set[Registration] = set()
+        """Registrations of programs that have been connected since their request."""
+        self._connect_counts: dict[Registration, tuple[int, float]] = {}
 
     def update(self, lines: Iterable[TopicLine] | None = None) -> None:
         """Update the roles of the programs on some lines, or on all lines if `lines` is None."""
@@ -96,15 +97,15 @@ class ProgramTable:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
                 if roles or self._was_briefly_connected(registration):
-                    self._joined.add(registration)
+                    self._once_connected.add(registration)
 
     def expect_connection(self, registration: Registration) -> None:
         """Treat a program as not connected yet, because it has sent a new request.
 
         Earlier connections of the program to the line are ignored.
         """
-        self._joined.discard(registration)
-        self._openings.pop(registration, None)
+        self._once_connected.discard(registration)
+        self._connect_counts.pop(registration, None)
 
     def remove_ended(self) -> bool:
         """Remove programs that exited or closed their connections; return True if any was removed."""
@@ -114,13 +115,13 @@ class ProgramTable:
         self._discard(ended)
         return bool(ended)
 
-    def _discard(self, ended: set[Registration]) -> None:
-        if ended:
-            self._port_map.remove(ended)
-            self._joined -= ended
-            for registration in ended:
+    def _discard(self, registrations: set[Registration]) -> None:
+        if registrations:
+            self._port_map.remove(registrations)
+            self._once_connected -= registrations
+            for registration in registrations:
                 self._roles.pop(registration, None)
-                self._openings.pop(registration, None)
+                self._connect_counts.pop(registration, None)
 
     def evict_unconnected(self) -> bool:
         """Remove the oldest registration without a connection; return False if there is none."""
@@ -132,10 +133,12 @@ class ProgramTable:
 
     def programs(self) -> tuple[OriginalProgram, ...]:
         """Return the current original nodes with their roles."""
-        grouped: dict[str, list[Registration]] = {}
+        registrations_by_node: dict[str, list[Registration]] = {}
         for registration in self._port_map.registrations:
-            grouped.setdefault(registration.node_id, []).append(registration)
-        return tuple(self._program(node_id, registrations) for node_id, registrations in grouped.items())
+            registrations_by_node.setdefault(registration.node_id, []).append(registration)
+        return tuple(
+            self._program(node_id, registrations) for node_id, registrations in registrations_by_node.items()
+        )
 
     def names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         """Return the names of the nodes that have a role on a line."""
@@ -149,12 +152,12 @@ class ProgramTable:
 
     def languages(self) -> dict[TopicLine, frozenset[str]]:
         """Return the known programming languages of the programs, by line."""
-        members: dict[TopicLine, frozenset[str]] = {}
+        languages_by_line: dict[TopicLine, frozenset[str]] = {}
         for registration in self._port_map.registrations:
             if registration.language is not None:
-                languages = members.get(registration.line, frozenset())
-                members[registration.line] = languages | {registration.language}
-        return members
+                languages = languages_by_line.get(registration.line, frozenset())
+                languages_by_line[registration.line] = languages | {registration.language}
+        return languages_by_line
 
     def members(self) -> list[Member]:
         """Return the entries for the broadcast of the original NEP, without lines that have no port."""
@@ -228,7 +231,7 @@ class ProgramTable:
     def _is_connected(self, registration: Registration, end: Endpoint) -> bool:
         if registration.pid is not None and registration.started is not None:
             is_connected = self._processes.is_connected(
-                registration.pid, end.port, binds=end.is_bound_by_program
+                registration.pid, end.port, is_bound_by_process=end.is_bound_by_program
             )
             if is_connected is not None:
                 return is_connected
@@ -240,13 +243,15 @@ class ProgramTable:
         if pair is None:
             return False
         now = self._clock()
-        before, asked_at = self._openings.setdefault(registration, (pair.openings, now))
-        was_joined = pair.openings > before and not any(pair.connections.values())
-        return was_joined and now - asked_at >= _CONNECT_GRACE_S
+        count_before, first_checked_at = self._connect_counts.setdefault(
+            registration, (pair.connect_count, now)
+        )
+        was_connected = pair.connect_count > count_before and not any(pair.connections.values())
+        return was_connected and now - first_checked_at >= _CONNECT_GRACE_S
 
     def _has_ended(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:
-            started = self._processes.started(registration.pid)
+            started = self._processes.start_time_s(registration.pid)
             if started is None or abs(started - registration.started) > _START_TIME_TOLERANCE_S:
                 return True
-        return registration in self._joined and not self._roles.get(registration)
+        return registration in self._once_connected and not self._roles.get(registration)

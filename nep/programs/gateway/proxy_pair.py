@@ -104,7 +104,8 @@ class ProxyPair:
         self.frame_format = FrameFormat(line.topic, line.framing, line.codec)
         self.ends = endpoints_of(line, base)
         self.filters: set[bytes] = set()
-        self.openings = 0
+        self.connect_count = 0
+        """Number of connections made so far, including closed ones."""
         self.unsupported_versions: dict[Role, str] = {}
         self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
@@ -112,37 +113,37 @@ class ProxyPair:
         self._high_water_mark = self._queue_length = (
             _IMAGE_QUEUE_LENGTH if line.codec == "image" else _QUEUE_LENGTH
         )
-        with contextlib.ExitStack() as undo:
-            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _MAX_FRAME_BYTES)
-            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _MAX_FILTER_BYTES)
+        with contextlib.ExitStack() as exit_stack:
+            self.incoming = self._open(context, zmq.XSUB, self.ends[0], exit_stack, _MAX_FRAME_BYTES)
+            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], exit_stack, _MAX_FILTER_BYTES)
             self.incoming.send(b"\x01")  # subscribe to everything
-            self._exit_stack = undo.pop_all()
+            self._exit_stack = exit_stack.pop_all()
 
     def _open(
         self,
         context: zmq.Context[zmq.Socket[bytes]],
         kind: int,
         end: Endpoint,
-        undo: contextlib.ExitStack,
+        exit_stack: contextlib.ExitStack,
         max_bytes: int,
     ) -> zmq.Socket[bytes]:
-        opened = context.socket(kind)
-        undo.callback(opened.close, _LINGER_MS)
-        opened.setsockopt(zmq.SNDHWM, self._queue_length)
-        opened.setsockopt(zmq.RCVHWM, self._queue_length)
-        opened.setsockopt(zmq.MAXMSGSIZE, max_bytes)  # larger messages disconnect the sender
+        proxy_socket = context.socket(kind)
+        exit_stack.callback(proxy_socket.close, _LINGER_MS)
+        proxy_socket.setsockopt(zmq.SNDHWM, self._queue_length)
+        proxy_socket.setsockopt(zmq.RCVHWM, self._queue_length)
+        proxy_socket.setsockopt(zmq.MAXMSGSIZE, max_bytes)  # larger messages disconnect the sender
         if end.is_bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
-        monitor = opened.get_monitor_socket(_CONNECT_EVENTS | _DISCONNECT_EVENTS)
-        undo.callback(monitor.close, 0)
-        undo.callback(opened.disable_monitor)
+        monitor = proxy_socket.get_monitor_socket(_CONNECT_EVENTS | _DISCONNECT_EVENTS)
+        exit_stack.callback(monitor.close, 0)
+        exit_stack.callback(proxy_socket.disable_monitor)
         self.monitors[end.role] = monitor
         address = f"tcp://{LOOPBACK}:{end.port}"
         if end.is_bound_by_program:
-            opened.connect(address)
+            proxy_socket.connect(address)
         else:
-            opened.bind(address)
-        return opened
+            proxy_socket.bind(address)
+        return proxy_socket
 
     @property
     def connections(self) -> Mapping[Role, int]:
@@ -170,20 +171,20 @@ class ProxyPair:
 
     def read_filters(self) -> bool:
         """Process pending subscription events; return True if the filters changed."""
-        before = set(self.filters)
+        previous_filters = set(self.filters)
         while True:
             try:
-                note = self.outgoing.recv(zmq.NOBLOCK)
+                event = self.outgoing.recv(zmq.NOBLOCK)
             except zmq.Again:
-                return before != self.filters
-            if note[:1] == b"\x01" and len(self.filters) < _MAX_FILTERS:
-                self.filters.add(note[1:])
-            elif note[:1] == b"\x00":
-                self.filters.discard(note[1:])
+                return previous_filters != self.filters
+            if event[:1] == b"\x01" and len(self.filters) < _MAX_FILTERS:
+                self.filters.add(event[1:])
+            elif event[:1] == b"\x00":
+                self.filters.discard(event[1:])
 
     def read_connections(self) -> bool:
         """Process pending connection events; return True if there were any."""
-        happened = False
+        had_events = False
         for role, monitor in self.monitors.items():
             while monitor.poll(0):
                 event = parse_monitor_message(monitor.recv_multipart())
@@ -191,11 +192,11 @@ class ProxyPair:
                 # By handle: connections that don't speak ZeroMQ also cause disconnect events.
                 if event["event"] & _CONNECT_EVENTS:
                     handles.add(event["value"])
-                    self.openings += 1
+                    self.connect_count += 1
                 else:
                     handles.discard(event["value"])
-                happened = True
-        return happened
+                had_events = True
+        return had_events
 
     def forward(self, frame: bytes, data: bytes) -> None:
         """Send a frame that was received on this line to the subscribers of the same line.

@@ -70,7 +70,7 @@ class _RejectedMessages:
 
     reason: str
     count: int = 0
-    reported: int = 0
+    reported_count: int = 0
     is_resolved: bool = False
 
 
@@ -96,9 +96,9 @@ class Relay:
         self._alerts = alerts
         self._program_names = program_names
         self._pairs: dict[TopicLine, ProxyPair] = {}
-        self._subscribed: set[Key] = set()
-        self._publishing: set[Key] = set()
-        self._rejected: dict[str, _RejectedMessages] = {}
+        self._subscribed_keys: set[Key] = set()
+        self._published_keys: set[Key] = set()
+        self._rejected_by_topic: dict[str, _RejectedMessages] = {}
 
     @property
     def pairs(self) -> Iterable[ProxyPair]:
@@ -141,13 +141,13 @@ class Relay:
 
     def serve(self, pair: ProxyPair) -> bool:
         """Process the pending input of a pair; return True if connections or subscriptions changed."""
-        changed = pair.read_connections()
-        changed |= pair.read_filters()
-        if changed:
+        has_changed = pair.read_connections()
+        has_changed |= pair.read_filters()
+        if has_changed:
             self.update_endpoints((pair.line.topic, pair.line.codec))
         for frame in pair.frames(_MAX_BATCH):
             self._relay_frame(pair, frame)
-        return changed
+        return has_changed
 
     def set_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
         """Set the programming languages of the programs on each line, some of which require escaping."""
@@ -169,11 +169,11 @@ class Relay:
         """Retry failed subscriptions and update alerts. Call once a second."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.update_endpoints(key)
-        for topic, rejected in list(self._rejected.items()):
-            if rejected.count != rejected.reported:
+        for topic, rejected in list(self._rejected_by_topic.items()):
+            if rejected.count != rejected.reported_count:
                 self._report_rejected(topic, rejected)
             elif rejected.is_resolved:
-                del self._rejected[topic]
+                del self._rejected_by_topic[topic]
                 self._alerts.resolve(f"message:{topic}")
 
     def update_endpoints(self, key: Key) -> None:
@@ -184,14 +184,14 @@ class Relay:
         """
         pairs = self._pairs_of(key)
         is_needed = any(pair.has_subscribers for pair in pairs)
-        if is_needed and key not in self._subscribed:
+        if is_needed and key not in self._subscribed_keys:
             if self._native.subscribe(*key):
-                self._subscribed.add(key)
-        elif not is_needed and key in self._subscribed:
-            self._subscribed.discard(key)
+                self._subscribed_keys.add(key)
+        elif not is_needed and key in self._subscribed_keys:
+            self._subscribed_keys.discard(key)
             self._native.unsubscribe(*key)
-        if key in self._publishing and not any(pair.connections["publisher"] for pair in pairs):
-            self._publishing.discard(key)
+        if key in self._published_keys and not any(pair.connections["publisher"] for pair in pairs):
+            self._published_keys.discard(key)
             self._native.stop_publishing(*key)
             self._alerts.resolve(f"nan:{key[0]}")
         for pair in pairs:
@@ -207,8 +207,8 @@ class Relay:
         except FrameError as error:
             self._reject(pair, error)
             return
-        if pair.line.topic in self._rejected:
-            self._rejected[pair.line.topic].is_resolved = True
+        if pair.line.topic in self._rejected_by_topic:
+            self._rejected_by_topic[pair.line.topic].is_resolved = True
         if pair.line.codec == "json" and has_replaced_nan(frame, data):
             self._alerts.report(
                 f"nan:{pair.line.topic}",
@@ -223,7 +223,7 @@ class Relay:
                 other.forward(frame, data)
             else:
                 other.deliver(data)
-        self._publishing.add(key)
+        self._published_keys.add(key)
         self._native.publish(*key, data)
 
     def _reject(self, pair: ProxyPair, error: FrameError) -> None:
@@ -231,14 +231,14 @@ class Relay:
             self._report_version_alert("publisher", pair, error.version)
             return
         topic = pair.line.topic
-        rejected = self._rejected.setdefault(topic, _RejectedMessages(str(error)))
+        rejected = self._rejected_by_topic.setdefault(topic, _RejectedMessages(str(error)))
         rejected.reason, rejected.is_resolved = str(error), False
         rejected.count += 1
-        if rejected.count == 1:  # further ones are reported once a second
+        if rejected.count == 1:  # further messages are reported once a second
             self._report_rejected(topic, rejected)
 
     def _report_rejected(self, topic: str, rejected: _RejectedMessages) -> None:
-        rejected.reported = rejected.count
+        rejected.reported_count = rejected.count
         template = ngettext("{reason}", "{reason} ({count} messages)", rejected.count)
         self._alerts.report(f"message:{topic}", template.format(reason=rejected.reason, count=rejected.count))
 

@@ -51,7 +51,7 @@ class RequestServer:
         context: ZeroMQ context.
         ports: Fixed ports.
         alerts: Receiver of problems.
-        decide: Returns the port for a request, or raises `RequestError`.
+        assign_port: Returns the port for a request, or raises `RequestError`.
     """
 
     def __init__(
@@ -59,12 +59,12 @@ class RequestServer:
         context: zmq.Context[zmq.Socket[bytes]],
         ports: Ports,
         alerts: AlertSink,
-        decide: Callable[[Request], int],
+        assign_port: Callable[[Request], int],
     ) -> None:
         self._context = context
         self._ports = ports
         self._alerts = alerts
-        self._assign_port = decide
+        self._assign_port = assign_port
         self._request_sockets: dict[int, zmq.Socket[bytes]] = {}
         self._broadcast_socket: zmq.Socket[bytes] | None = None
 
@@ -76,16 +76,16 @@ class RequestServer:
 
     def open(self) -> bool:
         """Bind the ports that are not bound yet; return True if a request port was bound."""
-        before = len(self._request_sockets)
+        count_before = len(self._request_sockets)
         for port, versions in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._request_sockets:
                 template = _("Another program is using port {port}: programs of {version} can't connect")
-                bound = self._bind(zmq.ROUTER, port, template.format(port=port, version=versions))
-                if bound is not None:
-                    self._request_sockets[port] = bound
+                socket = self._bind(zmq.ROUTER, port, template.format(port=port, version=versions))
+                if socket is not None:
+                    self._request_sockets[port] = socket
         if self._ports.broadcast and self._broadcast_socket is None:
             self._broadcast_socket = self._bind(
                 zmq.PUB,
@@ -94,24 +94,24 @@ class RequestServer:
                     port=self._ports.broadcast
                 ),
             )
-        return len(self._request_sockets) != before
+        return len(self._request_sockets) != count_before
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], int]]:
         """Yield the request sockets with their ports."""
-        for port, counter in self._request_sockets.items():
-            yield counter, port
+        for port, socket in self._request_sockets.items():
+            yield socket, port
 
-    def reply(self, counter: zmq.Socket[bytes], port: int) -> None:
+    def reply(self, socket: zmq.Socket[bytes], port: int) -> None:
         """Reply to a pending request, if there is one. Never raises because of the request's content.
 
         A message without the envelope of a REQ socket gets no reply.
 
         Args:
-            counter: Request socket.
+            socket: Request socket.
             port: Port of the socket.
         """
         try:
-            parts = counter.recv_multipart(zmq.NOBLOCK)
+            parts = socket.recv_multipart(zmq.NOBLOCK)
         except zmq.Again:
             return
         # Not a REP socket: after a request without envelope, libzmq 4.3.5 drops the next reply.
@@ -125,9 +125,9 @@ class RequestServer:
         except RequestError as error:
             reply = encode_rejection(error)
         except Exception:  # a reply must be sent, or the port would hang for everyone
-            _logger.exception("the gateway could not carry out a request")
-            reply = encode_rejection(RequestError("the gateway could not carry this out; its log says why"))
-        counter.send_multipart([*envelope, reply])
+            _logger.exception("unexpected error while handling a request")
+            reply = encode_rejection(RequestError("internal error of the gateway; see its log"))
+        socket.send_multipart([*envelope, reply])
 
     def publish_members(self, members: Iterable[Member]) -> None:
         """Publish the list of all topics to tools of the original NEP."""

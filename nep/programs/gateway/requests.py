@@ -79,18 +79,18 @@ class Request:
         return self.socket in _SERVICE_SOCKETS
 
 
-def parse_request(data: bytes, asked_port: int) -> Request:
+def parse_request(data: bytes, request_port: int) -> Request:
     """Parse a request.
 
     Args:
         data: Request as JSON.
-        asked_port: Port to which the request was sent.
+        request_port: Port to which the request was sent.
 
     Raises:
         RequestError: The request is too large, isn't a JSON object, or has a missing or invalid field.
     """
     if len(data) > MAX_REQUEST_BYTES:
-        raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")
+        raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are allowed")
     try:
         fields = json.loads(data)
     except (ValueError, RecursionError) as error:
@@ -105,7 +105,7 @@ def parse_request(data: bytes, asked_port: int) -> Request:
         mode=_MODES[_choice(fields, "mode", frozenset(_MODES), topic, default="many2many")],
         msg_type=_choice(fields, "msg_type", None, topic, default="json"),
         pid=_pid(fields.get("pid")),
-        request_port=asked_port,
+        request_port=request_port,
         language=_language(fields),
     )
 
@@ -121,7 +121,7 @@ def encode_grant(request: Request, port: int) -> bytes:
 def encode_rejection(error: RequestError) -> bytes:
     """Encode the reply to a rejected request.
 
-    Original programs evaluate only `state`; `error` is the reason for people.
+    Original programs evaluate only `state`; `error` is a description for the reader of a log.
     """
     return _encode_json({"topic": error.topic, "state": "failure", "error": str(error)})
 
@@ -156,10 +156,10 @@ def encode_broadcast(members: Iterable[Member]) -> bytes:
     for member in members:
         if member.topic not in topics:
             nodes[member.topic] = {}
-            about: dict[str, object] = {"port": member.port, "socket": member.socket, "ip": LOOPBACK}
+            description: dict[str, object] = {"port": member.port, "socket": member.socket, "ip": LOOPBACK}
             if member.mode is not None:
-                about["mode"] = member.mode
-            topics[member.topic] = {**about, "msg_type": member.msg_type, "nodes": nodes[member.topic]}
+                description["mode"] = member.mode
+            topics[member.topic] = {**description, "msg_type": member.msg_type, "nodes": nodes[member.topic]}
         nodes[member.topic][member.node] = {"socket": member.socket, "pid": member.pid, "ip": LOOPBACK}
     return b"master " + _encode_json(topics)
 
@@ -177,7 +177,9 @@ def _name(fields: Mapping[str, object], key: str, topic: object) -> str:
     except UnicodeEncodeError as error:
         raise RequestError(f"the '{key}' of the request is not text", topic) from error
     if size > MAX_NAME_BYTES:
-        raise RequestError(f"the '{key}' of the request has {size} bytes; at most {MAX_NAME_BYTES} go", topic)
+        raise RequestError(
+            f"the '{key}' of the request has {size} bytes; at most {MAX_NAME_BYTES} are allowed", topic
+        )
     return value
 
 
@@ -192,9 +194,12 @@ def _choice(
     if not isinstance(value, str):
         raise RequestError(f"the request has no '{key}'", topic)
     if len(value) > MAX_NAME_BYTES:
-        raise RequestError(f"the '{key}' of the request has {len(value)} letters", topic)
+        raise RequestError(
+            f"the '{key}' of the request has {len(value)} characters; at most {MAX_NAME_BYTES} are allowed",
+            topic,
+        )
     if allowed is not None and value not in allowed:
-        raise RequestError(f"no {key} '{value[:40]}'; one of {', '.join(sorted(allowed))}", topic)
+        raise RequestError(f"unknown {key} '{value[:40]}'; use one of {', '.join(sorted(allowed))}", topic)
     return value
 
 

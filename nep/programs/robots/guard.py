@@ -34,7 +34,7 @@ MAX_DESCRIPTION_BYTES = 1_000_000
 _MAX_CLAIMANTS = 8
 _MAX_QUEUED_BYTES = 16 * 2**20
 _MAX_CACHED = 10_000
-_MAX_NAME_SHOWN, _MAX_NAMES_SHOWN = 100, 5
+_MAX_NAME_LENGTH, _MAX_NAMES_SHOWN = 100, 5
 _POLL_S = 0.05
 _GRAPH_TIMEOUT_S = 0.5
 
@@ -43,7 +43,8 @@ class MotionGuard:
     """Guard that decides on which topics a program may publish. Thread-safe.
 
     Call `update_graph` with each new graph. `denial_reason` is a dictionary look-up unless something has
-    changed. Before the first graph no robots are known, and only the message type and RIZE's topic decide.
+    changed. Before the first graph, no robots are known: only topics of type ``robot/command`` and RIZE's
+    command topic are guarded.
 
     Args:
         node: Node that subscribes to the robots' descriptions.
@@ -58,9 +59,9 @@ class MotionGuard:
         self._allowed = frozenset(allowed)
         self._own_nodes = frozenset((node.id,) if own_nodes is None else own_nodes)
         self._lock = threading.RLock()
-        self._received_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
+        self._unparsed_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
         self._subscribers: dict[str, Subscriber] = {}
-        self._received: dict[tuple[str, int | None], Message] = {}
+        self._unparsed_messages: dict[tuple[str, int | None], Message] = {}
         """Descriptions that are still to be parsed: the newest of each publisher."""
         self._controls: dict[str, dict[int | None, RobotControls]] = {}
         """Last valid description of each publisher, by description topic."""
@@ -83,8 +84,8 @@ class MotionGuard:
     def update_graph(self, view: GraphView) -> None:
         """Process a new graph. Returns quickly if nothing has changed."""
         with self._lock:
-            before = self._view
-            if before is not None and (before.epoch, before.revision) == (view.epoch, view.revision):
+            previous = self._view
+            if previous is not None and (previous.epoch, previous.revision) == (view.epoch, view.revision):
                 if not self._is_dirty:
                     return
             else:
@@ -101,10 +102,10 @@ class MotionGuard:
 
     def wait_for_descriptions(self, timeout_s: float) -> bool:
         """Wait until the descriptions of all robots are read; return False after `timeout_s` seconds."""
-        until = time.monotonic() + timeout_s
+        deadline = time.monotonic() + timeout_s
         while True:
             self.poll()
-            if self.is_settled or time.monotonic() >= until:
+            if self.is_settled or time.monotonic() >= deadline:
                 return self.is_settled
             threading.Event().wait(_POLL_S)
 
@@ -170,37 +171,41 @@ class MotionGuard:
         return True
 
     def _receive(self, messages: Sequence[Message]) -> None:
-        with self._received_lock:
+        with self._unparsed_lock:
             for message in messages:
                 key = message.topic, message.publisher
-                self._received.pop(key, None)
+                self._unparsed_messages.pop(key, None)
                 if len(message.data) <= MAX_DESCRIPTION_BYTES:
-                    self._received[key] = message
-            while sum(len(each.data) for each in self._received.values()) > _MAX_QUEUED_BYTES:
-                del self._received[next(iter(self._received))]  # its robot counts as unread
+                    self._unparsed_messages[key] = message
+            while sum(len(each.data) for each in self._unparsed_messages.values()) > _MAX_QUEUED_BYTES:
+                del self._unparsed_messages[next(iter(self._unparsed_messages))]  # its robot counts as unread
             self._is_dirty = True
 
     def _rebuild(self, view: GraphView) -> None:
-        with self._received_lock:
+        with self._unparsed_lock:
             self._is_dirty = False
-            received, self._received = self._received, {}
-        for (topic, publisher), message in received.items():
+            unparsed_messages, self._unparsed_messages = self._unparsed_messages, {}
+        for (topic, publisher), message in unparsed_messages.items():
             controls = _parse_description(message, topic)
             if controls is not None:
-                claims = self._controls.setdefault(topic, {})
-                claims.pop(publisher, None)
-                claims[publisher] = controls
-                while len(claims) > _MAX_CLAIMANTS:
-                    del claims[next(iter(claims))]
-        robots = [controls for claims in self._controls.values() for controls in claims.values()]
+                known_controls = self._controls.setdefault(topic, {})
+                known_controls.pop(publisher, None)
+                known_controls[publisher] = controls
+                while len(known_controls) > _MAX_CLAIMANTS:
+                    del known_controls[next(iter(known_controls))]
+        robots = [
+            controls for known_controls in self._controls.values() for controls in known_controls.values()
+        ]
         robots += original_robots(view)
         self._moving = moving_topics(view, robots, self._unread_topics(view), self._own_nodes)
         self._cache = {}
 
     def _unread_topics(self, view: GraphView) -> frozenset[str]:
         def is_unread(topic: str) -> bool:
-            read = self._controls.get(topic, {}).keys()
-            return None not in read and any(each.id not in read for each in view.topics[topic].publishers)
+            read_ids = self._controls.get(topic, {}).keys()
+            return None not in read_ids and any(
+                each.id not in read_ids for each in view.topics[topic].publishers
+            )
 
         return frozenset(filter(is_unread, description_topics(view)))
 
@@ -228,16 +233,16 @@ def denial_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> 
     Returns:
         The message; "" if all robots are allowed.
     """
-    missing = list(_denied_robots(topic, robots, allowed))
-    if not missing:
+    denied_robots = list(_denied_robots(topic, robots, allowed))
+    if not denied_robots:
         return ""
-    topic_text = shortened(escaped(topic), _MAX_NAME_SHOWN)
-    names = [shortened(escaped(name), _MAX_NAME_SHOWN) for name in missing]
-    is_named = missing != [topic] and len(names) <= _MAX_NAMES_SHOWN
+    topic_text = shortened(escaped(topic), _MAX_NAME_LENGTH)
+    names = [shortened(escaped(name), _MAX_NAME_LENGTH) for name in denied_robots]
+    is_named = denied_robots != [topic] and len(names) <= _MAX_NAMES_SHOWN
     options = " ".join(
         f"--allow-moving {shlex.quote(each)}" for each in (names if is_named else [topic_text])
     )
-    if missing == [topic]:
+    if denied_robots == [topic]:
         template = _("'{topic}' moves a robot; make sure that nobody is in the way, then add {options}")
         return template.format(topic=topic_text, options=options)
     robots = names[:_MAX_NAMES_SHOWN] + ["…"] * (len(names) > _MAX_NAMES_SHOWN)

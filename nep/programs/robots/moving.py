@@ -21,7 +21,7 @@ REPLY_TYPE = "robot/answer"
 RIZE_COMMAND_TOPIC = "robot_action"
 """Topic for commands to all RIZE robots, to which robots of the driver kit also subscribe."""
 _CONTROL_KEYS = ("command", "world")
-_DESCRIPTION, _ANSWER = "/description", "/answer"
+_DESCRIPTION_SUFFIX, _ANSWER_SUFFIX = "/description", "/answer"
 _HREF_SCHEME = "nep:"
 _ORIGINAL_GENERATIONS = frozenset({"A", "B"})
 _COMMAND_NAMES = frozenset({"command", "cmd_vel"})
@@ -48,29 +48,31 @@ class MovingTopics:
     Args:
         robots: Robots and the topics that move them.
         unidentified: Topics or patterns that move robots of unknown names.
-        uses_names: Also include topics named like commands (``.../command``, ``.../cmd_vel``). For
-            recordings, which may lack the robot's description.
+        matches_command_names: True to also include topics named like commands (``.../command``,
+            ``.../cmd_vel``). For recordings, which may lack the robot's description.
     """
 
-    __slots__ = ("_all_names", "_by_topic", "_patterns", "_unidentified", "_uses_names")
+    __slots__ = ("_all_names", "_matches_command_names", "_patterns", "_robots_by_topic", "_unidentified")
 
     def __init__(
         self,
         robots: Iterable[RobotControls] = (),
         *,
         unidentified: Iterable[str] = (),
-        uses_names: bool = False,
+        matches_command_names: bool = False,
     ) -> None:
         robot_controls = tuple(robots)
-        by_topic: dict[str, dict[str, None]] = {}
+        robots_by_topic: dict[str, dict[str, None]] = {}
         for robot in robot_controls:
             for topic in robot.topics:
-                by_topic.setdefault(topic, {})[robot.name] = None
-        self._by_topic = {topic: tuple(names) for topic, names in by_topic.items()}
+                robots_by_topic.setdefault(topic, {})[robot.name] = None
+        self._robots_by_topic = {topic: tuple(names) for topic, names in robots_by_topic.items()}
         self._unidentified = frozenset(unidentified)
-        self._patterns = tuple(topic for topic in {*self._by_topic, *self._unidentified} if is_pattern(topic))
+        self._patterns = tuple(
+            topic for topic in {*self._robots_by_topic, *self._unidentified} if is_pattern(topic)
+        )
         self._all_names = tuple(dict.fromkeys(robot.name for robot in robot_controls))
-        self._uses_names = uses_names
+        self._matches_command_names = matches_command_names
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -80,7 +82,7 @@ class MovingTopics:
     @property
     def topics(self) -> dict[str, tuple[str, ...]]:
         """Names of the identified robots by the topic or pattern that moves them."""
-        robots_by_topic = dict(self._by_topic)
+        robots_by_topic = dict(self._robots_by_topic)
         if self._all_names:
             robots_by_topic[RIZE_COMMAND_TOPIC] = self._all_names
         return robots_by_topic
@@ -89,10 +91,10 @@ class MovingTopics:
         """Return the names of the identified robots that messages on a topic move."""
         if topic == RIZE_COMMAND_TOPIC:
             return self._all_names
-        names = dict.fromkeys(self._by_topic.get(topic, ()))
+        names = dict.fromkeys(self._robots_by_topic.get(topic, ()))
         for pattern in self._patterns:
             if matches(pattern, topic):
-                names |= dict.fromkeys(self._by_topic.get(pattern, ()))
+                names |= dict.fromkeys(self._robots_by_topic.get(pattern, ()))
         return tuple(names)
 
     def robots_moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
@@ -112,7 +114,7 @@ class MovingTopics:
             topic == RIZE_COMMAND_TOPIC
             or msg_type == COMMAND_TYPE
             or topic in self._unidentified
-            or (self._uses_names and topic.rpartition("/")[2] in _COMMAND_NAMES)
+            or (self._matches_command_names and topic.rpartition("/")[2] in _COMMAND_NAMES)
             or any(each in self._unidentified and matches(each, topic) for each in self._patterns)
         )
 
@@ -170,7 +172,7 @@ def robot_name_of(topic: str) -> str:
 
     For example, the name is ``Rover`` for ``/Rover/description``.
     """
-    return topic.strip("/").removesuffix(_DESCRIPTION) or topic
+    return topic.strip("/").removesuffix(_DESCRIPTION_SUFFIX) or topic
 
 
 def moving_topics(
@@ -189,14 +191,18 @@ def moving_topics(
         own_nodes: Ids of the caller's nodes, whose subscriptions are ignored.
     """
     all_robots = [*robots, *_unread_robots(view, unread, own_nodes)]
-    typed = [(info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE]
-    typed += [
+    command_topics = [
+        (info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE
+    ]
+    command_topics += [
         (info.name, info.subscribers) for info in view.patterns.values() if info.msg_type == COMMAND_TYPE
     ]
-    subscribed = (
-        name for name, subscribers in typed if any(each.node_id not in own_nodes for each in subscribers)
+    unidentified = (
+        name
+        for name, subscribers in command_topics
+        if any(each.node_id not in own_nodes for each in subscribers)
     )
-    return MovingTopics(all_robots, unidentified=subscribed)
+    return MovingTopics(all_robots, unidentified=unidentified)
 
 
 def _unread_robots(
@@ -204,21 +210,21 @@ def _unread_robots(
 ) -> Iterator[RobotControls]:
     # A driver of the kit publishes its answer topic first, then subscribes to commands, and publishes its
     # description last: a publisher of answers without a description is about to announce a robot.
-    announcing = {id for topic in description_topics(view) for id in _publisher_node_ids(view, topic)}
+    described_node_ids = {id for topic in description_topics(view) for id in _publisher_node_ids(view, topic)}
     programs: list[tuple[str, set[str]]] = [
-        (topic.removesuffix(_DESCRIPTION), _publisher_node_ids(view, topic)) for topic in unread
+        (topic.removesuffix(_DESCRIPTION_SUFFIX), _publisher_node_ids(view, topic)) for topic in unread
     ]
     programs += [
-        (topic.removesuffix(_ANSWER), nodes)
+        (topic.removesuffix(_ANSWER_SUFFIX), node_ids)
         for topic, info in view.topics.items()
-        if info.msg_type == REPLY_TYPE and (nodes := _publisher_node_ids(view, topic) - announcing)
+        if info.msg_type == REPLY_TYPE and (node_ids := _publisher_node_ids(view, topic) - described_node_ids)
     ]
-    subscribed = _subscriptions(view) if programs else {}
-    for home, nodes in programs:
-        topics = {f"{home}/{key}" for key in _CONTROL_KEYS}
-        for node in nodes.difference(own_nodes):
-            topics |= subscribed.get(node, set())
-        yield RobotControls(home.strip("/") or home, frozenset(topics))
+    subscriptions = _subscriptions(view) if programs else {}
+    for prefix, node_ids in programs:
+        topics = {f"{prefix}/{key}" for key in _CONTROL_KEYS}
+        for node_id in node_ids.difference(own_nodes):
+            topics |= subscriptions.get(node_id, set())
+        yield RobotControls(prefix.strip("/") or prefix, frozenset(topics))
 
 
 def _publisher_node_ids(view: GraphView, topic: str) -> set[str]:

@@ -70,9 +70,9 @@ def checked_origin(origin: str) -> str:
                 origin=quotable(origin)
             )
         )
-    is_usual = port is None or port == _DEFAULT_PORTS[parts.scheme]
+    is_default_port = port is None or port == _DEFAULT_PORTS[parts.scheme]
     host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
-    return f"{parts.scheme}://{host}" if is_usual else f"{parts.scheme}://{host}:{port}"
+    return f"{parts.scheme}://{host}" if is_default_port else f"{parts.scheme}://{host}:{port}"
 
 
 @dataclass(frozen=True)
@@ -148,10 +148,10 @@ class AuthVerifier:
         parts = (self._token, auth.client, auth.dest, auth.rand, auth.time_s, auth.level, auth.end_s)
         text = "".join(map(str, parts)).encode("utf-8", "replace")
         mac = hashlib.sha512(text).hexdigest()
-        is_right = hmac.compare_digest(mac.encode(), auth.mac.lower().encode("utf-8", "replace"))
+        is_valid_mac = hmac.compare_digest(mac.encode(), auth.mac.lower().encode("utf-8", "replace"))
         now = self._clock()
-        is_now = abs(now - auth.time_s) <= _CLOCK_TOLERANCE_S and auth.end_s > now
-        if not (is_right and is_now) or mac in self._used_macs:
+        is_current = abs(now - auth.time_s) <= _CLOCK_TOLERANCE_S and auth.end_s > now
+        if not (is_valid_mac and is_current) or mac in self._used_macs:
             return False
         self._used_macs[mac] = None
         while len(self._used_macs) > _MAX_USED_MACS:

@@ -58,12 +58,12 @@ class PageConnection:
         self.id = next(_ids)
         self._connection = connection
         self._counts = counts
-        self._since_s = time.time()
-        self._dropped = 0
+        self._connected_at_s = time.time()
+        self._dropped_count = 0
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
         self._node = new_node(name)
         self._queue = SendQueue(asyncio.get_running_loop().time, self._close_slow_page)
-        self._closing: asyncio.Task[None] | None = None
+        self._close_task: asyncio.Task[None] | None = None
         self.is_closing = False
         """True if the page's messages are ignored because it is being disconnected.
 
@@ -101,12 +101,12 @@ class PageConnection:
             name=self.name,
             address=str(address[0]) if isinstance(address, tuple) else str(address),
             origin=origin,
-            since_s=self._since_s,
+            since_s=self._connected_at_s,
             client=client_name(user_agent, is_foxglove=self.protocol == "foxglove"),
             protocol=self.protocol,
             title=page_title(path, referer, origin) or self.name,
             topics=self._topic_list,
-            dropped_count=self._dropped,
+            dropped_count=self._dropped_count,
             device=device_kind(user_agent),
         )
 
@@ -131,7 +131,7 @@ class PageConnection:
         `run` returns when the connection is closed.
         """
         self.is_closing = True
-        self._closing = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
+        self._close_task = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
 
     async def _close_connection(self, code: int, reason: str) -> None:
         # A page that does not read does not receive a close frame either.
@@ -154,7 +154,7 @@ class PageConnection:
         _logger.warning(
             "the page '%s' is disconnected: it doesn't read the replies to its requests", self.name
         )
-        self.start_closing("the page does not read its answers")
+        self.start_closing("the page does not read its replies")
 
     def _log_connection(self) -> None:
         """Log the connection through the page's node, because the graph doesn't show a node without topics.
@@ -164,8 +164,8 @@ class PageConnection:
         self._node.log.info("the page connected from %s", self._connection.remote_address)
 
     async def _close_node(self) -> None:
-        closed = self._thread.submit(self._node.close, _NODE_CLOSE_TIMEOUT_S)
-        await asyncio.shield(asyncio.wrap_future(closed))
+        future = self._thread.submit(self._node.close, _NODE_CLOSE_TIMEOUT_S)
+        await asyncio.shield(asyncio.wrap_future(future))
         self._thread.shutdown()  # returns at once: the thread is idle
 
     # ---- sending
@@ -193,7 +193,7 @@ class PageConnection:
             await self._connection.send(frame.data, text=frame.is_text)
         if frames:
             self._counts.sent += 1
-            feed.sent.count(sum(len(frame.data) for frame in frames))
+            feed.send_rate.count(sum(len(frame.data) for frame in frames))
 
     async def _encode_message(self, queued: QueuedMessage) -> list[Frame]:
         feed = queued.feed
@@ -208,7 +208,7 @@ class PageConnection:
 
     def _report_dropped(self, topic: str, count: int) -> None:
         self._counts.dropped += count
-        self._dropped += count
+        self._dropped_count += count
         template = ngettext(
             "this page is too slow: {count} message of '{topic}' was dropped",
             "this page is too slow: {count} messages of '{topic}' were dropped",

@@ -68,7 +68,8 @@ class ConnectedPage:
             Referer), else the host of its origin, else `name`.
         topics: Topics that the page publishes or subscribes to.
         dropped_count: Number of messages dropped because the page was too slow.
-        device: Kind of device: "phone", "tablet", or "" for a computer or an unknown device.
+        device: Kind of device according to the User-Agent header: "phone", "tablet", or "" for a computer or
+            an unknown device. Many tablets claim to be computers.
     """
 
     id: int
@@ -82,7 +83,6 @@ class ConnectedPage:
     topics: tuple[PageTopic, ...] = ()
     dropped_count: int = 0
     device: Device = ""
-    """Kind of device according to the User-Agent header; many tablets claim to be computers."""
 
     @property
     def subscribed_topics(self) -> tuple[str, ...]:
@@ -151,7 +151,7 @@ class PageContext:
         guard: MotionGuard,
         counts: WebCounts,
         *,
-        on_robot_refused: Callable[[str, str], object] = lambda _robot, _reason: None,
+        on_robot_rejected: Callable[[str, str], object] = lambda _robot, _reason: None,
         send_status: Callable[[Level, str], object] | None = None,
     ) -> None:
         """Initialize the context.
@@ -162,7 +162,7 @@ class PageContext:
             thread: Executor with a single thread, for calls that wait for the network.
             guard: Motion guard that decides on which topics the page may publish.
             counts: Counters of the server.
-            on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
+            on_robot_rejected: Called with the name of a robot that the page may not move, and the reason.
             send_status: Sends a status in another protocol; None for rosbridge.
         """
         self.node = node
@@ -171,7 +171,7 @@ class PageContext:
         self.counts = counts
         self.level: Level = "error"
         self._thread = thread
-        self._on_robot_rejected = on_robot_refused
+        self._on_robot_rejected = on_robot_rejected
         self._send_status = send_status
         self._rejection_times_s: dict[str, float] = {}
         self._rejection_lock = threading.Lock()

@@ -1,6 +1,6 @@
 """Resource limits of `nep web`: number of pages, and limits of each page.
 
-All are checked before memory is allocated.
+All limits are checked before memory is allocated.
 """
 
 MAX_PAGES = 100

@@ -167,31 +167,31 @@ def _with_typed_arrays(msg: Mapping[str, object], definition: Definition) -> obj
 
 def _typed_array_fields(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
     """Return the fields of a map that contain arrays of numbers, converted to typed arrays."""
-    packed: dict[str, object] = {}
+    converted_fields: dict[str, object] = {}
     if not isinstance(value, Mapping):
-        return packed
+        return converted_fields
     for name, kind in kinds:
         if name not in value:
             continue
         field_value = value[name]
         if kind.element is not None and kind.element.name in _TYPED_ARRAYS:
-            packed[name] = _pack_typed_array(field_value, kind.element.name)
+            converted_fields[name] = _to_typed_array(field_value, kind.element.name)
         elif kind.fields and isinstance(field_value, Mapping):
-            packed[name] = {
+            converted_fields[name] = {
                 **field_value,
                 **_typed_array_fields(field_value, [(each.name, each.kind) for each in kind.fields]),
             }
-    return packed
+    return converted_fields
 
 
-def _pack_typed_array(values: object, kind: str) -> object:
+def _to_typed_array(values: object, kind: str) -> object:
     """Convert a list of numbers to a typed array, in which `null` (NaN in JSON) becomes NaN."""
-    tag, letter = _TYPED_ARRAYS[kind]
+    tag, type_code = _TYPED_ARRAYS[kind]
     if not isinstance(values, list):
         return values
-    if letter in "fd" and None in values:
+    if type_code in "fd" and None in values:
         values = [float("nan") if each is None else each for each in values]
     try:
-        return cbor2.CBORTag(tag, array(letter, values).tobytes())
+        return cbor2.CBORTag(tag, array(type_code, values).tobytes())
     except (TypeError, OverflowError, ValueError):
         return values

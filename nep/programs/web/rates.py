@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 _SLOT_S = 0.5
-_SLOTS = 4
-_WINDOW_S = _SLOT_S * _SLOTS
+_SLOT_COUNT = 4
+_WINDOW_S = _SLOT_S * _SLOT_COUNT
 
 
 class RateMeter:
@@ -21,8 +21,8 @@ class RateMeter:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._since_s = clock()
-        self._slots = [(-1, 0, 0)] * (_SLOTS + 1)
+        self._started_s = clock()
+        self._slots = [(-1, 0, 0)] * (_SLOT_COUNT + 1)
         """Slots (number since the clock's zero, messages, bytes), including the incomplete one."""
         self.total = 0
 
@@ -39,9 +39,9 @@ class RateMeter:
         """Return messages and bytes per second; (0, 0) during the first half second."""
         now = self._clock()
         current = int(now / _SLOT_S)
-        begin = current - _SLOTS
-        full = [each for each in tuple(self._slots) if begin <= each[0] < current]
-        span_s = min(_WINDOW_S, current * _SLOT_S - self._since_s)
+        begin = current - _SLOT_COUNT
+        full_slots = [each for each in tuple(self._slots) if begin <= each[0] < current]
+        span_s = min(_WINDOW_S, current * _SLOT_S - self._started_s)
         if span_s < _SLOT_S:
             return 0.0, 0.0
-        return sum(each[1] for each in full) / span_s, sum(each[2] for each in full) / span_s
+        return sum(each[1] for each in full_slots) / span_s, sum(each[2] for each in full_slots) / span_s

@@ -52,7 +52,7 @@ class Feed:
         self.topic = topic
         is_image = bool(msg_type) and codec_for(msg_type).name == "image"
         self._default_capacity = _MAX_QUEUED_IMAGES if is_image else MAX_QUEUED_MESSAGES
-        self.sent = RateMeter(clock)
+        self.send_rate = RateMeter(clock)
         self.options = EncodingOptions()
         self.dropped_count = 0
         """Number of messages dropped since the page was last notified of drops."""
@@ -64,7 +64,7 @@ class Feed:
         self._throttle_s = 0.0
         self._capacity = self._default_capacity
         self._messages: deque[Message] = deque()
-        self._latched: dict[int | None, Message] = {}
+        self._latched_messages: dict[int | None, Message] = {}
         self._next_at = 0.0
 
     def __len__(self) -> int:
@@ -85,7 +85,7 @@ class Feed:
             as_pixels: Send images as the pixels of ``sensor_msgs/Image``.
         """
         if self._subscriptions and request.id not in self._subscriptions:
-            for message in tuple(self._latched.values()):
+            for message in tuple(self._latched_messages.values()):
                 self.add(message)
         self._subscriptions[request.id] = request
         self._update_options(as_pixels=as_pixels)
@@ -106,13 +106,13 @@ class Feed:
         return was_subscribed
 
     def _update_options(self, *, as_pixels: bool) -> None:
-        wishes = self._subscriptions.values()
-        sizes = [each.fragment_size for each in wishes if each.fragment_size is not None]
-        compression = max((each.compression for each in wishes), key=COMPRESSIONS.index)
+        subscriptions = self._subscriptions.values()
+        sizes = [each.fragment_size for each in subscriptions if each.fragment_size is not None]
+        compression = max((each.compression for each in subscriptions), key=COMPRESSIONS.index)
         self.options = EncodingOptions(compression, min(sizes, default=None), as_pixels)
-        self._throttle_s = min(each.throttle_s for each in wishes)
-        longest = max(each.queue_length for each in wishes)
-        self._capacity = longest or (1 if self._throttle_s else self._default_capacity)
+        self._throttle_s = min(each.throttle_s for each in subscriptions)
+        queue_length = max(each.queue_length for each in subscriptions)
+        self._capacity = queue_length or (1 if self._throttle_s else self._default_capacity)
 
     def add(self, message: Message) -> None:
         """Append a message, and drop the oldest ones that exceed the queue length."""
@@ -124,10 +124,10 @@ class Feed:
             self.drop_oldest()
 
     def _store_latched(self, message: Message) -> None:
-        self._latched.pop(message.publisher, None)
-        self._latched[message.publisher] = message
-        while sum(each.size_bytes for each in self._latched.values()) > _MAX_LATCHED_BYTES:
-            del self._latched[next(iter(self._latched))]
+        self._latched_messages.pop(message.publisher, None)
+        self._latched_messages[message.publisher] = message
+        while sum(each.size_bytes for each in self._latched_messages.values()) > _MAX_LATCHED_BYTES:
+            del self._latched_messages[next(iter(self._latched_messages))]
 
     def drop_oldest(self) -> None:
         """Drop the oldest message. With a throttle time it counts as throttled, else as dropped."""
@@ -162,7 +162,7 @@ class Feed:
     def clear(self) -> None:
         """Discard all queued and latched messages."""
         self._messages.clear()
-        self._latched.clear()
+        self._latched_messages.clear()
         self.size_bytes = 0
 
 
@@ -189,8 +189,8 @@ class SendQueue:
         self._clock = clock
         self._frames: deque[Frame] = deque()
         self._frames_bytes = 0
-        self._active: deque[Feed] = deque()
-        self._is_filled = asyncio.Event()
+        self._active_feeds: deque[Feed] = deque()
+        self._not_empty = asyncio.Event()
 
     def put(self, frames: list[Frame]) -> None:
         """Append messages that can't be dropped. Does nothing after an overflow."""
@@ -198,7 +198,7 @@ class SendQueue:
             return
         self._frames.extend(frames)
         self._frames_bytes += sum(len(each.data) for each in frames)
-        self._is_filled.set()
+        self._not_empty.set()
         if self._frames_bytes > MAX_CONTROL_BYTES and len(self._frames) > len(frames):
             self._has_overflowed = True
             self._on_overflow()
@@ -210,25 +210,25 @@ class SendQueue:
         """
         feed.add(message)
         self.activate(feed)
-        while sum(each.size_bytes for each in self._active) > self._max_bytes:
-            largest = max(self._active, key=lambda each: (len(each) > 1, each.size_bytes))
-            if len(self._active) == 1 and len(largest) == 1:
+        while sum(each.size_bytes for each in self._active_feeds) > self._max_bytes:
+            largest = max(self._active_feeds, key=lambda each: (len(each) > 1, each.size_bytes))
+            if len(self._active_feeds) == 1 and len(largest) == 1:
                 return  # the only message, larger than the limit
             largest.drop_oldest()
             if not len(largest):
-                self._active.remove(largest)
+                self._active_feeds.remove(largest)
 
     def activate(self, feed: Feed) -> None:
         """Add a feed that has messages to the feeds that are served in turn."""
-        if len(feed) and feed not in self._active:
-            self._active.append(feed)
-        self._is_filled.set()
+        if len(feed) and feed not in self._active_feeds:
+            self._active_feeds.append(feed)
+        self._not_empty.set()
 
     def remove(self, feed: Feed) -> None:
         """Remove a feed and discard its messages."""
         feed.clear()
-        if feed in self._active:
-            self._active.remove(feed)
+        if feed in self._active_feeds:
+            self._active_feeds.remove(feed)
 
     async def pop(self) -> Frame | QueuedMessage:
         """Wait for the next item to be sent, and return it. Frames added by `put` come first."""
@@ -241,29 +241,29 @@ class SendQueue:
             queued = self._pop_next(now)
             if queued is not None:
                 return queued
-            self._is_filled.clear()
-            wait_s = min((each.next_at for each in self._active), default=float("inf")) - now
+            self._not_empty.clear()
+            wait_s = min((each.next_at for each in self._active_feeds), default=float("inf")) - now
             await self._wait(None if wait_s == float("inf") else max(0.0, wait_s))
 
     def _pop_next(self, now: float) -> QueuedMessage | None:
-        for _turn in range(len(self._active)):
-            feed = self._active.popleft()
+        for _turn in range(len(self._active_feeds)):
+            feed = self._active_feeds.popleft()
             if not len(feed):
                 continue
             if feed.next_at > now:
-                self._active.append(feed)
+                self._active_feeds.append(feed)
                 continue
             message = feed.pop(now)
             if len(feed):
-                self._active.append(feed)
+                self._active_feeds.append(feed)
             return QueuedMessage(feed, message)
         return None
 
     async def _wait(self, timeout_s: float | None) -> None:
         if timeout_s is None:
-            await self._is_filled.wait()
+            await self._not_empty.wait()
             return
         try:
-            await asyncio.wait_for(self._is_filled.wait(), timeout_s)
+            await asyncio.wait_for(self._not_empty.wait(), timeout_s)
         except asyncio.TimeoutError:
             return

@@ -85,7 +85,7 @@ class WebSettings:
     transport: str = "zeromq"
     foxglove: ChannelFormat | None = None
     """Encoder for clients of Foxglove's WebSocket protocol; None rejects these clients."""
-    rosbridge: bool = True
+    is_rosbridge_enabled: bool = True
     """True to accept rosbridge clients, which are all clients without Foxglove's subprotocol."""
 
     @property
@@ -129,7 +129,7 @@ class WebServer:
         self._blocked_pages = BlockedPages()
         self._rejections_lock = threading.Lock()
         self._rejections: tuple[Rejection, ...] = ()
-        self._auth = AuthVerifier(settings.access.token)
+        self._auth_verifier = AuthVerifier(settings.access.token)
         self._started = threading.Event()
         self._problem: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -194,11 +194,11 @@ class WebServer:
         check_token(replace(self.settings, access=access))
         with self._lock:
             if access.token != self.settings.access.token:
-                self._auth = AuthVerifier(access.token)
+                self._auth_verifier = AuthVerifier(access.token)
             self.settings = replace(self.settings, access=access)
             return self._disconnect(
-                lambda page, known: not self._is_still_allowed(page.connection, known),
-                "this page may not be connected any more",
+                lambda page, previous_access: not self._is_still_allowed(page.connection, previous_access),
+                "this page is no longer allowed to connect",
             )
 
     def set_allow_moving(self, names: Collection[str]) -> None:
@@ -225,26 +225,26 @@ class WebServer:
             if channels is not None:
                 return 0
             return self._disconnect(
-                lambda page, _access: page.protocol == "foxglove", "Foxglove's protocol was switched off"
+                lambda page, _access: page.protocol == "foxglove", "Foxglove's protocol was turned off"
             )
 
-    def set_rosbridge(self, on: bool) -> int:
+    def set_rosbridge(self, is_enabled: bool) -> int:
         """Enable or disable rosbridge; return the number of pages that are disconnected. Thread-safe."""
         with self._lock:
-            self.settings = replace(self.settings, rosbridge=on)
-            if on:
+            self.settings = replace(self.settings, is_rosbridge_enabled=is_enabled)
+            if is_enabled:
                 return 0
             return self._disconnect(
-                lambda page, _access: page.protocol == "rosbridge", "rosbridge was switched off"
+                lambda page, _access: page.protocol == "rosbridge", "rosbridge was turned off"
             )
 
     def _disconnect(
-        self, is_chosen: Callable[[RosbridgePage | FoxglovePage, Access], bool], reason: str
+        self, should_disconnect: Callable[[RosbridgePage | FoxglovePage, Access], bool], reason: str
     ) -> int:
         pages = [
             page
             for page, access in self._pages.copy().items()
-            if not page.is_closing and is_chosen(page, access)
+            if not page.is_closing and should_disconnect(page, access)
         ]
         for page in pages:
             page.is_closing = True
@@ -297,14 +297,14 @@ class WebServer:
     def __exit__(self, *_exc: object) -> None:
         self.close()
 
-    # ---- in its thread
+    # ---- in the server's thread
 
     def _run(self) -> None:
         try:
             asyncio.run(self._serve())
         except Exception as error:
             if self._started.is_set():
-                _logger.exception("the web server ended because of an error")
+                _logger.exception("the web server stopped because of an error")
             self._problem = error
         finally:
             self._started.set()
@@ -320,9 +320,9 @@ class WebServer:
             async with server:
                 self.port = next(iter(server.sockets)).getsockname()[1]
                 self._started.set()
-                watch = asyncio.create_task(self._watch_robots(guard))
+                watch_task = asyncio.create_task(self._watch_robots(guard))
                 await self._stop.wait()
-                watch.cancel()
+                watch_task.cancel()
                 server.close()  # with 1001, going away
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(server.wait_closed(), _SHUTDOWN_TIMEOUT_S)
@@ -335,14 +335,14 @@ class WebServer:
         from websockets.asyncio.server import ServerConnection, serve  # noqa: PLC0415 - only needed here
 
         def new_connection(*args: Any, **options: Any) -> ServerConnection:  # noqa: ANN401 - the library's own
-            created = ServerConnection(*args, **options)
-            self._connections.add(created)
-            return created
+            connection = ServerConnection(*args, **options)
+            self._connections.add(connection)
+            return connection
 
         try:
             return await serve(
                 partial(self._serve_page, guard),
-                self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
+                self.settings.hosts,  # type: ignore[arg-type] # asyncio accepts a sequence
                 self.settings.port,
                 process_request=self._process_request,
                 select_subprotocol=self._select_subprotocol,
@@ -353,7 +353,7 @@ class WebServer:
                 max_queue=2,
                 server_header=None,
                 logger=_quiet_logger(),
-                create_connection=new_connection,  # type: ignore[arg-type] # a function that returns one, too
+                create_connection=new_connection,  # type: ignore[arg-type] # functions are accepted, too
             )
         except OSError as error:
             raise self._bind_error(error) from error
@@ -390,7 +390,7 @@ class WebServer:
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(stop.wait(), _REFRESH_S)
 
-    # ---- who connects
+    # ---- accepting connections
 
     def _process_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a rejected handshake or to an HTTP request; None accepts a handshake."""
@@ -414,7 +414,10 @@ class WebServer:
             rejection = _HandshakeRejection(
                 HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page")
             )
-        elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
+        elif not (
+            self.settings.is_rosbridge_enabled
+            or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))
+        ):
             rejection = _HandshakeRejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
         else:
             rejection = self._token_rejection(connection, request, access)
@@ -434,7 +437,7 @@ class WebServer:
         from websockets.http11 import Response  # noqa: PLC0415 - only this command needs it
 
         authorizations = request.headers.get_all("Authorization")
-        method = getattr(request, "method", "GET")  # websockets before 17 refuses other methods itself
+        method = getattr(request, "method", "GET")  # websockets before 17 rejects other methods itself
         page_request = PageRequest(
             method,
             request.path,
@@ -457,12 +460,12 @@ class WebServer:
         self, connection: ServerConnection, request: Request, access: Access
     ) -> _HandshakeRejection | None:
         authorizations = request.headers.get_all("Authorization")
-        is_given = access.check_token(request.path, authorizations[0] if authorizations else None)
-        connection.is_unlocked = not access.token or is_given is True  # type: ignore[attr-defined]
+        is_token_valid = access.check_token(request.path, authorizations[0] if authorizations else None)
+        connection.is_unlocked = not access.token or is_token_valid is True  # type: ignore[attr-defined]
         connection.access = access  # type: ignore[attr-defined]
-        if not access.token or is_given:
+        if not access.token or is_token_valid:
             return None
-        if is_given is False:
+        if is_token_valid is False:
             return _HandshakeRejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
         if self._unauthenticated_count >= _MAX_UNAUTHENTICATED:
             return _HandshakeRejection(
@@ -491,7 +494,7 @@ class WebServer:
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             address = address_of(connection)
-            _logger.warning("refused %s: %s (%d so far)", address, message, self.counts.turned_away)
+            _logger.warning("rejected %s: %s (%d so far)", address, message, self.counts.turned_away)
 
     def _record_robot_rejection(self, connection: ServerConnection, robot: str, message: str) -> None:
         source = escaped((origin_of(connection) or host_of(connection))[:200])
@@ -510,15 +513,15 @@ class WebServer:
         try:
             if not connection.is_unlocked:  # type: ignore[attr-defined]
                 with self._lock:
-                    access, auth = self.settings.access, self._auth
-                if access.token and not await self._authenticate(connection, auth):
+                    access, verifier = self.settings.access, self._auth_verifier
+                if access.token and not await self._authenticate(connection, verifier):
                     return
             with self._lock:
                 if self._is_still_allowed(connection, access):
                     page = self._new_page(connection, guard)
                     self._pages[page] = access
             if page is None:
-                await connection.close(_POLICY_VIOLATION, "this page may not connect any more")
+                await connection.close(_POLICY_VIOLATION, "this page is no longer allowed to connect")
                 return
             self.counts.opened += 1
             await page.run()
@@ -541,22 +544,22 @@ class WebServer:
                 self.counts,
                 channels=channels,
                 guard=guard,
-                on_robot_refused=report,
+                on_robot_rejected=report,
             )
         return RosbridgePage(connection, name, self._new_node, guard, self.counts, report)
 
     def _is_still_allowed(self, connection: ServerConnection, previous_access: Access) -> bool:
         """Return True if the current rules allow a page accepted under the rules `previous_access`."""
         access = self.settings.access
-        if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
+        if not self.settings.is_rosbridge_enabled and connection.subprotocol not in SUBPROTOCOLS:
             return False
-        is_refused = access.origin_rejection_reason(origin_of(connection), server_origin(connection))
-        return not is_refused and (not access.token or access.token == previous_access.token)
+        rejection_reason = access.origin_rejection_reason(origin_of(connection), server_origin(connection))
+        return not rejection_reason and (not access.token or access.token == previous_access.token)
 
-    async def _authenticate(self, connection: ServerConnection, auth: AuthVerifier) -> bool:
+    async def _authenticate(self, connection: ServerConnection, verifier: AuthVerifier) -> bool:
         self._unauthenticated_count += 1
         try:
-            if await authenticate(connection, auth):
+            if await authenticate(connection, verifier):
                 return True
         finally:
             self._unauthenticated_count -= 1

@@ -42,8 +42,8 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
     agent = user_agent[:_MAX_READ_LENGTH]
     if is_foxglove:
         return "Lichtblick" if "lichtblick" in agent.lower() else "Foxglove"
-    for mark, name in _CLIENTS:
-        if mark in agent:
+    for substring, name in _CLIENTS:
+        if substring in agent:
             return name
     product = _PRODUCT_TOKEN.match(agent)
     return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_DISPLAYED_LENGTH]
@@ -54,7 +54,7 @@ def device_kind(user_agent: str) -> Device:
     agent = user_agent[:_MAX_READ_LENGTH]
     if "iPhone" in agent or ("Android" in agent and "Mobile" in agent):
         return "phone"
-    return "tablet" if any(mark in agent for mark in ("iPad", "Android", "Tablet")) else ""
+    return "tablet" if any(substring in agent for substring in ("iPad", "Android", "Tablet")) else ""
 
 
 def page_title(path: str, referer: str, origin: str) -> str:

@@ -31,7 +31,7 @@ from nep.recordings.formats.records import RawMessage
 
 _MAX_CURSORS = 32
 _BATCH_BYTES = 1_000_000
-_MAX_BATCH = 4_096
+_MAX_BATCH_MESSAGES = 4_096
 Reply = Mapping[str, object]
 
 
@@ -102,11 +102,11 @@ class RecordingService:
         return {"file": number, "facts": file_info_to_plain(file.info)}
 
     def _read_raw(self, request: Mapping[str, Any]) -> Reply:
-        pieces = None if request["pieces"] is None else set(request["pieces"])
+        chunk_indexes = None if request["pieces"] is None else set(request["pieces"])
         file = self._files[request["file"]]
         number = next(self._numbers)
         self._cursors[number] = file.read_raw(
-            request["start_ns"], request["end_ns"], set(request["channels"]), pieces
+            request["start_ns"], request["end_ns"], set(request["channels"]), chunk_indexes
         )
         while len(self._cursors) > _MAX_CURSORS:
             self._cursors.popitem(last=False)
@@ -119,7 +119,7 @@ class RecordingService:
             raise ValueError(_("too many readers of the recording at the same time; try again later"))
         self._cursors.move_to_end(number)
         cursor, batch, size = self._cursors[number], list[RawMessage](), 0
-        for raw in islice(cursor, min(request["most"], _MAX_BATCH)):
+        for raw in islice(cursor, min(request["most"], _MAX_BATCH_MESSAGES)):
             batch.append(raw)
             size += raw.data.nbytes
             if size >= _BATCH_BYTES:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _REQUEST_TIMEOUT_S = 60.0
 _CLOSE_TIMEOUT_S = 5.0
-_FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
+_FIRST_BATCH_MESSAGES, _BATCH_GROWTH_FACTOR, _MAX_BATCH_MESSAGES = 16, 4, 4_096
 
 
 class ReaderProcess:
@@ -208,12 +208,12 @@ class _Pipe:
 class _RemoteFile:
     """File that is open in the reader process (a `RawFile`)."""
 
-    def __init__(self, pipe: _Pipe, path: Path, opened: Mapping[str, Any], timeout_s: float) -> None:
+    def __init__(self, pipe: _Pipe, path: Path, open_reply: Mapping[str, Any], timeout_s: float) -> None:
         self._pipe, self._path, self._timeout_s = pipe, path, timeout_s
-        self._number = opened["file"]
+        self._number = open_reply["file"]
         self._is_closed = False
-        self._damage = corruption_from_plain(opened.get("damage"))
-        self.info: FileInfo = file_info_from_plain(opened["facts"])
+        self._damage = corruption_from_plain(open_reply.get("damage"))
+        self.info: FileInfo = file_info_from_plain(open_reply["facts"])
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:
@@ -233,24 +233,24 @@ class _RemoteFile:
         start_ns: int | None,
         end_ns: int | None,
         channels: Collection[int],
-        pieces: Collection[int] | None = None,
+        chunk_indexes: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
         if not channels:
             return
-        max_count = _FIRST_BATCH
+        max_count = _FIRST_BATCH_MESSAGES
         reply = self._request(
             "raw",
             start_ns=_clamp_time(start_ns),
             end_ns=_clamp_time(end_ns),
             channels=list(channels),
-            pieces=None if pieces is None else list(pieces),
+            pieces=None if chunk_indexes is None else list(chunk_indexes),
             most=max_count,
         )
         while reply["cursor"]:
             for record in records_in(reply["messages"]):
                 if isinstance(record, RawMessage):
                     yield record
-            max_count = min(_GROWTH * max_count, _MAX_BATCH)
+            max_count = min(_BATCH_GROWTH_FACTOR * max_count, _MAX_BATCH_MESSAGES)
             reply = self._request("next", cursor=reply["cursor"], most=max_count)
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
@@ -275,8 +275,8 @@ class _RemoteFile:
         return counts
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
-        pieces: list[int] = self._request("pieces_of", channels=list(channels))["pieces"]
-        return pieces
+        chunk_indexes: list[int] = self._request("pieces_of", channels=list(channels))["pieces"]
+        return chunk_indexes
 
     def close(self) -> None:
         if not self._is_closed:

@@ -76,7 +76,7 @@ class Encoding(NamedTuple):
 
     Attributes:
         form: Name of the encoding, such as "json" or "picture".
-        before: Bytes that precede the message's data.
+        prefix: Bytes that precede the message's data.
         sequence: Sequence number in the record.
         publish_ns: Publish time in the record (ns since 1970).
         is_decodable: True if the message can be decoded.
@@ -85,12 +85,11 @@ class Encoding(NamedTuple):
     """
 
     form: str
-    before: bytes
+    prefix: bytes
     sequence: int
     publish_ns: int
     is_decodable: bool
     is_self_contained: bool = False
-    """True if the record contains its publisher and type, because its publisher has no channel."""
 
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
@@ -114,7 +113,7 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
-    form, is_decodable, before = _determine_form(message, log_ns if stamp is None else stamp)
+    form, is_decodable, prefix = _determine_form(message, log_ns if stamp is None else stamp)
     extra: dict[str, Any] = {}
     if extension:
         extra["extension"] = dict(extension)
@@ -137,11 +136,11 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
     if form in _DATA_FIELD:
         if extra:
             packed = _pack_extra(extra)
-            before += bytes_field_head(EXTRA_FIELD, len(packed)) + packed
-        before += bytes_field_head(_DATA_FIELD[form], message.size_bytes)
+            prefix += bytes_field_head(EXTRA_FIELD, len(packed)) + packed
+        prefix += bytes_field_head(_DATA_FIELD[form], message.size_bytes)
     sequence = 0 if seq is None else seq & _MAX_U32
     publish_ns = log_ns if stamp is None else max(0, min(stamp, _MAX_U64))
-    return Encoding(form, before, sequence, publish_ns, is_decodable, is_self_contained)
+    return Encoding(form, prefix, sequence, publish_ns, is_decodable, is_self_contained)
 
 
 def _pack_extra(extra: Mapping[str, Any]) -> bytes:
@@ -207,8 +206,8 @@ def _determine_image_form(message: Message, stamp_ns: int) -> tuple[str, bool, b
     return "raw", True, time + sizes + fixed_field(5, step)
 
 
-def _pixel_bytes(numbers: str, channels: int) -> int:
-    return int(numbers[-1]) * channels
+def _pixel_bytes(dtype: str, channels: int) -> int:
+    return int(dtype[-1]) * channels
 
 
 def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
@@ -232,8 +231,8 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
     elif form in _DATA_FIELD:
         name = _SCHEMAS.get(form, "nep.Bytes")
         schema = (name, "protobuf", descriptor_set(name))
-    encoded_as = "protobuf" if form in _DATA_FIELD else form
-    return ChannelDefinition(kind.topic, encoded_as, *schema, tuple(metadata))
+    message_encoding = "protobuf" if form in _DATA_FIELD else form
+    return ChannelDefinition(kind.topic, message_encoding, *schema, tuple(metadata))
 
 
 def recorder_channel(role: Role) -> ChannelDefinition:
@@ -272,7 +271,7 @@ class LiveChannels:
         encoding = encoding_of(message, log_ns)
         if not encoding.is_decodable:
             message.kind.decode(message.raw, message.extension)  # raises
-        return definition_of(message, encoding), b"".join((encoding.before, message.raw))
+        return definition_of(message, encoding), b"".join((encoding.prefix, message.raw))
 
 
 # ---- decoding
@@ -313,8 +312,8 @@ class ChannelDecoder:
         # For channels of other programs.
         if self._is_wrapped:
             return "image" if self.definition.schema_name.endswith("Image") else "bytes"
-        encoded = self.definition.message_encoding
-        return encoded if encoded in {"json", "msgpack"} else "bytes"
+        message_encoding = self.definition.message_encoding
+        return message_encoding if message_encoding in {"json", "msgpack"} else "bytes"
 
     @property
     def topic(self) -> str:

@@ -119,22 +119,22 @@ def _join(pieces: Iterator[bytes]) -> memoryview:
 
 
 def _decompress_stream(
-    data: memoryview, compression: str, most_bytes: int, step_bytes: int = _STEP_BYTES
+    data: memoryview, compression: str, remaining_bytes: int, step_bytes: int = _STEP_BYTES
 ) -> Iterator[bytes]:
     # Short steps, so that Ctrl+C can interrupt.
     if compression == "zstd":
         decompressor = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES)
         with decompressor.stream_reader(data, read_size=step_bytes) as stream:
-            while most_bytes > 0 and (piece := stream.read(min(step_bytes, most_bytes))):
-                most_bytes -= len(piece)
+            while remaining_bytes > 0 and (piece := stream.read(min(step_bytes, remaining_bytes))):
+                remaining_bytes -= len(piece)
                 yield piece
         return
     with lz4_frame.LZ4FrameDecompressor() as lz4:
         offset = 0
-        while most_bytes > 0 and not lz4.eof and (offset < len(data) or not lz4.needs_input):
+        while remaining_bytes > 0 and not lz4.eof and (offset < len(data) or not lz4.needs_input):
             part = data[offset : offset + step_bytes] if lz4.needs_input else b""
             offset += len(part)
-            decoded: bytes = lz4.decompress(part, max_length=min(step_bytes, most_bytes))
-            most_bytes -= len(decoded)
+            decoded: bytes = lz4.decompress(part, max_length=min(step_bytes, remaining_bytes))
+            remaining_bytes -= len(decoded)
             if decoded:
                 yield decoded

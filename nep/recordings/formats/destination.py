@@ -74,12 +74,12 @@ class SingleFile:
 
     Args:
         file: Writer of the file.
-        least_free_bytes: Free disk space at which the recording stops.
+        min_free_bytes: Free disk space at which the recording stops.
     """
 
-    def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
+    def __init__(self, file: FileWriter, min_free_bytes: int) -> None:
         self.file = file
-        self._least_free_bytes = least_free_bytes
+        self._min_free_bytes = min_free_bytes
         self._identity = _file_identity(file.path)
 
     is_full = False
@@ -94,7 +94,7 @@ class SingleFile:
         """Raise `RecordingError` if the file no longer exists or the disk is full."""
         if _file_identity(self.file.path) != self._identity:
             raise RecordingError(str(self.file.path), _("the file was moved or deleted during recording"))
-        if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
+        if shutil.disk_usage(self.file.path.parent).free < self._min_free_bytes:
             raise RecordingError(
                 str(self.file.path), _("the disk is full; everything recorded before is saved")
             )

@@ -130,7 +130,7 @@ class Definitions:
         self._schemas: dict[int, Schema] = {}
         self._without_schema: dict[int, dict[int, Channel]] = {}
         """Channels whose schema is missing, by the number of the schema and of the channel."""
-        self._read: dict[tuple[int, int], int] = {}
+        self._record_hashes: dict[tuple[int, int], int] = {}
         """Hashes of records by opcode and number, to skip repeated records."""
         self._size_bytes = 0
 
@@ -154,10 +154,10 @@ class Definitions:
             return []
         record_bytes = bytes(content)
         key = (opcode, int.from_bytes(record_bytes[:2], "little"))
-        mark = hash(record_bytes)
-        if self._read.get(key) == mark or self._size_bytes > _MAX_DEFINITION_BYTES:
+        record_hash = hash(record_bytes)
+        if self._record_hashes.get(key) == record_hash or self._size_bytes > _MAX_DEFINITION_BYTES:
             return []
-        self._read[key] = mark
+        self._record_hashes[key] = record_hash
         self._size_bytes += len(record_bytes)
         try:
             record = read_record("Schema" if opcode == Opcode.SCHEMA else "Channel", record_bytes)
@@ -294,12 +294,12 @@ class _SummaryReader:
 
     def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
         self._file, self._size, self._budget = file, size, budget
-        self._others = RecordCounter(path)
+        self._record_counter = RecordCounter(path)
         self._index = FileIndex(end=size)
         self._message_count = 0
         self._seen_offsets: set[int] = set()
         self._opcodes: set[int] = set()
-        self._has_unlisted: Mapping[int, bool] = {}
+        self._is_index_required: Mapping[int, bool] = {}
 
     def read(self, footer: bytes) -> FileIndex | None:
         # None if the summary is missing, damaged or incomplete.
@@ -329,7 +329,7 @@ class _SummaryReader:
     def _add(self, location: RecordLocation) -> None:
         # Raises `ValueError` for invalid entries.
         index, opcode = self._index, location.opcode
-        self._others.add(opcode)
+        self._record_counter.add(opcode)
         self._opcodes.add(opcode)
         if opcode == Opcode.CHUNK_INDEX:
             self._add_chunk(read_chunk_info(_read_content(self._file, location)))
@@ -339,7 +339,7 @@ class _SummaryReader:
         elif opcode == Opcode.STATISTICS and location.length <= _MAX_METADATA_BYTES:
             statistics = read_record("Statistics", _read_content(self._file, location))
             index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
-            self._has_unlisted = {
+            self._is_index_required = {
                 Opcode.METADATA_INDEX: bool(statistics.metadata_count),
                 Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
             }
@@ -370,7 +370,7 @@ class _SummaryReader:
         if not self._is_new(info.offset):
             raise ValueError("two entries for one chunk")
         if not info.packed_offsets:
-            damage = _index_from_records(self._file, info, self._index.definitions, self._budget)
+            damage = _index_records(self._file, info, self._index.definitions, self._budget)
             self._index.corruption.extend(damage)
         if info.packed_offsets:
             self._index.chunks.append(info)
@@ -378,7 +378,10 @@ class _SummaryReader:
     def _is_plausible(self, start: int) -> bool:
         # Chunks must not overlap, all channels must be known, and everything in the file must be listed.
         index, channels = self._index, self._index.definitions.channels
-        if any(lacks and opcode not in self._opcodes for opcode, lacks in self._has_unlisted.items()):
+        if any(
+            is_required and opcode not in self._opcodes
+            for opcode, is_required in self._is_index_required.items()
+        ):
             return False
         end = 0
         for info in sorted(index.chunks, key=lambda each: each.offset):
@@ -414,17 +417,17 @@ class _Scanner:
         self._offsets: dict[int, int] = {}
         self._run: ChunkInfo | None = None
         self._counts: dict[int, int] = {}
-        self._others = RecordCounter(path)
+        self._record_counter = RecordCounter(path)
 
     def run(self) -> FileIndex:
         # Raises `RecordingTooLargeError`, `OSError`, and what `progress` raises.
-        index, reported = self._index, 0
+        index, reported_end = self._index, 0
         is_closed = self._data_end < self._size
         for location in walk_records(self._file, self._data_end, self._budget):
             self._add(location)
             index.end = location.end
-            if self._progress is not None and index.end - reported >= _READ_BYTES:
-                reported = index.end
+            if self._progress is not None and index.end - reported_end >= _READ_BYTES:
+                reported_end = index.end
                 self._progress(index.end, self._size)
             if location.opcode == Opcode.DATA_END:
                 index.end = self._data_end if is_closed else location.end
@@ -435,7 +438,7 @@ class _Scanner:
             index.corruption.append(CorruptRange(index.end, self._data_end - index.end))
         for chunk in index.chunks:  # other programs write a schema into any chunk before its channel
             if index.definitions.lacks_schemas and not chunk.is_run:
-                _index_from_records(self._file, chunk, index.definitions, self._budget)
+                _index_records(self._file, chunk, index.definitions, self._budget)
         if is_closed and index.end == self._data_end:
             index.end = self._size
         return index
@@ -452,7 +455,7 @@ class _Scanner:
                 self._chunk.index_bytes += HEAD_BYTES + location.length
             return
         self._end_chunk()
-        self._others.add(opcode)
+        self._record_counter.add(opcode)
         if opcode == Opcode.CHUNK or location.length > _MAX_RUN_RECORD_BYTES:
             self._end_run()
         if opcode == Opcode.CHUNK:
@@ -511,7 +514,7 @@ class _Scanner:
         chunk.packed_offsets, self._offsets = pack_channel_map(self._offsets), {}
         channels = self._index.definitions.channels
         if not chunk.packed_offsets or not all(each in channels for each in chunk.channels):
-            damage = _index_from_records(self._file, chunk, self._index.definitions, self._budget)
+            damage = _index_records(self._file, chunk, self._index.definitions, self._budget)
             self._index.corruption.extend(damage)
         if chunk.packed_offsets:
             self._index.chunks.append(chunk)
@@ -520,15 +523,15 @@ class _Scanner:
         if len(self._index.attachments) >= _MAX_ATTACHMENTS:
             return
         self._file.seek(location.offset + HEAD_BYTES + 16)  # after its two times
-        begin = self._file.read(min(location.length, _MAX_HEADER_BYTES))
+        head = self._file.read(min(location.length, _MAX_HEADER_BYTES))
         texts, offset = [], 0
         for _word in range(2):
-            end = offset + 4 + int.from_bytes(begin[offset : offset + 4], "little")
-            if end + 4 > len(begin):
+            end = offset + 4 + int.from_bytes(head[offset : offset + 4], "little")
+            if end + 4 > len(head):
                 return
-            texts.append(begin[offset + 4 : end].decode("utf-8", "replace"))
+            texts.append(head[offset + 4 : end].decode("utf-8", "replace"))
             offset = end
-        size = int.from_bytes(begin[offset : offset + 8], "little")
+        size = int.from_bytes(head[offset : offset + 8], "little")
         self._index.attachments.append(AttachedFile(texts[0], texts[1], min(size, location.length)))
 
 
@@ -546,7 +549,7 @@ def _chunk_info(location: RecordLocation, header: ChunkHead) -> ChunkInfo:
     )
 
 
-def _index_from_records(
+def _index_records(
     file: BinaryIO, info: ChunkInfo, definitions: Definitions, budget: ReadBudget
 ) -> list[CorruptRange]:
     # For files without message indexes; an offset of 0 means no index.

@@ -54,14 +54,14 @@ class ReadBudget:
     ) -> None:
         self._path, self._remaining_bytes = path, work_bytes
         self._clock = clock
-        self._until = None if seconds is None else clock() + seconds
+        self._deadline = None if seconds is None else clock() + seconds
 
     def spend(self, work_bytes: int) -> None:
         """Subtract work from the budget. Raises `RecordingTooLargeError` if the budget is exceeded."""
         self._remaining_bytes -= work_bytes
         if self._remaining_bytes < 0:
             raise RecordingTooLargeError(str(self._path), _("the file is too large to read"))
-        if self._until is not None and self._clock() > self._until:
+        if self._deadline is not None and self._clock() > self._deadline:
             raise RecordingTooLargeError(str(self._path), _("reading the file takes too long"))
 
 

@@ -214,7 +214,7 @@ class FileWriter:
         return sum(self.counts.values())
 
     def add(
-        self, channel: int, times: tuple[int, int], sequence: int, before: bytes, data: bytes | memoryview
+        self, channel: int, times: tuple[int, int], sequence: int, prefix: bytes, data: bytes | memoryview
     ) -> None:
         """Add a message to the current chunk in memory.
 
@@ -222,12 +222,12 @@ class FileWriter:
             channel: Id of the channel.
             times: Log time and publish time in ns since 1970.
             sequence: Sequence number in the record.
-            before: Bytes that precede the data.
+            prefix: Bytes that precede the data.
             data: Data of the message.
         """
         chunk = self._chunk
         log_ns = times[0]
-        size = len(before) + (len(data) if isinstance(data, bytes) else data.nbytes)
+        size = len(prefix) + (len(data) if isinstance(data, bytes) else data.nbytes)
         index = chunk.indexes.get(channel)
         if index is None:
             index = chunk.indexes[channel] = array("Q")
@@ -240,7 +240,7 @@ class FileWriter:
         index.append(log_ns)
         index.append(chunk.size)
         header = pack_message_head(channel, sequence, log_ns, times[1], size)
-        chunk.parts.append(header + before if before else header)
+        chunk.parts.append(header + prefix if prefix else header)
         chunk.parts.append(data)
         chunk.size += len(header) + size
 
@@ -284,8 +284,8 @@ class FileWriter:
         self.flush()
         counts = {number: message_count(index) for number, index in indexes.items()}
         self.write_channels(counts)
-        copied = replace(info, offset=self._position, packed_offsets=b"", index_bytes=0)
-        self._write_chunk(copied, [record], indexes, counts)
+        new_info = replace(info, offset=self._position, packed_offsets=b"", index_bytes=0)
+        self._write_chunk(new_info, [record], indexes, counts)
 
     def _write_chunk(
         self,
@@ -316,19 +316,19 @@ class FileWriter:
         Args:
             channels: Mapping whose keys are channel ids; the values are ignored.
         """
-        new = [number for number in channels if number not in self._written_channels]
-        if not new:
+        new_channels = [number for number in channels if number not in self._written_channels]
+        if not new_channels:
             return
         parts: list[bytes | memoryview] = []
         schemas: set[int] = set()
-        for number in new:
+        for number in new_channels:
             schema, channel = self.table.records(number)
             if schema is not None and schema.id not in self._written_schemas and schema.id not in schemas:
                 schemas.add(schema.id)
                 parts.append(pack_record(schema))
             parts.append(pack_record(channel))
         self._write(b"".join(parts))
-        self._written_channels.update(new)
+        self._written_channels.update(new_channels)
         self._written_schemas |= schemas
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:

@@ -77,8 +77,8 @@ def parse_stats(value: object) -> TopicStats | None:
     lost = value.get("lost")
     names = ("received", "late", "undecodable", "unkept", "size_bytes")
     counts = {name: each for name in names if type(each := value.get(name)) is int and each >= 0}
-    is_whole = len(counts) == len(names) and (lost is None or (type(lost) is int and lost >= 0))
-    return TopicStats(lost=lost, **counts) if is_whole else None
+    is_complete = len(counts) == len(names) and (lost is None or (type(lost) is int and lost >= 0))
+    return TopicStats(lost=lost, **counts) if is_complete else None
 
 
 @dataclass
@@ -123,17 +123,17 @@ class TopicCounter:
             self.undecodable += 1
         if seq is None:
             return
-        numbers = self._publishers.get(publisher)
-        if numbers is None:
+        sequence_range = self._publishers.get(publisher)
+        if sequence_range is None:
             if len(self._publishers) < MAX_PUBLISHERS:
                 self._publishers[publisher] = _SequenceRange(seq, seq, 1)
             return
-        numbers.received += 1
-        if seq > numbers.last:
-            numbers.last = seq
+        sequence_range.received += 1
+        if seq > sequence_range.last:
+            sequence_range.last = seq
         else:
             self.late += 1
-            numbers.first = min(numbers.first, seq)
+            sequence_range.first = min(sequence_range.first, seq)
 
     def count_dropped(self, publisher: int | None, count: int, size_bytes: int) -> None:
         """Count received messages of a publisher that are not recorded because the queue is full.
@@ -147,9 +147,9 @@ class TopicCounter:
         self.unkept += count
         self.size_bytes += size_bytes
         self.is_changed = True
-        numbers = self._publishers.get(publisher)
-        if numbers is not None:
-            numbers.received += count
+        sequence_range = self._publishers.get(publisher)
+        if sequence_range is not None:
+            sequence_range.received += count
 
     def stats(self) -> TopicStats:
         """Return the current counts."""

@@ -61,8 +61,8 @@ def timestamp_field(number: int, stamp_ns: int) -> bytes:
         number: Number of the field.
         stamp_ns: Time in ns since 1970.
     """
-    seconds, rest = divmod(stamp_ns, _NS_PER_S)
-    return _complete_field(number, b"\x08" + _encode_varint(seconds) + b"\x10" + _encode_varint(rest))
+    seconds, nanoseconds = divmod(stamp_ns, _NS_PER_S)
+    return _complete_field(number, b"\x08" + _encode_varint(seconds) + b"\x10" + _encode_varint(nanoseconds))
 
 
 def _read_varint(data: memoryview, offset: int) -> tuple[int, int]:
@@ -135,9 +135,9 @@ SCHEMAS: Mapping[str, _Fields] = {
 """Fields of each message, by the name of the message."""
 
 
-def _message_descriptor(name: str, fields_of_it: _Fields) -> bytes:
+def _message_descriptor(name: str, field_types: _Fields) -> bytes:
     encoded = _complete_field(1, name.encode())
-    for field_name, (number, kind) in fields_of_it.items():
+    for field_name, (number, kind) in field_types.items():
         encoded_field = _complete_field(1, field_name.encode())
         encoded_field += (
             b"\x18" + _encode_varint(number) + b"\x20\x01\x28" + _encode_varint(kind)
@@ -148,10 +148,10 @@ def _message_descriptor(name: str, fields_of_it: _Fields) -> bytes:
     return encoded
 
 
-def _file_descriptor(name: str, package: str, depends_on: str, message: bytes) -> bytes:
+def _file_descriptor(name: str, package: str, dependency: str, message: bytes) -> bytes:
     encoded = _complete_field(1, name.encode()) + _complete_field(2, package.encode())
-    if depends_on:
-        encoded += _complete_field(3, depends_on.encode())
+    if dependency:
+        encoded += _complete_field(3, dependency.encode())
     return encoded + _complete_field(4, message) + _complete_field(12, b"proto3")
 
 
@@ -164,9 +164,11 @@ def descriptor_set(schema: str) -> bytes:
     """
     package, name = schema.split(".")
     message = _message_descriptor(name, SCHEMAS[schema])
-    needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""
+    dependency = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""
     encoded = b""
-    if needs:
+    if dependency:
         stamp = _message_descriptor("Timestamp", {"seconds": (1, _INT64), "nanos": (2, _INT32)})
-        encoded += _complete_field(1, _file_descriptor(needs, "google.protobuf", "", stamp))
-    return encoded + _complete_field(1, _file_descriptor(f"{package}/{name}.proto", package, needs, message))
+        encoded += _complete_field(1, _file_descriptor(dependency, "google.protobuf", "", stamp))
+    return encoded + _complete_field(
+        1, _file_descriptor(f"{package}/{name}.proto", package, dependency, message)
+    )

@@ -207,11 +207,11 @@ def read_chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None
     """
     if len(record) < HEAD_BYTES + _CHUNK.size:
         return None
-    start_ns, end_ns, uncompressed, crc, letters = _CHUNK.unpack_from(record, HEAD_BYTES)
-    offset = HEAD_BYTES + _CHUNK.size + letters
-    if letters > 16 or len(record) < offset + _SIZE.size or max(uncompressed, length) > MAX_CHUNK_BYTES:
+    start_ns, end_ns, uncompressed, crc, name_bytes = _CHUNK.unpack_from(record, HEAD_BYTES)
+    offset = HEAD_BYTES + _CHUNK.size + name_bytes
+    if name_bytes > 16 or len(record) < offset + _SIZE.size or max(uncompressed, length) > MAX_CHUNK_BYTES:
         return None
-    compression = bytes(record[offset - letters : offset])
+    compression = bytes(record[offset - name_bytes : offset])
     (data_bytes,) = _SIZE.unpack_from(record, offset)
     offset += _SIZE.size
     if compression not in {b"", b"lz4", b"zstd"} or offset + data_bytes != HEAD_BYTES + length:
@@ -233,9 +233,9 @@ def pack_chunk(
         crc: CRC-32 of the decompressed data.
         times: Log times of the first and last message in ns since 1970.
     """
-    letters = compression.encode("ascii")
-    rest = _CHUNK.pack(*times, uncompressed_bytes, crc, len(letters)) + letters + _SIZE.pack(len(data))
-    return RECORD_HEAD.pack(Opcode.CHUNK, len(rest) + len(data)) + rest
+    name = compression.encode("ascii")
+    content = _CHUNK.pack(*times, uncompressed_bytes, crc, len(name)) + name + _SIZE.pack(len(data))
+    return RECORD_HEAD.pack(Opcode.CHUNK, len(content) + len(data)) + content
 
 
 # ---- indexes
@@ -255,8 +255,8 @@ def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
         channel: Id of the channel.
         entries: Alternating log times and offsets.
     """
-    rest = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)
-    return RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, len(rest)) + rest
+    content = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)
+    return RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, len(content)) + content
 
 
 def message_count(index: bytes | memoryview) -> int:
@@ -320,8 +320,8 @@ class ChunkInfo:
 
     def has_index_at(self, offset: int) -> bool:
         """Return True if a message index may start at an offset, which must follow the chunk."""
-        after = self.offset + self.length
-        return after <= offset < after + self.index_bytes
+        chunk_end = self.offset + self.length
+        return chunk_end <= offset < chunk_end + self.index_bytes
 
     @property
     def counts(self) -> dict[int, int]:
@@ -331,12 +331,12 @@ class ChunkInfo:
         """
         if self.packed_counts:
             return dict(_OFFSET.iter_unpack(self.packed_counts))
-        after = self.offset + self.length
-        end = after + self.index_bytes
+        chunk_end = self.offset + self.length
+        end = chunk_end + self.index_bytes
         counts = {}
         pairs = sorted(_OFFSET.iter_unpack(self.packed_offsets), key=_second, reverse=True)
         for channel, offset in pairs:
-            if after <= offset < end:
+            if chunk_end <= offset < end:
                 counts[channel] = max(0, end - offset - _INDEX_HEAD_BYTES) // _ENTRY.size
                 end = offset
         return counts
@@ -363,11 +363,11 @@ def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
         position = _CHUNK_INDEX_FIELDS.size + size
         if size % _OFFSET.size or position > len(content):
             raise ValueError("size")
-        index_bytes, letters = _INDEX_LENGTH.unpack_from(content, position)
+        index_bytes, name_bytes = _INDEX_LENGTH.unpack_from(content, position)
         packed_offsets = bytes(content[_CHUNK_INDEX_FIELDS.size : position])
         position += _INDEX_LENGTH.size
-        compression = str(content[position : position + letters], "ascii")
-        sizes = _SIZES.unpack_from(content, position + letters)
+        compression = str(content[position : position + name_bytes], "ascii")
+        sizes = _SIZES.unpack_from(content, position + name_bytes)
     except struct.error as error:
         raise ValueError(str(error)) from error
     return ChunkInfo(start_ns, end_ns, offset, length, packed_offsets, index_bytes, compression, *sizes)
@@ -375,14 +375,14 @@ def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
 
 def pack_chunk_info(info: ChunkInfo) -> bytes:
     """Encode a chunk index record."""
-    letters = info.compression.encode("ascii")
-    rest = (
+    name = info.compression.encode("ascii")
+    content = (
         _CHUNK_INDEX_FIELDS.pack(
             info.start_ns, info.end_ns, info.offset, info.length, len(info.packed_offsets)
         )
         + info.packed_offsets
-        + _INDEX_LENGTH.pack(info.index_bytes, len(letters))
-        + letters
+        + _INDEX_LENGTH.pack(info.index_bytes, len(name))
+        + name
         + _SIZES.pack(info.compressed_bytes, info.uncompressed_bytes)
     )
-    return RECORD_HEAD.pack(Opcode.CHUNK_INDEX, len(rest)) + rest
+    return RECORD_HEAD.pack(Opcode.CHUNK_INDEX, len(content)) + content

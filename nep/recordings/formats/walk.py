@@ -8,8 +8,8 @@ from typing import BinaryIO, NamedTuple
 from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget
 from nep.recordings.formats.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
 
-_SMALL_WINDOW, _LARGE_WINDOW = 4_096, 1_048_576
-_BUDGET_INTERVAL = 1_000
+_SMALL_WINDOW_BYTES, _LARGE_WINDOW_BYTES = 4_096, 1_048_576
+_BUDGET_INTERVAL_RECORDS = 1_000
 
 
 class RecordLocation(NamedTuple):
@@ -38,7 +38,7 @@ def walk_records(
     size: int,
     budget: ReadBudget,
     offset: int = len(MAGIC),
-    begin_bytes: int = 64,
+    prefix_bytes: int = 64,
 ) -> Iterator[RecordLocation]:
     """Iterate over the records of a file up to `size`, or to the first invalid bytes.
 
@@ -50,19 +50,19 @@ def walk_records(
         size: Offset at which to stop, such as the size of the file.
         budget: Limit of the work.
         offset: Offset of the first record.
-        begin_bytes: Number of content bytes to return in `RecordLocation.prefix`.
+        prefix_bytes: Number of content bytes to return in `RecordLocation.prefix`.
 
     Raises:
         RecordingTooLargeError: The budget is exceeded.
         OSError: The file can't be read.
     """
-    window, base, step, count = b"", offset, _SMALL_WINDOW, 0
+    window, base, step, count = b"", offset, _SMALL_WINDOW_BYTES, 0
     while offset + HEAD_BYTES <= size:
         window_offset = offset - base
-        if window_offset + HEAD_BYTES + begin_bytes > len(window):
-            step = min(2 * step, _LARGE_WINDOW) if window_offset <= len(window) else _SMALL_WINDOW
+        if window_offset + HEAD_BYTES + prefix_bytes > len(window):
+            step = min(2 * step, _LARGE_WINDOW_BYTES) if window_offset <= len(window) else _SMALL_WINDOW_BYTES
             file.seek(offset)
-            window, base, window_offset = file.read(max(step, HEAD_BYTES + begin_bytes)), offset, 0
+            window, base, window_offset = file.read(max(step, HEAD_BYTES + prefix_bytes)), offset, 0
             if len(window) < HEAD_BYTES:
                 return
         opcode, length = RECORD_HEAD.unpack_from(window, window_offset)
@@ -70,9 +70,9 @@ def walk_records(
             return
         window_offset += HEAD_BYTES
         count += 1
-        if count % _BUDGET_INTERVAL == 0:
-            budget.spend(_BUDGET_INTERVAL * RECORD_COST_BYTES)
+        if count % _BUDGET_INTERVAL_RECORDS == 0:
+            budget.spend(_BUDGET_INTERVAL_RECORDS * RECORD_COST_BYTES)
         yield RecordLocation(
-            offset, opcode, length, window[window_offset : window_offset + min(length, begin_bytes)]
+            offset, opcode, length, window[window_offset : window_offset + min(length, prefix_bytes)]
         )
         offset += HEAD_BYTES + length

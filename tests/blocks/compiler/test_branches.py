@@ -62,7 +62,7 @@ def test_else_if_compiles_to_elif_and_else_comes_last() -> None:
         ("control_if_else", {"elseIfs": 0, "else": False}, False),
     ],
 )
-def test_outdated_or_invalid_branch_state_falls_back_to_the_default_of_the_block_type(
+def test_else_branch_follows_the_saved_state_or_if_missing_or_invalid_the_block_type(
     kind: str, extra: object, has_else: bool
 ) -> None:
     found = lines(chosen(extra, kind, ELSE=[write(text("none"))]))

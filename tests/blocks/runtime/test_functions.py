@@ -62,12 +62,14 @@ def test_inputs_are_local_to_call_and_variables_are_global() -> None:
     )  # fmt: skip
     run = play(
         workspace(
-            started(call("g", who=text("Ada")), call("g", who=text("Bob")), write(get("count"))),
+            started(
+                call("g", who=text("Ada")), call("g", who=text("Bob")), write(get("count")), write(get("who"))
+            ),
             greet,
             variables=("count", "who"),
         )
     )
-    assert run.lines == ["Ada", "Bob", "2"]
+    assert run.lines == ["Ada", "Bob", "2", "0"]
 
 
 def test_infinite_recursion_is_stopped_with_explanation() -> None:
@@ -174,7 +176,7 @@ def test_call_of_missing_function_is_an_error_with_fix() -> None:
     run = play(saved)
     (problem,) = run.program.errors
     sentence = "The function “greet” is missing. Define it, or delete this block."
-    assert (problem.message, problem.block_id, problem.fix) == (sentence, "c", "Define it")
+    assert (problem.message, problem.block_id, problem.fix) == (sentence, "c", "Define the function")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
     fixed = fix(saved, str(problem.fix_action))

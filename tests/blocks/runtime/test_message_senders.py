@@ -17,7 +17,7 @@ from app.robots.identity import subscriber_nodes
 from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import WireRobot
-from tests.robots.message_senders import WhoseWordsCount, answer
+from tests.robots.message_senders import MessageSenderContract, answer
 
 pytestmark = pytest.mark.usefixtures("patient")
 
@@ -95,7 +95,7 @@ class Program:
         return not find_robots(self._node, 30.0).rejected_claims
 
 
-class TestAProgram(WhoseWordsCount):
+class TestProgramSenders(MessageSenderContract):
     """Sender checks of every participant, run for a program."""
 
     @pytest.fixture

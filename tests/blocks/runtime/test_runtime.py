@@ -159,7 +159,7 @@ def test_script_waits_for_first_sensor_value(running):
     run = running(workspace(started(write(block("robot_pepper_get_battery", ROBOT="Pepper")))), link)
     until(lambda: run.runtime.scheduler.snapshot().blocks != ())
     link.sensors["Pepper", "battery"] = 50
-    link.poke()
+    link.on_change()
     run.end()
     assert run.lines == ["50"]
 
@@ -169,7 +169,7 @@ def test_program_ends_when_another_program_stops_the_robot(running):
     link.held = {"say"}
     run = running(workspace(started(say("Hi"), say("again"))), link)
     until(lambda: bool(link.calls))
-    link.stopped_outside("Pepper")
+    link.on_external_stop("Pepper")
     run.end()
     assert run.runtime.error is not None
     assert run.runtime.error.sentence == "Pepper was stopped by another program, so the behaviour ended."
@@ -210,7 +210,7 @@ def test_skipped_events_of_slow_script_are_counted(running):
         link.happen("/x", each)
     link.held.clear()
     link.answer(link.calls[0], "succeeded")
-    link.poke()
+    link.on_change()
     until(lambda: len(link.calls) == 17)
     until(
         lambda: run.lines == ["“when a message arrives on /x” couldn't keep up: 4 of its events were skipped"]

@@ -134,7 +134,7 @@ def test_step_runs_wait_to_its_end(stage):
     assert stage.did == ["waited"]
 
 
-def test_step_during_wait_ends_the_wait(stage):
+def test_step_during_a_wait_completes_the_remaining_wait(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("wait")
         stage.scheduler.wait(1.0)

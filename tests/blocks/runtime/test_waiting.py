@@ -1,4 +1,4 @@
-"""Tests of waiting for a busy robot, and of the error for a robot without a heartbeat."""
+"""Tests of waiting for a busy robot, and of the error for a robot whose heartbeat stops."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkey
     assert run.end().lines == ["after"]
 
 
-def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
+def test_robot_whose_heartbeat_stops_is_an_error_at_the_block(monkeypatch) -> None:
     monkeypatch.setattr("app.blocks.runtime.robot_handle.MIN_SILENCE_S", 0.3)
     link = FakeLink()
     link.held = {"say"}

@@ -43,5 +43,5 @@ def test_slot_used_only_for_one_choice_is_described_in_help() -> None:
     told = help_of(CATALOGUE.blocks["lists_get"])
     assert told["title"] == "(where) (number) of (list)"
     assert told["gaps"][1] == [  # type: ignore[index]
-        "number", "a number; 1 by default; used only if you choose an item by its number",
+        "number", "a number; 1 by default; used only if you choose by number",
     ]  # fmt: skip

@@ -49,7 +49,7 @@ def words(block_type: str) -> str:
         ("values_text", "[TEXT]"),
     ],
 )
-def test_block_texts_match_the_design(block_type, expected):
+def test_block_texts_contain_their_fields_and_slots_in_order(block_type, expected):
     assert words(block_type) == expected
 
 
@@ -128,7 +128,7 @@ def test_long_category_has_headings_between_its_blocks():
     assert shown[shown.index("Change a list") + 1] == "lists_add"
 
 
-def test_category_can_be_nested_under_its_title():
+def test_combined_category_has_a_heading_for_each_of_its_parts():
     (numbers,) = [item for item in DEFINITIONS["toolbox"]["contents"] if item["name"] == "Numbers and logic"]  # type: ignore[index]
     shown = [entry.get("text") or entry["type"] for entry in numbers["contents"]]
     assert shown[:2] == ["Logic", "values_compare"]

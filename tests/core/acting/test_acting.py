@@ -26,32 +26,32 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         tick_until(session, lambda: "sum" in getattr(session.live.graph, "services", {}))
         assert acting.send(STILL) == ""
         assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
-        (armed,) = acting.sent.records
+        (armed,) = acting.sent_log.records
         assert (armed.origin, armed.result_text) == ("switch", "armed for 5 min")
         is_there, first = heard.listen(timeout_s=20.0)
         assert is_there
-        tick_until(session, lambda: "a" in acting.last)
-        assert result_text(acting.last["a"]) == "received by 1"
+        tick_until(session, lambda: "a" in acting.last_results)
+        assert result_text(acting.last_results["a"]) == "1 subscriber"
         assert acting.call("sum", '{"a": 2, "b": 3}', 20.0) == ""
         tick_until(session, lambda: acting.calls.in_flight is None)
         assert acting.calls.records[-1].reply == {"sum": 5}
         assert call_text(acting.calls.records[-1]).startswith("replied in ")
         assert acting.saved_messages.requests["sum"] == '{"a": 2, "b": 3}'
-        sent, called = list(acting.sent.records)[1:]
+        sent, called = list(acting.sent_log.records)[1:]
         assert (sent.origin, sent.name, sent.result_text) == (
             "publish",
             "/cmd_vel",
-            "Stand still, received by 1",
+            "Stand still, 1 subscriber",
         )
         assert json.loads(sent.text) == first
         assert (called.origin, called.name, called.is_error) == ("service", "sum", False)
         assert called.text == '{"a": 2, "b": 3}'
-        assert acting.sent.total == 2
+        assert acting.sent_log.total == 2
         assert acting.resend(sent.number) == acting.resend(called.number) == ""
         is_there, again = heard.listen(timeout_s=20.0)
         assert is_there
         assert again["id"] != first["id"]
-        tick_until(session, lambda: acting.sent.total == 4)
+        tick_until(session, lambda: acting.sent_log.total == 4)
         assert acting.resend(armed.number) == "This can't be sent again."
         assert acting.send(STILL, rate_hz=20.0) == ""
         is_there, second = heard.listen(timeout_s=20.0)
@@ -65,10 +65,10 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.resend(sent.number) == "Sending to /cmd_vel isn't armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
-        tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent.records))
+        tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent_log.records))
     said = [each.text for each in session.console.records]
     assert "armed for 5 min" in said
-    assert "/cmd_vel: Stand still, received by 1" in said
+    assert "/cmd_vel: Stand still, 1 subscriber" in said
     assert "no longer armed" in said
 
 
@@ -121,7 +121,7 @@ def test_file_of_saved_messages_of_newer_version_is_not_overwritten(tmp_path: Pa
 def test_send_results_are_formatted() -> None:
     order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
-        (SendResult(order, "sent", subscriber_count=2), "received by 2"),
+        (SendResult(order, "sent", subscriber_count=2), "2 subscribers"),
         (SendResult(order, "sent"), "no subscribers"),
         (SendResult(order, "began"), "started"),
         (SendResult(order, "ended", count=412, dropped_count=3), "412 sent, 3 late messages skipped"),

@@ -48,7 +48,7 @@ def test_job_failure_is_raised_when_the_result_is_requested_and_next_job_runs(be
         raise ValueError("no such luck")
 
     beside.submit("a", fail)
-    until(lambda: bool(beside._failed))
+    until(lambda: bool(beside._errors))
     with pytest.raises(ValueError, match="no such luck"):
         beside.pop_result("a")
     beside.submit("a", lambda: "well")

@@ -81,6 +81,7 @@ def test_corrupted_file_opens_or_is_rejected_with_reason(tmp_path: Path) -> None
     whole = (resources.path("examples") / "1-greeting.nepb").read_bytes()
     dice = random.Random(3)
     path = tmp_path / "x.nepb"
+    reasons: list[str] = []
     for _ in range(300):
         data = bytearray(whole)
         for _ in range(dice.randint(1, 8)):
@@ -89,9 +90,12 @@ def test_corrupted_file_opens_or_is_rejected_with_reason(tmp_path: Path) -> None
         document = Document(lambda: Journal(tmp_path / "journal"))
         try:
             document.open(path)
-        except DocumentError:
+        except DocumentError as error:
+            reasons.append(error.reason)
             continue
         document.program()  # a file that opens may have problems, but must not raise an exception
+    assert reasons
+    assert all(reasons)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-32"])

@@ -28,11 +28,11 @@ def test_unchanged_behaviour_has_no_difference() -> None:
 def test_added_removed_and_changed_blocks_are_counted() -> None:
     then = stack(block("a", "x", block("b", "y")), block("c"))
     now = stack(block("a", "other", block("d")), block("c"), block("e"))
-    assert difference(then, now) == Difference(3, added=2, removed=1, changed=1)
+    assert difference(then, now) == Difference(3, added_count=2, removed_count=1, changed_count=1)
 
 
 def test_shadow_text_change_counts_as_changed_block() -> None:
-    assert difference(stack(block("a", "x")), stack(block("a"))) == Difference(1, changed=1)
+    assert difference(stack(block("a", "x")), stack(block("a"))) == Difference(1, changed_count=1)
 
 
 def test_reordered_blocks_are_reported_as_moved() -> None:

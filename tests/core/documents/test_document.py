@@ -172,7 +172,7 @@ def test_saved_behaviour_reopens_unchanged_and_its_journal_is_deleted(
 
 
 def test_save_without_file_raises_with_advice(document: Document) -> None:
-    with pytest.raises(DocumentError, match="choose one"):
+    with pytest.raises(DocumentError, match="choose a file"):
         document.save()
 
 

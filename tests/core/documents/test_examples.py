@@ -132,7 +132,7 @@ def test_robot_speaks_spanish_in_translated_example(language: str) -> None:
 
 @pytest.mark.parametrize(("language", "last"), [("es", "Respuestas correctas: 2 de 3"), ("qps", "2")],
                          indirect=["language"])  # fmt: skip
-def test_quiz_comparison_works_in_every_language(language: str, last: str) -> None:
+def test_quiz_comparison_works_in_translated_examples(language: str, last: str) -> None:
     link = FakeLink()
     link.sensors[("Pepper", "head_touched")] = True  # always true
     play = run("4-a-quiz", link)

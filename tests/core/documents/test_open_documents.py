@@ -192,7 +192,7 @@ def test_tabs_are_restored_with_unsaved_work(opened, documents, journals, tmp_pa
     documents.close_all()
     as_if_dead(journals)
     after = opened()
-    taken = after.restore_tabs(kept, unsaved_work(journals), ended_well=True)
+    taken = after.restore_tabs(kept, unsaved_work(journals), has_ended_normally=True)
     assert names(after) == ["A", "New behaviour", "B"]
     assert [document.dirty for document in after] == [True, True, False]
     assert next(iter(after)).workspace == OTHER
@@ -212,7 +212,7 @@ def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
     as_if_dead(journals)
     after = opened()
     left = unsaved_work(journals)
-    assert after.restore_tabs(kept, left, ended_well=False) == set()
+    assert after.restore_tabs(kept, left, has_ended_normally=False) == set()
     assert (names(after), after.current.workspace, after.current.dirty) == (["A"], STARTED, False)
     after.recover(left[0])
     assert (names(after), after.current.workspace, after.current.dirty) == (["A"], OTHER, True)
@@ -227,7 +227,7 @@ def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
     ],
 )
 def test_invalid_tab_settings_open_only_an_empty_behaviour(documents, kept) -> None:
-    documents.restore_tabs(kept, [], ended_well=True)
+    documents.restore_tabs(kept, [], has_ended_normally=True)
     assert names(documents) == ["New behaviour"]
 
 
@@ -237,7 +237,7 @@ def test_damaged_file_is_not_reopened(opened, documents, tmp_path) -> None:
     kept = documents.tabs_state()
     path.write_text("{")
     after = opened()
-    after.restore_tabs(kept, [], ended_well=True)
+    after.restore_tabs(kept, [], has_ended_normally=True)
     assert after.current.is_blank
 
 

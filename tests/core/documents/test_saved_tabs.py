@@ -57,7 +57,7 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Start]]:
 def test_after_clean_exit_unsaved_work_is_restored_without_asking(start) -> None:
     first = start()
     first.work()
-    first.tabs.save(ended_well=True)
+    first.tabs.save(has_ended_normally=True)
     first.documents.close_all()
     as_if_dead(first.journals)
     after = start()
@@ -79,7 +79,7 @@ def test_after_crash_user_is_asked_about_unsaved_work(start) -> None:
 def test_clean_exit_flag_applies_to_one_start_only(start, tmp_path: Path) -> None:
     first = start()
     first.work()
-    first.tabs.save(ended_well=True)
+    first.tabs.save(has_ended_normally=True)
     start().work()
     assert Settings(tmp_path).get("tabs", {})["ended_well"] is False
 
@@ -89,7 +89,7 @@ def test_second_window_does_not_overwrite_saved_tabs(start, tmp_path: Path) -> N
     second = start()
     second.documents.new()
     second.documents.current.apply_edit(STARTED)
-    second.tabs.save(ended_well=True)
+    second.tabs.save(has_ended_normally=True)
     kept = Settings(tmp_path).get("tabs", {})
     assert [Path(each["path"]).name for each in kept["tabs"]] == ["A.nepb"]
     assert kept["ended_well"] is False
@@ -100,7 +100,7 @@ def test_unwritable_settings_are_reported(start, tmp_path: Path) -> None:
     first.work()
     (tmp_path / "settings.json").unlink()
     (tmp_path / "settings.json").mkdir()
-    first.tabs.save(ended_well=True)
+    first.tabs.save(has_ended_normally=True)
     assert len(first.complaints) == 1
     assert first.complaints[0].startswith("can't save settings in ")
 

@@ -74,10 +74,9 @@ def test_node_positions_are_stable_when_nodes_join_and_leave() -> None:
     first = arrange(LAB)
     more = graph({"g": "abcdkm", "h": "ef", "i": "x", "j": "n"}, "ab bc cd de ef fa xa ax ak km na")
     second = arrange(more, first)
-    untouched = [key for key in "ef" if "h" in second.groups]
     assert all(second.positions[key] == first.positions[key] for key in "abcd")
     assert overlapping(second) == []
-    assert untouched
+    assert "h" in second.groups
     fewer = arrange(graph({"g": "abkm", "h": "e", "j": "n"}, "ab ak"), second)
     assert all(fewer.positions[key] == second.positions[key] for key in "abkmen")
     back = arrange(more, fewer)

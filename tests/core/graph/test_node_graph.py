@@ -158,13 +158,15 @@ def test_internal_topics_and_services_are_drawn_on_request() -> None:
 
 
 def test_collapsed_group_is_one_box_with_all_lines_of_its_nodes() -> None:
-    graph = node_graph(facts(), GraphOptions(toggled=frozenset({"host:lab-pc"})))
+    graph = node_graph(facts(), GraphOptions(toggled_groups=frozenset({"host:lab-pc"})))
     assert {(each.kind, each.key, each.member_count) for each in graph.nodes} == {
         ("group", "host:lab-pc", 5),
         ("program", "|pepper|pepper_driver", 1),
     }
     assert {line.topics for line in graph.lines} == {("/Pepper/odom", "/Pepper/touch"), ("robot_action",)}
-    again = node_graph(facts(), GraphOptions(starts_collapsed=True, toggled=frozenset({"host:pepper"})))
+    again = node_graph(
+        facts(), GraphOptions(starts_collapsed=True, toggled_groups=frozenset({"host:pepper"}))
+    )
     assert again == graph
 
 

@@ -20,7 +20,7 @@ def numbers(history: MessageHistory) -> list[int | None]:
 
 
 def test_oldest_messages_are_evicted_and_remaining_messages_keep_their_index() -> None:
-    history = MessageHistory(most_messages=3)
+    history = MessageHistory(max_messages=3)
     for number in range(5):
         history.add(message(number))
     assert (numbers(history), history.first, history.end, len(history)) == ([2, 3, 4], 2, 5, 3)
@@ -31,7 +31,7 @@ def test_oldest_messages_are_evicted_and_remaining_messages_keep_their_index() -
 
 
 def test_history_is_limited_in_bytes_but_keeps_newest_message_of_any_size() -> None:
-    history = MessageHistory(most_bytes=100)
+    history = MessageHistory(max_bytes=100)
     for number in range(20):
         history.add(message(number, 30))
     assert (len(history), history.size_bytes) == (3, 90)
@@ -61,6 +61,7 @@ def test_latency_is_computed_once_on_arrival() -> None:
     first, again = history.at(0), history.at(0)
     assert first is not None
     assert again is not None
+    assert sent.latency_s is not None
     assert first.latency_s == again.latency_s == sent.latency_s
 
 

@@ -162,7 +162,7 @@ def test_unexpected_decoder_exception_does_not_stop_later_images(images: Images,
     stream = images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.error is not None)
-    assert stream.error == "“/camera” sends an image that can't be shown: 'no such thing'"
+    assert stream.error == "An image on “/camera” can't be shown: 'no such thing'"
     images.offer([jpeg((4, 5, 6), seq=2)])
     until(lambda: stream.picture is not None)
     assert stream.error is None

@@ -66,7 +66,7 @@ def test_invalid_value_is_marked_and_other_values_are_readable() -> None:
     root = index('{"good": 1, "bad": oops, "none" , "last": 2}').root
     assert isinstance(root, LazyObject)
     assert (root["good"], root["last"]) == (1, 2)
-    assert str(root["bad"]) == "no JSON: oops"
+    assert str(root["bad"]) == "invalid JSON: oops"
     assert isinstance(root["none"], UnreadableValue)
 
 

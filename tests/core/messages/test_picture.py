@@ -88,7 +88,7 @@ def test_grey_and_depth_images_have_pixel_values() -> None:
     small, _ = decode(raw(np.zeros((400, 600), np.uint8), "mono8"), 0.0, (60, 40))
     assert small is not None
     assert small.bgra.shape == (50, 75, 4)
-    assert small.numbers is None
+    assert small.channel_values is None
 
 
 @pytest.mark.parametrize(

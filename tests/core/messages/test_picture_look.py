@@ -41,7 +41,7 @@ def test_brightness_and_contrast_are_applied_and_clipped() -> None:
 @pytest.mark.parametrize("name", COLOUR_MAPS)
 def test_pixel_colours_match_the_colour_scale(name) -> None:
     depth = np.array([[100, 600, 1100]], np.uint16)
-    bgra, scale = apply_colour_map(PictureStyle(colours=name), depth)
+    bgra, scale = apply_colour_map(PictureStyle(colour_map=name), depth)
     assert (scale.low, scale.high) == (100.0, 1100.0)
     assert bgra[0, 0, 2::-1].tolist() == scale.colours[0].tolist()
     assert bgra[0, 1, 2::-1].tolist() == scale.colours[127].tolist()
@@ -50,7 +50,7 @@ def test_pixel_colours_match_the_colour_scale(name) -> None:
 
 def test_custom_range_clips_values_outside() -> None:
     depth = np.array([[0.0, 1.0, 2.0, 9.0, np.nan, np.inf]], np.float32)
-    bgra, scale = apply_colour_map(PictureStyle(colours="grey", low=1.0, high=3.0), depth)
+    bgra, scale = apply_colour_map(PictureStyle(colour_map="grey", low=1.0, high=3.0), depth)
     assert (scale.low, scale.high) == (1.0, 3.0)
     assert bgra[0, :, 0].tolist() == [0, 0, 127, 255, 0, 0]
 
@@ -81,7 +81,7 @@ def test_decoded_image_reports_its_appearance_and_colour_scale() -> None:
     plain, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0)
     assert plain is not None
     assert (plain.scale, plain.style) == (None, PLAIN)
-    look = PictureStyle(colours="jet", brightness=0.1)
+    look = PictureStyle(colour_map="jet", brightness=0.1)
     shown, _error = decode(message(np.array([[0, 255]], np.uint8)), 0.0, None, look)
     assert shown is not None
     assert shown.scale is not None

@@ -105,25 +105,27 @@ MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
     ],
 )
 def test_expensive_query_stops_at_step_limit_with_explanation(text) -> None:
-    answer = JsonQuery(text).evaluate(MANY, most_steps=5000)
-    assert answer.cut == "Search stopped after 5000 values; these were found so far."
+    answer = JsonQuery(text).evaluate(MANY, max_steps=5000)
+    assert answer.incomplete_reason == (
+        "The search stopped after 5000 values. Only the matches found until then are shown."
+    )
 
 
 def test_comparing_long_lists_counts_towards_step_limit() -> None:
     lists = {"a": list(range(4000)), "b": list(range(4000))}
-    answer = JsonQuery("$[?$.a == $.b]").evaluate(lists, most_steps=3000)
-    assert answer.cut.startswith("Search stopped after 3000 values")
+    answer = JsonQuery("$[?$.a == $.b]").evaluate(lists, max_steps=3000)
+    assert answer.incomplete_reason.startswith("The search stopped after 3000 values")
 
 
 def test_number_of_results_and_depth_are_limited() -> None:
-    answer = JsonQuery("$..age").evaluate(MANY, most_found=10)
-    assert (len(answer.values), answer.cut) == (10, "Only the first 10 are shown.")
+    answer = JsonQuery("$..age").evaluate(MANY, max_results=10)
+    assert (len(answer.values), answer.incomplete_reason) == (10, "Only the first 10 matches are shown.")
     deep: dict[str, object] = {}
     for _each in range(500):
         deep = {"a": deep}
     answer = JsonQuery("$..*").evaluate(deep)
     assert answer.values
-    assert answer.cut
+    assert answer.incomplete_reason
 
 
 def test_query_works_on_lazy_large_message() -> None:

@@ -37,7 +37,7 @@ class FakeWebServer:
         self.foxglove = self.settings.foxglove
         self.pages: tuple[ConnectedPage, ...] = ()
         self.rejections: tuple[Rejection, ...] = ()
-        self.rosbridge = self.settings.rosbridge
+        self.rosbridge = self.settings.is_rosbridge_enabled
         self.kept_out: set[int] = set()
         self.has_ended = False
 
@@ -55,8 +55,8 @@ class FakeWebServer:
         self.foxglove = channels  # type: ignore[assignment]
         return 0
 
-    def set_rosbridge(self, on: bool) -> int:
-        self.rosbridge = on
+    def set_rosbridge(self, is_enabled: bool) -> int:
+        self.rosbridge = is_enabled
         return 0
 
     def unblock_page(self, page_id: int) -> None:

@@ -53,7 +53,7 @@ def test_malformed_messages_at_1000_hz_are_one_alert_with_exact_count(
         tick_until(session, lambda: bad_count(session, "/bad") >= 1500)
         (alert,) = session.alerts.active
         assert alert.count == 1500
-        assert "(1500 messages)" in alert.title
+        assert "1500 messages on /bad" in alert.title
         publisher.publish({"good": True})
         tick_until(session, lambda: not session.alerts.active)
 
@@ -65,10 +65,12 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
         for _ in range(sent):
             publisher.publish_bytes(BAD)
         tried = session._checks._results
-        until(lambda: "/bad" in tried and tried["/bad"].checked == sent, "all arrive while nobody ticks")
+        until(
+            lambda: "/bad" in tried and tried["/bad"].checked_count == sent, "all arrive while nobody ticks"
+        )
         tick_until(session, lambda: session.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
-        assert f"({sent} messages)" in session.alerts.active[0].title
+        assert f"{sent} messages on /bad" in session.alerts.active[0].title
         assert session.topics["/bad"].displayed_and_sent_counts == (
             MAX_MESSAGES_PER_TOPIC,
             sent,
@@ -146,8 +148,6 @@ def test_messages_of_50_mb_are_received_or_counted_as_lost(session: Session, tal
         newest = session.topics["/huge"].newest
         assert newest is not None
         assert newest.size_bytes == len(data)
-        held = [m for m in (newest, session.topics["/huge"].previous) if m is not None]
-        assert len(held) <= 2
 
 
 def test_publisher_can_restart_100_times(session: Session, master: Master) -> None:

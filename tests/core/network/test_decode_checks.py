@@ -37,10 +37,10 @@ def test_every_message_is_checked_and_newest_error_is_reported() -> None:
     checks.check("/a", messages(GOOD))
     checks.check("/b", messages(GOOD))
     found = checks.pop_results()
-    assert (found["/a"].checked, found["/a"].bad_count, found["/a"].unchecked_count) == (4, 2, 0)
+    assert (found["/a"].checked_count, found["/a"].bad_count, found["/a"].unchecked_count) == (4, 2, 0)
     assert "json" in found["/a"].error
     assert found["/a"].is_newest_readable
-    assert (found["/b"].checked, found["/b"].bad_count, found["/b"].error) == (1, 0, "")
+    assert (found["/b"].checked_count, found["/b"].bad_count, found["/b"].error) == (1, 0, "")
     assert checks.pop_results() == {}
 
 
@@ -57,7 +57,7 @@ def test_100_000_malformed_messages_are_counted_as_bad_or_unchecked() -> None:
     assert found.bad_count + found.unchecked_count == 100_000
     assert not found.is_newest_readable
     # A slow machine may leave some unchecked, but only after using a good part of the time budget.
-    assert found.unchecked_count == 0 or found.checked * each_s > 0.3 * module.MAX_BUDGET_S
+    assert found.unchecked_count == 0 or found.checked_count * each_s > 0.3 * module.MAX_BUDGET_S
 
 
 def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
@@ -65,16 +65,16 @@ def test_healthy_topic_leaves_reserve_time_to_failing_topics() -> None:
     checks = DecodeChecker(clock, clock)
     checks.check("/a", messages(*[GOOD] * 500))
     well = checks.pop_results()["/a"]
-    assert 0 < well.checked < 60
-    assert well.checked + well.unchecked_count == 500
+    assert 0 < well.checked_count < 60
+    assert well.checked_count + well.unchecked_count == 500
     checks.check("/b", messages(*[BAD] * 500))
     bad = checks.pop_results()["/b"]
-    assert bad.bad_count == bad.checked > 40
+    assert bad.bad_count == bad.checked_count > 40
     checks.check("/b", messages(*[BAD] * 500))
-    assert checks.pop_results()["/b"].checked < 10  # budget spent; the newest is always checked
+    assert checks.pop_results()["/b"].checked_count < 10  # budget spent; the newest is always checked
     clock.now += 10.0
     checks.check("/b", messages(*[BAD] * 500))
-    assert checks.pop_results()["/b"].checked > 40
+    assert checks.pop_results()["/b"].checked_count > 40
 
 
 def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
@@ -82,7 +82,7 @@ def test_malformed_message_allows_remaining_batch_to_use_reserve_time() -> None:
     checks.check("/a", messages(BAD, *[GOOD] * 200))
     found = checks.pop_results()["/a"]
     assert found.bad_count == 1
-    assert found.checked > module.RESERVED_BUDGET_S / 0.01
+    assert found.checked_count > module.RESERVED_BUDGET_S / 0.01
 
 
 class Reads(Clock):
@@ -100,7 +100,7 @@ def test_cpu_clock_is_not_read_for_every_message() -> None:
     checks = DecodeChecker(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 5000, BAD, *[GOOD] * 5000))
     found = checks.pop_results()["/a"]
-    assert (found.checked, found.bad_count, found.unchecked_count) == (10_001, 1, 0)
+    assert (found.checked_count, found.bad_count, found.unchecked_count) == (10_001, 1, 0)
     assert clock.count < 100
 
 
@@ -108,7 +108,7 @@ def test_cpu_clock_is_read_after_each_large_message() -> None:
     clock = Reads(step_s=1e-6)
     checks = DecodeChecker(Clock(), clock)
     checks.check("/a", messages(*[GOOD] * 1000, *[b" " * 64_000 + GOOD] * 200))
-    assert checks.pop_results()["/a"].checked == 1200
+    assert checks.pop_results()["/a"].checked_count == 1200
     assert clock.count > 190
 
 
@@ -153,7 +153,7 @@ def test_counts_are_exact_across_threads() -> None:
     while not done.is_set():
         if not any(thread.is_alive() for thread in threads):
             done.set()
-        counted += sum(found.checked + found.unchecked_count for found in checks.pop_results().values())
+        counted += sum(found.checked_count + found.unchecked_count for found in checks.pop_results().values())
     for thread in threads:
         thread.join()
     assert counted == 2 * 300 * 2
@@ -165,7 +165,7 @@ def test_topic_without_recent_errors_loses_reserve_time() -> None:
     checks.check("/a", messages(BAD))
     clock.now += module.SUSPECT_TIMEOUT_S - 1
     checks.check("/a", messages(*[GOOD] * 500))
-    suspect = checks.pop_results()["/a"].checked
+    suspect = checks.pop_results()["/a"].checked_count
     clock.now += module.SUSPECT_TIMEOUT_S + 20
     checks.check("/a", messages(*[GOOD] * 500))
-    assert checks.pop_results()["/a"].checked < suspect - module.RESERVED_BUDGET_S / 0.01 / 2
+    assert checks.pop_results()["/a"].checked_count < suspect - module.RESERVED_BUDGET_S / 0.01 / 2

@@ -51,7 +51,7 @@ def test_queue_is_limited_in_bytes_but_keeps_one_message_of_any_size() -> None:
 
 
 def test_events_keep_their_order_and_an_overflow_is_counted() -> None:
-    mailbox = Mailbox(events=2)
+    mailbox = Mailbox(max_events=2)
     for event in ("one", "two", "three"):
         mailbox.post_event(event)
     drained = mailbox.drain()

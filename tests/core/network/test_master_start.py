@@ -35,7 +35,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
 
     def ask() -> None:
         before = start._thread
-        start.ensure_with_backoff()
+        start.ensure_running_with_backoff()
         if start._thread is not before:
             asked.append(now[0])
             start.close()
@@ -55,7 +55,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
 def test_no_master_is_started_when_one_is_running(master) -> None:
     told: list[str] = []
     start = MasterStarter(master.address, told.append)
-    start.ensure()
+    start.ensure_running()
     start.close()
     assert (told, start.has_started, start.is_first_master) == ([], False, False)
 
@@ -73,8 +73,8 @@ def free(monkeypatch) -> str:
 def the_one_started(address: str) -> None:
     told: list[str] = []
     start = MasterStarter(address, told.append)
-    start.ensure()
-    start.ensure()  # must not start a second master
+    start.ensure_running()
+    start.ensure_running()  # must not start a second master
     eventually(lambda: start.has_started)
     assert start.is_first_master
     assert nep.is_running(address, 5)

@@ -81,7 +81,7 @@ def test_studio_master_and_robot_work_with_loopback_only(tmp_path: Path) -> None
         NEP_STUDIO_HOME=str(tmp_path / "home"),
         NEP_STATE_DIR=str(tmp_path / "state"),
     )
-    assert "the main job was done" in done.stdout, done.stderr
+    assert "all steps succeeded" in done.stdout, done.stderr
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
     assert len(list((tmp_path / "pictures").glob("*.png"))) >= 5

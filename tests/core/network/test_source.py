@@ -29,7 +29,7 @@ def sources(master: Master, events: list[object]) -> Iterator[list[LiveSource]]:
 
 
 def begin(address: str, events: list[object], made: list[LiveSource]) -> LiveSource:
-    source = LiveSource(address, [], events.append, always={LOG_TOPIC: LOG_TYPE})
+    source = LiveSource(address, [], events.append, permanent_topics={LOG_TOPIC: LOG_TYPE})
     made.append(source)
     source.start()
     return source

@@ -229,7 +229,7 @@ def test_network_kinds_are_found_by_name_and_missing_zenoh_has_install_advice(
 ) -> None:
     for kind in KINDS:
         assert find_kind(kind.name) is kind
-        assert kind.checked(kind.default_address) == kind.checked("")
+        assert kind.validate_address(kind.default_address) == kind.validate_address("")
         assert kind.unknown_text == f"unknown on {kind.product_name}"
     assert find_kind("") is find_kind("zeromq") is None
     monkeypatch.setitem(sys.modules, "zenoh", None)

@@ -65,7 +65,7 @@ def values(shown: NodeParameters) -> dict[str, object]:
 
 def settled(session: Session, shown: NodeParameters) -> str:
     """Wait until the node has replied, and return its rejection, or ""."""
-    tick_until(session, lambda: not _refreshed(shown).setting)
+    tick_until(session, lambda: not _refreshed(shown).pending_name)
     return shown.rejection_reason
 
 
@@ -76,13 +76,13 @@ def test_parameters_have_limits_and_updates_are_received(
     assert speed is not None
     assert (speed.value, speed.kind, speed.minimum, speed.maximum) == (0.5, "float", 0, 2)
     assert (shown.find("gait").choices, shown.find("serial").is_read_only) == (("walk", "run"), True)  # type: ignore[union-attr]
-    assert shown.changed == {}, "what it was at first has not changed"
+    assert shown.change_times_s == {}, "what it was at first has not changed"
     robot.parameters["speed"] = 1.5
     tick_until(session, lambda: values(_refreshed(shown, 7.0))["speed"] == 1.5)
-    assert shown.changed == {"speed": 7.0}
+    assert shown.change_times_s == {"speed": 7.0}
     robot.parameters.declare("later", True)
     tick_until(session, lambda: "later" in values(_refreshed(shown, 8.0)))
-    assert shown.changed == {"speed": 7.0, "later": 8.0}
+    assert shown.change_times_s == {"speed": 7.0, "later": 8.0}
 
 
 def test_parameter_is_set_or_rejected_with_a_reason(
@@ -90,7 +90,7 @@ def test_parameter_is_set_or_rejected_with_a_reason(
 ) -> None:
     robot.parameters.on_change(lambda new: "1.3 shakes the head" if new.get("speed") == 1.3 else None)
     shown.set("speed", "1")
-    assert shown.setting == "speed"
+    assert shown.pending_name == "speed"
     assert settled(session, shown) == ""
     assert (robot.parameters["speed"], type(robot.parameters["speed"])) == (1.0, float), (
         "the type must be kept"
@@ -105,11 +105,14 @@ def test_parameter_is_set_or_rejected_with_a_reason(
         assert said in settled(session, shown)
     for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]"):
         shown.set("speed", text)
-        assert (shown.rejection_reason, shown.setting) == ("enter a number", "")
+        assert (shown.rejection_reason, shown.pending_name) == ("enter a number", "")
     shown.set("gait", "fly")
     assert "use 'walk' or 'run'" in settled(session, shown)
     shown.set("serial", "8")
-    assert (shown.rejection_reason, shown.setting) == ("only its own node can set it", "")
+    assert (shown.rejection_reason, shown.pending_name) == (
+        "only the node itself can change this parameter",
+        "",
+    )
     shown.set("no such", "8")
     assert (robot.parameters["speed"], robot.parameters["gait"], robot.parameters["serial"]) == (
         1.0,
@@ -145,7 +148,7 @@ def test_setting_a_parameter_of_an_unresponsive_or_disappeared_node_is_reported(
     robot.close()
     tick_until(session, lambda: entry_of(session, robot).gone_s is not None)
     shown.set("speed", "1")
-    assert (shown.rejection_reason, shown.setting) == ("the node has disappeared", "")
+    assert (shown.rejection_reason, shown.pending_name) == ("the node has left", "")
     assert values(shown)["serial"] == "7", "what was known stays to be read"
 
 
@@ -154,14 +157,14 @@ def test_parameter_change_without_master_is_rejected_not_queued(
 ) -> None:
     shown._has_master = lambda: False
     shown.set("speed", "1")
-    assert shown.setting == ""
+    assert shown.pending_name == ""
     assert "no master responds" in shown.rejection_reason
 
 
 def test_showing_another_node_or_none_clears_parameters(session: Session, shown: NodeParameters) -> None:
-    watching, revision = shown.watching, shown.revision
+    watching, revision = shown.watch_handle, shown.revision
     shown.show(NodeEntry("x", "without"))
-    assert (shown.node, shown.all, shown.watching, shown.has_received) == (None, (), None, False)
+    assert (shown.node, shown.all, shown.watch_handle, shown.has_received) == (None, (), None, False)
     assert shown.revision > revision
     assert watching is not None
     assert not session._watches.is_watched(watching.topics[0])  # type: ignore[attr-defined]
@@ -178,7 +181,7 @@ def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
         for payload in ("words", 7, {"parameters": None}, {}):
             loud.publish(payload)
         tick_until(session, lambda: _refreshed(shown).problem)
-        assert shown.problem == "this isn't a list of parameters"
+        assert shown.problem == "the message contains no list of parameters"
         assert "speed" in values(shown), "what the node told stays"
         loud.publish({"parameters": [1, {"name": ["x"], "type": 5, "min": "a", "choices": 3, "value": None}]})
         tick_until(session, lambda: not _refreshed(shown).problem)

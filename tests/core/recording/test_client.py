@@ -99,7 +99,7 @@ def test_recording_starts_reports_stats_and_ends(made):
     client.stop()
     assert [each["op"] for each in made.lines[0].orders] == ["record", "note", "stop"]
     made.say("ended", path="a.mcap", status=status(message_count=7))
-    assert (client.state.phase, client.state.message_count, client.state.last) == ("", 7, Path("a.mcap"))
+    assert (client.state.phase, client.state.message_count, client.state.last_path) == ("", 7, Path("a.mcap"))
     assert not made.told()
     client.close()
     assert made.lines[0].is_closed
@@ -172,7 +172,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert client.save_last(Path("b.mcap"), 60.0)
     made.say("kept", path="a.mcap")
     made.say("problem", op="keep", path="b.mcap", sentence="the disk is full")
-    assert (client.state.pending_saves, client.state.last) == ((), Path("a.mcap"))
+    assert (client.state.pending_saves, client.state.last_path) == ((), Path("a.mcap"))
     assert "recorder:keep" in made.told()
     waits = []
     for _each in range(6):

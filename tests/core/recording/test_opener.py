@@ -91,7 +91,7 @@ def test_recording_is_played_by_a_separate_process(tmp_path: Path, path: Path) -
 
         return look
 
-    eventually(seen(lambda: replay.player is not None and replay.opened is not None), 60.0)
+    eventually(seen(lambda: replay.player is not None and replay.opened_recording is not None), 60.0)
     replay.seek(replay.end_ns)
     eventually(seen(lambda: replay.topics["/odom"].newest is not None), 60.0)
     watch.close()

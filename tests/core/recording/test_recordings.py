@@ -97,7 +97,7 @@ def test_new_recording_includes_ongoing_events(made):
 def test_one_time_recording_choice_is_not_saved(made):
     only = RecordingChoice("chosen", ("/odom",))
     assert made.recordings.record(choice=only) == ""
-    assert made.recordings.recorded == only
+    assert made.recordings.active_choice == only
     assert made.recordings.choice == RecordingChoice()
     assert made.again().choice == RecordingChoice()
 

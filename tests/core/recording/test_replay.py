@@ -252,5 +252,5 @@ def test_topic_without_sequence_numbers_is_listed_with_unknown_losses(tmp_path):
     assert view.topics["/original"].lost is None
 
 
-def test_message_interval_matches_the_recording(whole):
+def test_messages_of_the_sample_recording_are_one_step_apart(whole):
     assert whole[1][0] - whole[0][0] == STEP_NS

@@ -98,7 +98,7 @@ def replay(path):
 
 
 def of(handed: ReplayResults, topic: str) -> list[Message]:
-    batch = handed.drained.batches.get(topic)
+    batch = handed.drain_result.batches.get(topic)
     return batch.messages if batch is not None else []
 
 
@@ -133,7 +133,7 @@ def test_seek_delivers_newest_message_of_each_topic_up_to_playhead(replay, whole
         expected = {topic: newest(whole, topic, at_ns) for topic in topics}
         assert found == {topic: each for topic, each in expected.items() if each is not None}
         assert ("/camera" in played.pictures.shown) == (expected["/camera"] is not None)
-        assert handed.drained.batches == {}
+        assert handed.drain_result.batches == {}
 
 
 def test_seek_discards_undelivered_messages(replay, whole):
@@ -144,12 +144,12 @@ def test_seek_discards_undelivered_messages(replay, whole):
         played.clock.now += 0.01
     handed = played.do(lambda playback: playback.seek(whole[0][0]))
     assert [each.seq for each in handed.seek_messages] == [0]
-    assert handed.drained.batches == {}
+    assert handed.drain_result.batches == {}
 
 
 def test_seek_is_clamped_to_the_recording(replay, whole):
     played = replay("/a")
-    end_ns = played.source.opened.recording.end_ns
+    end_ns = played.source.opened_recording.recording.end_ns
     assert end_ns >= whole[-1][0]
     for at_ns, expected in ((-1, whole[0][0]), (0, whole[0][0]), (2**64 - 1, end_ns)):
         played.do(lambda playback, at_ns=at_ns: playback.seek(at_ns))
@@ -160,7 +160,7 @@ def test_only_last_of_many_seeks_is_executed(replay, whole):
     played = replay("/a")
     for log_ns, _message in whole:
         played.source.queue_change("seek", lambda playback, at_ns=log_ns: playback.seek(at_ns))
-    assert len(played.source._changes) == 1
+    assert len(played.source._queued_changes) == 1
     played.source.process()
     assert played.source.status.player.position_ns == whole[-1][0]
 
@@ -231,10 +231,10 @@ def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_
     played.source.pop_results()
     played.do(Playback.play)
     handed = played.pass_time(5.0)
-    batch = handed.drained.batches["/a"]
+    batch = handed.drain_result.batches["/a"]
     assert (len(batch.messages), batch.arrived_count) == (MAX_MESSAGES_PER_TOPIC, count - 1)
     assert batch.messages[-1].seq == count - 1
-    assert played.source.status.player.position_ns == played.source.opened.recording.end_ns
+    assert played.source.status.player.position_ns == played.source.opened_recording.recording.end_ns
 
 
 def test_small_messages_do_not_retain_their_file_chunk(replay):
@@ -274,7 +274,7 @@ def test_truncated_recording_is_opened_without_modifying_it(tmp_path, path, whol
     cut.write_bytes(path.read_bytes()[:-400])
     before = cut.read_bytes()
     played = Replayed(cut, "/a")
-    opened = played.source.opened
+    opened = played.source.opened_recording
     assert not opened.recording.is_complete
     assert opened.recording.message_count == COUNT
     played.source.close()

@@ -143,7 +143,7 @@ def test_crashed_master_is_reported_at_next_master_start(crashes) -> None:
     told: list[str] = []
     start = MasterStarter(address, told.append)
     for number_of_crashes in (0, 1):
-        start.ensure()
+        start.ensure_running()
         assert start._thread is not None
         start._thread.join(WAIT_S)
         assert (told, len(crashes())) == ([], number_of_crashes)

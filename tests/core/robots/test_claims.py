@@ -22,7 +22,7 @@ from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInf
 from tests.blocks.samples import block, number, started, workspace
 from tests.blocks.wire_robot import WireRobot
 from tests.core.waiting import tick_until
-from tests.robots.message_senders import WhoseWordsCount, announce, described
+from tests.robots.message_senders import MessageSenderContract, announce, described
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ class Studio:
         return not any(alert.id.startswith("claim:") for alert in self.session.alerts.active)
 
 
-class TestStudio(WhoseWordsCount):
+class TestStudioSenders(MessageSenderContract):
     """Sender checks of every participant, run for Studio."""
 
     @pytest.fixture
@@ -370,7 +370,7 @@ def test_invalid_description_of_one_program_does_not_block_the_next() -> None:
     assert not announcements.claims
 
 
-def test_suspended_robot_returns_although_its_topic_stayed_subscribed() -> None:
+def test_robot_that_left_the_graph_returns_although_its_topic_stayed_subscribed() -> None:
     opened: list[str] = []
     watches = Watches(opened.append, opened.remove)
     announcements = Announcements(watches, Senders())

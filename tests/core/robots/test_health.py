@@ -71,7 +71,7 @@ def test_alert_is_resolved_by_a_second_of_valid_messages_and_count_restarts(case
     case.look(1)
     alert = case.alert()
     assert alert is not None
-    assert "1 message)" in alert.title
+    assert "1 message on" in alert.title
 
 
 def test_topic_with_valid_and_malformed_messages_keeps_one_alert(case: Case) -> None:
@@ -123,8 +123,8 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
         silence_reason=None,
         robot=shown,
         unended_actions="",
-        rejected=ReportedCount(),
-        errors=ReportedCount(),
+        rejected_messages=ReportedCount(),
+        driver_exceptions=ReportedCount(),
         motion_warning="",
         stop_problem="",
     )
@@ -157,19 +157,21 @@ def test_virtual_robot_is_reported_only_while_its_process_runs_here(case: Case) 
     case.now += RESTART_TIMEOUT_S
     case.health.check()
     assert case.alert() is None, "it was ended, or belongs to somebody else"
-    case.health.check(started={"Rover"})
+    case.health.check(started_names={"Rover"})
     alert = case.alert()
     assert alert is not None
     assert (alert.title, alert.action) == ("Rover isn't responding.", "connect:Rover")
 
 
-@pytest.mark.parametrize("kind", ["rejected", "errors"])
+@pytest.mark.parametrize(
+    ("kind", "attribute"), [("rejected", "rejected_messages"), ("errors", "driver_exceptions")]
+)
 def test_driver_that_rejects_messages_or_catches_exceptions_is_an_alert_until_it_stops(
-    case: Case, kind: str
+    case: Case, kind: str, attribute: str
 ) -> None:
     link = robot(virtual=False, connected=True)
     case.links.append(link)
-    count: ReportedCount = getattr(link, kind)
+    count: ReportedCount = getattr(link, attribute)
     case.health.check()
     assert case.alert() is None
     for value in (1, 12):

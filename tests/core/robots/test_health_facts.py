@@ -61,8 +61,8 @@ def test_healthy_robot_has_only_ok_facts(case: Case) -> None:
         ("Stop", "ok", "confirmed in 41 ms, at 8:40"),
         ("Camera", "ok", "sends 15 images per second"),
         ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} are sending"),
-        ("Safety stop", "ok", "stops by itself after 1 s"),
-        ("Last response", "ok", f"every {PEPPER.heartbeat_interval_s:g} s during actions"),
+        ("Safety stop", "ok", "stops 1 s after its program disappears"),
+        ("Heartbeat", "ok", f"every {PEPPER.heartbeat_interval_s:g} s during actions"),
     ]
     assert not any(fact.needs_attention for fact in case.facts())
 
@@ -84,7 +84,7 @@ def test_unwatched_camera_is_not_a_warning(case: Case) -> None:
     assert case.says("Camera") == ("off", "ready (not in use)")
     case.topics[camera] = Topic(camera, age_s=15.0)
     assert case.says("Camera") == ("off", "ready (not in use)"), "it sent while somebody looked"
-    case.topics[camera] = Topic(camera, subscribers=1, subscribed_since=NOW)
+    case.topics[camera] = Topic(camera, subscribers=1, subscribed_since_s=NOW)
     assert case.says("Camera") == ("off", "no image yet")
 
 
@@ -97,7 +97,8 @@ def test_unresponsive_robot_shows_duration_and_advice(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    ("title", "kind"), [("Rejected messages", "rejected"), ("Driver exceptions", "errors")]
+    ("title", "kind"),
+    [("Rejected messages", "rejected_messages"), ("Driver exceptions", "driver_exceptions")],
 )
 def test_driver_rejections_and_exceptions_are_a_warning_while_they_increase(
     case: Case, title: str, kind: str
@@ -121,7 +122,7 @@ def test_disconnected_robot_shows_no_outdated_facts(case: Case) -> None:
         "Connection",
         "Stop",
         "Safety stop",
-        "Last response",
+        "Heartbeat",
     ]
 
 
@@ -197,5 +198,5 @@ def test_rize_robot_has_no_heartbeat_fact_and_its_stop_and_watchdog_facts_are_of
     case.link.last_stop = None
     assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")
     assert case.says("Safety stop")[0] == "off"
-    assert "Last response" not in [fact.title for fact in case.facts()]
+    assert "Heartbeat" not in [fact.title for fact in case.facts()]
     assert not any(fact.needs_attention for fact in case.facts())

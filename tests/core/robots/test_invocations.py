@@ -1,4 +1,4 @@
-"""Tests of trying actions by hand: replies, waiting, timeouts, silent robots and replies to other senders."""
+"""Tests of invoking actions by hand: replies, waiting, timeouts, silent robots and foreign replies."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_trial_passes_through_its_states_and_is_recorded(bench) -> None:
+def test_invocation_passes_through_its_states_and_is_recorded(bench) -> None:
     made = bench.begin("move", distance=0.5)
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
@@ -72,13 +72,13 @@ def test_trial_passes_through_its_states_and_is_recorded(bench) -> None:
     assert list(bench.link.past_invocations) == [made]
 
 
-def test_only_newest_trials_are_kept(bench) -> None:
+def test_only_the_newest_invocations_are_kept(bench) -> None:
     for _ in range(MAX_PAST_INVOCATIONS + 5):
         bench.answer(bench.begin("light"), "succeeded")
     assert len(bench.link.past_invocations) == MAX_PAST_INVOCATIONS
 
 
-def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
+def test_invocation_fails_after_three_seconds_without_reply(bench) -> None:
     made = bench.begin()
     bench.pass_time(FIRST_REPLY_TIMEOUT_S - 0.1)
     assert made.is_running
@@ -90,7 +90,7 @@ def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
     assert bench.link.state == "ready"
 
 
-def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
+def test_invocation_fails_two_seconds_after_the_robot_falls_silent(bench) -> None:
     made = bench.begin()
     bench.answer(made, "accepted")
     bench.answer(made, "running")
@@ -104,7 +104,7 @@ def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
     assert bench.sent[-1] == {"id": made.id, "op": "cancel", "from": "studio", "action": "move"}
 
 
-def test_trial_on_robot_without_heartbeat_waits_until_the_time_limit(bench) -> None:
+def test_invocation_of_robot_without_heartbeat_waits_until_the_time_limit(bench) -> None:
     bench.link.robot = replace(bench.link.robot, heartbeat_interval_s=None)
     made = bench.begin()
     bench.answer(made, "running")
@@ -139,7 +139,7 @@ def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
         {"op": "invoke", "state": ["succeeded"], "mine": True},
     ],
 )
-def test_foreign_and_invalid_replies_do_not_end_a_trial(bench, answer) -> None:
+def test_foreign_and_invalid_replies_do_not_end_an_invocation(bench, answer) -> None:
     made = bench.begin()
     bench.answer(made, "running")
     bench.tries.apply_reply(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
@@ -153,7 +153,7 @@ def test_second_final_reply_is_ignored(bench) -> None:
     assert (made.state, made.error) == ("succeeded", None)
 
 
-def test_trial_of_unreachable_robot_fails_at_once(bench) -> None:
+def test_invocation_of_unreachable_robot_fails_at_once(bench) -> None:
     bench.reachable = False
     made = bench.begin()
     assert (made.state, made.error) == ("failed", "Turtle can't be reached; check that it is switched on")
@@ -170,13 +170,13 @@ def test_cancel_is_sent_while_running_and_never_after_the_end(bench) -> None:
     assert len(bench.sent) == count
 
 
-def test_two_trials_of_one_action_both_end(bench) -> None:
+def test_two_invocations_of_one_action_both_end(bench) -> None:
     first, second = bench.begin(), bench.begin()
     bench.answer(first, "accepted")
     bench.answer(second, "accepted", replaces=["move"])
     bench.answer(first, "canceled", error="replaced by move")
     assert (first.state, second.state) == ("canceled", "accepted")
-    assert bench.rested == []  # the second trial keeps the robot awake
+    assert bench.rested == []  # the second invocation keeps the robot awake
     bench.answer(second, "succeeded")
     assert bench.rested == ["Turtle"]
 

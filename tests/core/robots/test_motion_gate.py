@@ -40,12 +40,12 @@ class Robots:
     """Fake fleet whose robots a test connects."""
 
     def __init__(self) -> None:
-        self.movable: tuple[Robot, ...] = ()
+        self.movable_robots: tuple[Robot, ...] = ()
         self.moving_topics = MovingTopics()
         self.described_topics: frozenset[str] = frozenset()
 
     def come(self, *robots: Robot, others: tuple[RobotControls, ...] = ()) -> None:
-        self.movable = robots
+        self.movable_robots = robots
         self.moving_topics = MovingTopics((*map(controls_of, robots), *others))
 
 
@@ -134,8 +134,8 @@ def test_saved_message_needs_permission_and_repetition_ends_when_a_real_robot_co
         acting.outbox.send(
             SendOrder("a", "Go", TOPIC, "json", lambda: {"op": "invoke"})
         )  # as if queued before the permission was revoked
-        tick_until(session, lambda: acting.last["a"].kind == "failed")
-        assert "which isn't allowed" in acting.last["a"].message
+        tick_until(session, lambda: acting.last_results["a"].kind == "failed")
+        assert "which isn't allowed" in acting.last_results["a"].message
         assert len(told) == before + 1
 
 

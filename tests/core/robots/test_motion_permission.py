@@ -61,7 +61,7 @@ def test_granted_permission_continues_once_and_lasts_for_the_session(rover) -> N
 def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None:
     moving = MotionPermission()
     moving.request_permission([(rover, ["move"])], pytest.fail)
-    moving.answer(is_allowed=False, always=True)
+    moving.answer(is_allowed=False, is_permanent=True)
     assert moving.question is None
     assert not moving.request_permission([(rover, ["move"])], pytest.fail)
     moving.withdraw()
@@ -73,7 +73,7 @@ def test_denied_permission_prevents_motion_and_is_requested_again(rover) -> None
 def test_permanent_permission_is_saved_for_this_robot_until_reset(rover, tmp_path) -> None:
     moving = MotionPermission(Settings(tmp_path))
     moving.request_permission([(rover, ["move"])], lambda: None)
-    moving.answer(is_allowed=True, always=True)
+    moving.answer(is_allowed=True, is_permanent=True)
     assert MotionPermission(Settings(tmp_path)).is_allowed(rover)
     assert not MotionPermission(Settings(tmp_path)).is_allowed(replace(rover, model="other"))
     moving.revoke_all()

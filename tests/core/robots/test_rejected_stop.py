@@ -69,7 +69,7 @@ def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
     session: Session, arm: Driver
 ) -> None:
     link = the_link(session)
-    assert link.chip_text == "virtual, ready" if link.is_virtual else "ready"
+    assert link.chip_text == ("virtual, ready" if link.is_virtual else "ready")
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     view = session.runs.view()
@@ -77,7 +77,7 @@ def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
     assert view.title.startswith("Arm may still move")
     assert view.detail == "Switch Arm off by hand."
     assert (view.result_status, view.confirm_label) == ("error", "Arm isn't moving")
-    assert "did not answer" not in f"{view}"
+    assert "didn't reply" not in f"{view}"
     assert (link.state, link.chip_text.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)
     assert (words, status) == ("Arm: may still move", "error")
@@ -156,7 +156,7 @@ def test_run_prints_the_rejection_message_of_the_robot(master: Master, arm: Driv
     assert run_file(path, out=out, allow_moving=True) == FAILED
     assert "Arm may still move" in out.getvalue()
     assert "the brake does not answer. Switch it off by hand." in out.getvalue()
-    assert "did not answer." not in out.getvalue()
+    assert "didn't reply" not in out.getvalue()
 
 
 @pytest.fixture

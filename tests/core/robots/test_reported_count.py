@@ -55,15 +55,15 @@ def test_counts_are_read_only_from_heartbeats_of_the_robot_program(lab: Simulate
         lab.settle()
 
     send_alive(rejected=12, errors=3)
-    assert (link.rejected.value, link.errors.value) == (12, 3)
+    assert (link.rejected_messages.value, link.driver_exceptions.value) == (12, 3)
     send_alive(rejected="many", errors=[1])
     send_alive(lab.stranger.node, rejected=99, errors=99)
-    assert (link.rejected.value, link.errors.value) == (12, 3)
-    assert link.rejected.is_growing(lab.clock.now())
+    assert (link.rejected_messages.value, link.driver_exceptions.value) == (12, 3)
+    assert link.rejected_messages.is_growing(lab.clock.now())
     send_alive()
-    assert (link.rejected.value, link.errors.value) == (0, 0)
+    assert (link.rejected_messages.value, link.driver_exceptions.value) == (0, 0)
     send_alive(rejected=5)
     pepper.node.close()
     lab.start_robot("Pepper")
     lab.wait_for_link("Pepper")
-    assert link.rejected.value == 0, "another program"
+    assert link.rejected_messages.value == 0, "another program"

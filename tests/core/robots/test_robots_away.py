@@ -104,7 +104,7 @@ def test_disconnected_robots_beyond_the_limit_are_evicted_and_their_resources_cl
 ) -> None:
     strangers.pass_by(1000)
     assert len(strangers.fleet.links) == MAX_DISCONNECTED
-    assert len(strangers.fleet._names) == MAX_DISCONNECTED
+    assert len(strangers.fleet._names_by_topic) == MAX_DISCONNECTED
     assert strangers.watched == set()
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
     strangers.pass_by(500)
@@ -143,7 +143,7 @@ def test_stopped_selected_or_used_robots_are_not_evicted(strangers: Strangers, w
     elif why == "chosen":
         fleet.select("Pepper")
     elif why == "used":
-        fleet.used = lambda: ("Pepper",)
+        fleet.robots_in_use = lambda: ("Pepper",)
     elif why == "being stopped":
         fleet.mark_stopping(["Pepper"])
     else:
@@ -187,7 +187,7 @@ def test_alerts_of_evicted_robots_are_resolved(strangers: Strangers) -> None:
     strangers.pass_by(300)
     health.check()
     assert not alerts.has("robot:Rover")
-    assert len(health._gone_since) == MAX_DISCONNECTED
+    assert len(health._gone_since_s) == MAX_DISCONNECTED
 
 
 def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None:
@@ -195,9 +195,9 @@ def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None
     try:
         runs, fleet = lab.studio.session.runs, lab.studio.session.fleet
         runs._used_robots = ("Pepper",)
-        assert fleet.used() == ()
+        assert fleet.robots_in_use() == ()
         runs._run = replace(runs.state, state="running")
-        assert fleet.used() == ("Pepper",)
+        assert fleet.robots_in_use() == ("Pepper",)
         runs._run = replace(runs.state, state="ready")
     finally:
         lab.close()

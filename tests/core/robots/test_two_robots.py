@@ -62,9 +62,7 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
             assert (link.drawing["figure"], link.drawing["eyes"]) == ("turtle", "#ff0000")
 
 
-def test_panels_show_the_selected_robot_or_the_first_connected_robot(
-    session: Session, node: nep.Node
-) -> None:
+def test_current_robot_is_the_selected_or_the_first_connected_one(session: Session, node: nep.Node) -> None:
     with Driver(simulated.ROBOT, "Pepper", node):
         there(session, "Pepper")
         with Driver(turtle.ROBOT, "Turtle", node):
@@ -165,7 +163,7 @@ def test_permission_continues_the_requested_run_without_asking_again(
         tick_until(session, lambda: tried.state == "succeeded", FOUND_S)
 
 
-def test_trial_continues_after_permission(session: Session, node: nep.Node) -> None:
+def test_invocation_continues_after_permission(session: Session, node: nep.Node) -> None:
     with Driver(REAL, "Turtle", node):
         there(session, "Turtle")
         with pytest.raises(MayNotMoveError, match="Turtle can't move yet"):

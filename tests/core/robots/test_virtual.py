@@ -182,7 +182,7 @@ def test_permission_ends_with_the_program_and_permanent_permission_covers_its_re
     assert not asks(fleet)
     fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # restarted
     assert asks(fleet)
-    fleet.permission.answer(is_allowed=True, always=True)
+    fleet.permission.answer(is_allowed=True, is_permanent=True)
     fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
     assert not asks(fleet)
     for other in (replace(STRANGE, host="evil"), replace(STRANGE, node="evil")):
@@ -220,9 +220,9 @@ def test_only_virtual_robots_return_to_start_position_and_only_on_request(fleet:
     assert worlds["Turtle"].changes == [{"start": ["Turtle"]}]
     assert worlds["Other"].changes == []
     assert fleet.permission.question is None
-    fleet.set_resets_at_start(begins=False)
+    fleet.set_resets_at_start(is_enabled=False)
     fleet.return_to_start(["Turtle"])
     assert len(worlds["Turtle"].changes) == 1
-    fleet.set_resets_at_start(begins=True)
+    fleet.set_resets_at_start(is_enabled=True)
     fleet.return_to_start(["Turtle"])
     assert len(worlds["Turtle"].changes) == 2

@@ -34,7 +34,7 @@ def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Do
     document.apply_edit(waiting(soon))
     errors = BlockErrors()
     errors.start_run(RequestedRun(document))
-    errors.set_errors({"w": "“wait” needs a number"}, not_started=False)
+    errors.set_errors({"w": "“wait” needs a number"}, prevents_start=False)
     assert not errors.discard_fixed()
     document.apply_edit(waiting(soon, "Other"))
     assert not errors.discard_fixed()
@@ -48,7 +48,7 @@ def test_error_of_deleted_block_is_cleared(document: Document) -> None:
     document.apply_edit(waiting(soon))
     errors = BlockErrors()
     errors.start_run(RequestedRun(document))
-    errors.set_errors({"w": "“wait” needs a number"}, not_started=False)
+    errors.set_errors({"w": "“wait” needs a number"}, prevents_start=False)
     document.apply_edit(workspace(started()))
     assert errors.discard_fixed()
 
@@ -58,7 +58,7 @@ def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: D
     document.apply_edit(workspace(started(wait)))
     wanted, errors = RequestedRun(document), BlockErrors()
     errors.start_run(wanted)
-    errors.set_errors(wanted.problems(document.program()), not_started=True)
+    errors.set_errors(wanted.problems(document.program()), prevents_start=True)
     assert list(errors.by_block) == ["w"]
     document.apply_edit(workspace(started(block("messages_write", VALUE=text("Hello")), wait)))
     assert not errors.discard_fixed()

@@ -24,14 +24,14 @@ class Steps:
     def __init__(self) -> None:
         self.done: list[tuple[str, str | None]] = []
 
-    def send_stop(self, *_names: object, ends: str | None = None) -> None:
-        self.done.append(("stop sent", ends))
+    def send_stop(self, *_names: object, program_key: str | None = None) -> None:
+        self.done.append(("stop sent", program_key))
 
     def stop(self) -> None:
         self.done.append(("program ended", None))
 
-    def stop_all(self, *_names: object, ends: str | None = None, **_more: object) -> StopReport:
-        self.done.append(("robots awaited", ends))
+    def stop_all(self, *_names: object, program_key: str | None = None, **_more: object) -> StopReport:
+        self.done.append(("robots awaited", program_key))
         return StopReport((), 1.0)
 
 

@@ -62,19 +62,19 @@ def printed(heard: Heard) -> list[str]:
 
 
 def test_program_over_memory_limit_is_killed_and_reported(started, heard) -> None:
-    started(EATS, most_bytes=200_000_000)
+    started(EATS, max_bytes=200_000_000)
     ended = heard.until("ended")
     assert not ended.is_ok
     assert ended.text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_memory_of_child_processes_counts_towards_limit(started, heard) -> None:
-    started(LETS_EAT, most_bytes=200_000_000)
+    started(LETS_EAT, max_bytes=200_000_000)
     assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_default_memory_limit_is_one_gigabyte() -> None:
-    assert Runner(lambda _event: None)._most_bytes == MAX_MEMORY_BYTES == 1_000_000_000
+    assert Runner(lambda _event: None)._max_bytes == MAX_MEMORY_BYTES == 1_000_000_000
 
 
 # ---- floods ----------------------------------------------------------------------------------------
@@ -147,10 +147,10 @@ def test_program_that_closes_its_output_is_stopped(started, heard) -> None:
 
 def child_of(heard: Heard, runner: Runner) -> psutil.Process:
     deadline = time.monotonic() + LONG_S
-    while not runner._errors:
+    while not runner._error_lines:
         assert time.monotonic() < deadline
         threading.Event().wait(0.01)
-    return psutil.Process(int(runner._errors[0].split()[1]))
+    return psutil.Process(int(runner._error_lines[0].split()[1]))
 
 
 def gone(process: psutil.Process) -> bool:

@@ -140,8 +140,8 @@ def test_stop_over_closed_node_is_reported(master, robots):
 
 
 def test_stop_names_the_program_to_end(stopper, robots):
-    stopper.send_stop(ends="program-1")
-    stopper.stop_all(ends="program-2")
+    stopper.send_stop(program_key="program-1")
+    stopper.stop_all(program_key="program-2")
     stopper.stop_all()
     for robot in robots:
         assert [stop.get("ends") for stop in robot.heard("stop")] == ["program-1", "program-2", None]

@@ -39,7 +39,7 @@ def test_running_state_shows_elapsed_time_and_activity() -> None:
     early = view_of(replace(run, is_started=False, description=""), ["Pepper"], 100.1)
     assert (early.title, early.detail, early.compact_text) == ("Starting", "", "Greeting is starting")
     assert (early.state, early.can_pause) == ("running", True)
-    elsewhere = view_of(replace(run, is_started=False), ["Pepper"], 100.1, elsewhere=True)
+    elsewhere = view_of(replace(run, is_started=False), ["Pepper"], 100.1, is_elsewhere=True)
     assert elsewhere.title == "Greeting is starting"
 
 
@@ -161,7 +161,7 @@ def test_rize_robot_is_never_shown_as_stopped() -> None:
 
 
 def test_finished_and_failed_programs_are_distinguished() -> None:
-    assert view_of(after(PEPPER, finished=True, elapsed_s=3.0), [], 0).title == "Finished after 3 s"
+    assert view_of(after(PEPPER, is_finished=True, elapsed_s=3.0), [], 0).title == "Finished after 3 s"
     view = view_of(after(PEPPER, errors={"a": "“turn” needs a number."}, elapsed_s=3.0), [], 0)
     assert (view.title, view.detail) == ("Stopped after 3 s because of an error", "“turn” needs a number.")
 
@@ -202,7 +202,7 @@ def test_stop_report_status_is_ok_only_if_every_robot_confirmed(
 
 
 def test_program_without_robots_shows_its_end_without_stop_result() -> None:
-    run = RunState("ready", "Greeting", elapsed_s=3.0, finished=True, report=StopReport((), 0.0))
+    run = RunState("ready", "Greeting", elapsed_s=3.0, is_finished=True, report=StopReport((), 0.0))
     view = view_of(run, [], 0)
     assert (view.state, view.title, view.result, view.result_status) == (
         "ready",

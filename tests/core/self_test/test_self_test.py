@@ -132,7 +132,7 @@ def test_unwritable_folder_is_reported_without_opening_a_window(
     assert main(["--selftest", str(tmp_path / "file" / "below")]) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"nep-studio: can't write to the folder '{tmp_path / 'file' / 'below'}' (")
-    assert said.endswith("; choose another one\n")
+    assert said.endswith("; choose another folder\n")
     assert os.environ == before
     with pytest.raises(UnwritableFolderError):
         prepare(tmp_path / "file", {}, is_root=False)

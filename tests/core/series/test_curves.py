@@ -85,7 +85,7 @@ def test_every_message_is_a_point_at_its_own_time() -> None:
 
 
 @pytest.mark.parametrize("how", [{"dropped": 5}, {"skip": 5}])
-def test_lost_messages_are_a_gap_and_counted(how) -> None:
+def test_lost_messages_leave_a_gap_and_are_counted(how) -> None:
     case = Case()
     x = case.curve("/a.x")
     case.send("/a", (0.0, {"x": 1}), (0.1, {"x": 2}))

@@ -86,19 +86,19 @@ values = st.recursive(
 def test_every_suggested_field_is_found_at_its_path(payload) -> None:
     for found in fields_of(payload):
         assert len(str(found.path)) > 0
-        for one in found.path.expanded(payload):
+        for one in found.path.expand(payload):
             value = one.value_in(payload)
             assert kind_of_value(value) in {"number", "state"}
-        assert len(found.path.expanded(payload)) == min(found.count, 65)
+        assert len(found.path.expand(payload)) == min(found.count, 65)
 
 
 def test_wildcard_expands_to_every_list_element() -> None:
-    assert [str(p) for p in FieldPath.parse("pose.x[*]").expanded(MESSAGE)] == [
+    assert [str(p) for p in FieldPath.parse("pose.x[*]").expand(MESSAGE)] == [
         f"pose.x[{n}]" for n in range(3)
     ]
-    assert len(FieldPath.parse("joints[*].position").expanded(MESSAGE)) == 3
-    assert FieldPath.parse("ok[*]").expanded(MESSAGE) == []
-    assert len(FieldPath.parse("a[*][*]").expanded({"a": [[1] * 100] * 100})) == 65, "one more than fit"
+    assert len(FieldPath.parse("joints[*].position").expand(MESSAGE)) == 3
+    assert FieldPath.parse("ok[*]").expand(MESSAGE) == []
+    assert len(FieldPath.parse("a[*][*]").expand({"a": [[1] * 100] * 100})) == 65, "one more than fit"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def test_states_that_change_within_a_step_are_reduced_to_a_single_state() -> Non
     states = dense(8000)
     every = list(states.runs(-1, 100))
     assert len(every) == 8000
-    few = list(states.runs(-1, 100, step_s=0.5, without=("false",)))
+    few = list(states.runs(-1, 100, step_s=0.5, excluded_values=("false",)))
     assert len(few) <= 20
     assert {run.value for run in few} == {"true"}
     assert all(run in every for run in few)
@@ -38,7 +38,7 @@ def test_unknown_states_are_skipped_only_on_request() -> None:
     states.add(2.0, None)
     states.add(3.0, "up")
     assert [run.value for run in states.runs(0, 9)] == ["", None, "up"]
-    assert [run.value for run in states.runs(0, 9, without=())] == ["", "up"]
+    assert [run.value for run in states.runs(0, 9, excluded_values=())] == ["", "up"]
     assert states.values_in(0, 9) == {"", "up"}
     assert list(States().runs(0, 9, step_s=1.0)) == []
 

@@ -86,8 +86,8 @@ def test_own_settings_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: 
     write(tmp_path / "settings.json", NEWER)
     whole = write(tmp_path / "settings.format-1.json", NEWER)
     settings = Settings(tmp_path)
-    assert settings.damaged is not None
-    assert settings.damaged.read_bytes() == whole
+    assert settings.damaged_path is not None
+    assert settings.damaged_path.read_bytes() == whole
     settings.set("theme", "light")
     assert Settings(tmp_path).get("theme", "") == "light"
 
@@ -96,8 +96,8 @@ def test_damaged_own_settings_file_next_to_a_newer_one_is_backed_up(tmp_path: Pa
     before = write(tmp_path / "settings.json", NEWER)
     (tmp_path / "settings.format-1.json").write_text("{")
     settings = Settings(tmp_path)
-    assert settings.damaged is not None
-    assert settings.damaged.read_text() == "{"
+    assert settings.damaged_path is not None
+    assert settings.damaged_path.read_text() == "{"
     assert (tmp_path / "settings.json").read_bytes() == before
 
 

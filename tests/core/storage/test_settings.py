@@ -37,8 +37,8 @@ def test_damaged_settings_file_is_backed_up(tmp_path: Path, damage: bytes) -> No
     (tmp_path / "settings.json").write_bytes(damage)
     settings = Settings(tmp_path)
     assert settings.get("theme", "light") == "light"
-    assert settings.damaged is not None
-    assert settings.damaged.read_bytes() == damage
+    assert settings.damaged_path is not None
+    assert settings.damaged_path.read_bytes() == damage
     assert "settings.damaged.json" in settings.notice
     settings.set("theme", "dark")
     assert Settings(tmp_path).get("theme", "light") == "dark"
@@ -134,7 +134,7 @@ def test_recent_file_with_non_utf_8_name_is_saved_with_the_other_settings(
     again = Settings(tmp_path / "home")
     assert [file.path.name for file in again.all_recent_files] == [name]
     assert again.get("theme", "light") == "dark"
-    assert again.damaged is None
+    assert again.damaged_path is None
 
 
 @pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, {("a", "b"): 1}])

@@ -49,7 +49,7 @@ def test_damaged_file_is_backed_up_and_its_valid_part_is_used(path: Path) -> Non
     path.write_bytes(b"a1b")
     found = read(path)
     assert found.value == ["a", "b"]
-    assert found.problem == "The file was saved as “words.damaged.json”: there are figures in it."
+    assert found.problem == "Reason: there are figures in it. The file was saved as “words.damaged.json”."
     assert (path.read_bytes(), beside(path).read_bytes()) == (b"a1b", b"a1b")
 
 

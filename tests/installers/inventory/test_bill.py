@@ -76,7 +76,7 @@ def test_unknown_library_fails_the_build(
         monkeypatch.setattr(f"installers.inventory.__main__.{each}", lambda *_: ())
     (tmp_path / "libreadline.so.8").write_bytes(b"\x7fELF and so on")
     assert main(["linux", "0", str(tmp_path), str(tmp_path), str(tmp_path / "bill.json")]) == 1
-    assert "'libreadline.so.8' is of nothing that is told" in capsys.readouterr().err
+    assert "'libreadline.so.8' has no known origin" in capsys.readouterr().err
     assert not (tmp_path / "bill.json").exists()
 
 

@@ -135,7 +135,7 @@ def test_all_unknown_libraries_are_reported_at_once(tmp_path: Path) -> None:
         list(parts_in_folder(tmp_path, [*OURS, Part("numpy", "2", "BSD-3-Clause")]))
     lines = str(raised.value).splitlines()
     assert len(lines) == 2
-    assert all("put it into LIBRARIES" in line for line in lines)
+    assert all("add it to LIBRARIES" in line for line in lines)
 
 
 def test_ffmpeg_stubs_are_accepted_and_real_ffmpeg_is_rejected(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_system_library_without_package_fails_the_build_except_pythons_openssl(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))  # no dpkg-query
-    with pytest.raises(InventoryError, match=r"'libnss3\.so' is of no package"):
+    with pytest.raises(InventoryError, match=r"'libnss3\.so' belongs to no package"):
         list(parts_in_folder(put(tmp_path / "in", "libnss3.so"), OURS))
     (tmp_path / "in" / "libnss3.so").unlink()
     (part,) = parts_in_folder(put(tmp_path / "in", "libssl.3.dylib"), OURS)

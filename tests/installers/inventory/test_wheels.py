@@ -82,7 +82,7 @@ def test_licence_text_is_found_in_old_and_new_wheels_and_the_topmost_wins(
     (info / "RECORD").write_text("".join(f"{name},,\n" for name in reversed(names)), "utf-8")
     found = metadata.Distribution.at(info)
     assert wheels._licence_text(found, "LICENSE.txt") == (("LICENSE.txt", tmp_path / names[0]),)
-    with pytest.raises(InventoryError, match="made-up has no 'COPYING' any more"):
+    with pytest.raises(InventoryError, match="made-up no longer contains 'COPYING'"):
         wheels._licence_text(found, "COPYING")
 
 
@@ -107,7 +107,7 @@ def test_opencv_build_information_is_parsed() -> None:
 
 
 def test_unknown_component_of_opencv_is_reported() -> None:
-    with pytest.raises(InventoryError, match="OpenCV has 'libnew' inside"):
+    with pytest.raises(InventoryError, match="OpenCV contains 'libnew'"):
         list(parts_of_build("3rdparty dependencies: libnew", THEIRS))
 
 
@@ -136,13 +136,13 @@ def test_build_only_crates_are_excluded() -> None:
 
 def test_crate_without_a_licence_is_reported() -> None:
     made = {"components": [{"name": "odd", "version": "1", "purl": "pkg:cargo/odd@1"}]}
-    with pytest.raises(InventoryError, match="the crate 'odd' in wheel tells no licence"):
+    with pytest.raises(InventoryError, match="the crate 'odd' in wheel has no licence"):
         list(parts_of_crates(made, "wheel"))
 
 
 def test_unknown_crate_of_iceoryx2_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wheels, "CRATES", {})
-    with pytest.raises(InventoryError, match="iceoryx2 has the crate 'arc-swap' inside"):
+    with pytest.raises(InventoryError, match="iceoryx2 contains the crate 'arc-swap'"):
         parts_of_wheel.__wrapped__("iceoryx2")
 
 

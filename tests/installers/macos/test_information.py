@@ -80,7 +80,7 @@ def test_apple_version_has_up_to_three_numbers(given: str, told: str) -> None:
 
 
 def test_version_without_a_number_raises() -> None:
-    with pytest.raises(ValueError, match="no version 'new'"):
+    with pytest.raises(ValueError, match="invalid version 'new'"):
         apple_version("new")
 
 

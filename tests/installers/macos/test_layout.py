@@ -67,7 +67,7 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda app: put(app / "Contents/MacOS/nep-studio", header(LIBRARY)),
         "has no program 'nep-studio'",
     ),
-    "not executable": (lambda app: (app / "Contents/MacOS/nep-studio").chmod(0o644), "may not be started"),
+    "not executable": (lambda app: (app / "Contents/MacOS/nep-studio").chmod(0o644), "is not executable"),
     "no icon": (
         lambda app: (app / "Contents/Resources/nep-studio.icns").unlink(),
         "no icon 'nep-studio.icns'",
@@ -76,26 +76,26 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda app: put(app / "Contents/Resources/behaviour.icns", b"icns\0\0\1\0"),
         "no icon 'behaviour.icns'",
     ),
-    "no Spanish": (lambda app: shutil.rmtree(app / "Contents/Resources/es.lproj"), "no words for 'es'"),
-    "beside Contents": (lambda app: put(app / "readme.txt"), "readme.txt is beside Contents"),
-    "beside MacOS": (lambda app: put(app / "Contents/readme.txt"), "readme.txt has no place in Contents"),
-    "an absolute link": (link_to_the_builder, "is a link to the absolute '/usr/bin/python3'"),
-    "a link out": (link_out, "leads out of the application"),
+    "no Spanish": (lambda app: shutil.rmtree(app / "Contents/Resources/es.lproj"), "no texts for 'es'"),
+    "next to Contents": (lambda app: put(app / "readme.txt"), "readme.txt is next to Contents"),
+    "next to MacOS": (lambda app: put(app / "Contents/readme.txt"), "readme.txt is not allowed in Contents"),
+    "an absolute link": (link_to_the_builder, "is a link to the absolute path '/usr/bin/python3'"),
+    "a link out": (link_out, "is a link out of the application"),
     "a broken link": (
         lambda app: link(app / "Contents/Resources/x", "y"),
-        "Contents/Resources/x leads nowhere",
+        "Contents/Resources/x is a broken link",
     ),
     "code among resources": (
         lambda app: put(app / "Contents/Resources/cv2/cv2.so", header()),
-        "cv2.so is code among the resources",
+        "cv2.so is code in Resources",
     ),
-    "data among code": (lambda app: put(app / "Contents/Frameworks/cv2/config.py"), "config.py is no code"),
+    "data among code": (lambda app: put(app / "Contents/Frameworks/cv2/config.py"), "config.py is not code"),
     "a dot in a folder": (
         lambda app: put(app / "Contents/Frameworks/numpy.libs/a.dylib", header()),
         "numpy.libs has a dot in its name",
     ),
     "an emptied framework": (library_without_program, "QtXml.framework has no library 'QtXml'"),
-    "a file beside Versions": (file_beside_versions, "QtCore.prl is beside Versions"),
+    "a file next to Versions": (file_beside_versions, "QtCore.prl is next to Versions"),
     "no version of a framework": (
         lambda app: (app / QT / "QtCore.framework/Versions/Current").unlink(),
         "QtCore.framework has no link Versions/Current",
@@ -109,9 +109,9 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
         "there are 0 QtWebEngineCore.framework",
     ),
     "no web process": (lambda app: (app / PROCESS).unlink(), "has no Helpers/QtWebEngineProcess.app"),
-    "a web process at rest": (
+    "web process not executable": (
         lambda app: (app / PROCESS).chmod(0o644),
-        "QtWebEngineProcess may not be started",
+        "QtWebEngineProcess is not executable",
     ),
     "no texts of Chromium": (
         lambda app: (app / WEB / "Resources/icudtl.dat").unlink(),
@@ -119,15 +119,15 @@ SPOILED: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "a library that was left out": (
         lambda app: put(app / "Contents/Frameworks/a.so", header(needs=["@rpath/libzmq.5.dylib"])),
-        "a.so is linked with '@rpath/libzmq.5.dylib', which is not there",
+        "a.so is linked with '@rpath/libzmq.5.dylib', which is missing",
     ),
     "a library of the builder": (
         lambda app: put(app / "Contents/Frameworks/a.so", header(needs=["/opt/homebrew/lib/libpng.dylib"])),
-        "a.so is linked with '/opt/homebrew/lib/libpng.dylib', which is not there",
+        "a.so is linked with '/opt/homebrew/lib/libpng.dylib', which is missing",
     ),
     "another processor": (
         lambda app: put(app / "Contents/Frameworks/libpython3.13.dylib", header(machine="x86_64")),
-        "libpython3.13.dylib is made for x86_64, not for arm64",
+        "libpython3.13.dylib is built for x86_64, not arm64",
     ),
 }
 

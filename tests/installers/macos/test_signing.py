@@ -108,7 +108,7 @@ def test_ad_hoc_signing_without_identity_is_reported(
         assert name == "codesign"
         assert words[:4] == ["--force", "--sign", "-", "--timestamp=none"] or words[0] == "--verify"
     assert capsys.readouterr().out == (
-        "· signing and notarising: skipped, as NEP_MACOS_IDENTITY is not given (installers/README.md)\n"
+        "· signing and notarisation skipped: NEP_MACOS_IDENTITY is not set (installers/README.md)\n"
     )
 
 
@@ -118,7 +118,7 @@ def test_skipped_notarisation_is_reported(
     finished(tmp_path, signing.identity_of({"NEP_MACOS_IDENTITY": NAME}))
     assert {name for name, *_words in calls(tools)} == {"codesign"}
     said = capsys.readouterr().out
-    assert said == "· notarising: skipped, as NEP_MACOS_NOTARY_PROFILE is not given (installers/README.md)\n"
+    assert said == "· notarisation skipped: NEP_MACOS_NOTARY_PROFILE is not set (installers/README.md)\n"
 
 
 def test_application_is_verified_notarised_stapled_and_assessed_by_gatekeeper(
@@ -168,16 +168,14 @@ def test_rejected_notarisation_is_reported_and_nothing_is_stapled(
     identity = signing.Identity(NAME, ("--keychain-profile", "school"))
     with pytest.raises(PackageError) as caught:
         signing.notarise(context(tmp_path), put(tmp_path / "a.dmg"), identity)
-    assert str(caught.value) == (
-        "Apple did not notarise 'a.dmg' (Invalid): the signature has no secure time stamp"
-    )
+    assert str(caught.value) == "Apple rejected 'a.dmg' (Invalid): the signature has no secure time stamp"
     assert [call[1:3] for call in calls(log)] == [["notarytool", "submit"], ["notarytool", "log"]]
 
 
 def test_failed_signing_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, fails="codesign")
     monkeypatch.setenv("PATH", str(log.parent))
-    with pytest.raises(PackageError, match="'codesign' ended with 3"):
+    with pytest.raises(PackageError, match="'codesign' exited with 3"):
         finished(tmp_path, signing.Identity(NAME, ("--keychain-profile", "school")))
     assert [call[0] for call in calls(log)] == ["codesign"]
 
@@ -185,7 +183,7 @@ def test_failed_signing_aborts_packaging(tmp_path: Path, monkeypatch: pytest.Mon
 def test_failed_notary_submission_aborts_packaging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = noting_tools(tmp_path / "tools", sys.executable, fails="xcrun")
     monkeypatch.setenv("PATH", str(log.parent))
-    with pytest.raises(PackageError, match="'xcrun notarytool submit' ended with 3"):
+    with pytest.raises(PackageError, match="'xcrun notarytool submit' exited with 3"):
         signing.notarise(context(tmp_path), put(tmp_path / "a.dmg"), signing.Identity(NAME, ("--key", "k")))
 
 
@@ -193,7 +191,7 @@ def test_application_with_layout_errors_is_not_signed(tmp_path: Path, tools: Pat
     made, app = context(tmp_path), made_up_app(tmp_path)
     put(made.work / "pictures" / "behaviour.icns", ICON)
     put(app / "Contents" / "Frameworks" / "notes.txt")
-    with pytest.raises(PackageError, match=r"notes\.txt is no code"):
+    with pytest.raises(PackageError, match=r"notes\.txt is not code"):
         packer.finish(made, app, signing.Identity(NAME))
     assert calls(tools) == []
 
@@ -201,11 +199,11 @@ def test_application_with_layout_errors_is_not_signed(tmp_path: Path, tools: Pat
 @pytest.mark.parametrize(
     ("environ", "said"),
     [
-        ({"NEP_MACOS_NOTARY_PROFILE": "school"}, "give also NEP_MACOS_IDENTITY"),
-        (KEY, "give also NEP_MACOS_IDENTITY"),
+        ({"NEP_MACOS_NOTARY_PROFILE": "school"}, "set also NEP_MACOS_IDENTITY"),
+        (KEY, "set also NEP_MACOS_IDENTITY"),
         (
             {"NEP_MACOS_IDENTITY": NAME, "NEP_MACOS_NOTARY_KEY": "k"},
-            "give also NEP_MACOS_NOTARY_KEY_ID, NEP_MACOS_NOTARY_ISSUER",
+            "set also NEP_MACOS_NOTARY_KEY_ID, NEP_MACOS_NOTARY_ISSUER",
         ),
     ],
 )

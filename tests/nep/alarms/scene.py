@@ -15,10 +15,13 @@ MIDNIGHT_S = 1_790_000_000.0
 class Scene:
     """Alarms with a fake clock; `now` is in monotonic seconds."""
 
-    def __init__(self, *rules: AlarmRule, carriers: dict[str, ActionStarter] | None = None) -> None:
+    def __init__(self, *rules: AlarmRule, action_starters: dict[str, ActionStarter] | None = None) -> None:
         self.now = 100.0
         self.alarms = Alarms(
-            rules, carriers=carriers, clock=lambda: self.now, clock_s=lambda: MIDNIGHT_S + self.now
+            rules,
+            action_starters=action_starters,
+            clock=lambda: self.now,
+            clock_s=lambda: MIDNIGHT_S + self.now,
         )
         self.revision = 0
 

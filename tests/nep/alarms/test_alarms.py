@@ -33,7 +33,7 @@ def far(scene: Scene) -> None:
 def scene_with(*actions: AlarmAction, hands: Hands, **more: object) -> Scene:
     kinds = ("banner", "call", "stop")
     made = Scene(
-        rule("below", "/d", *actions, path="r", limit=1, **more), carriers=dict.fromkeys(kinds, hands)
+        rule("below", "/d", *actions, path="r", limit=1, **more), action_starters=dict.fromkeys(kinds, hands)
     )
     made.graph(("/d",))
     return made
@@ -91,7 +91,7 @@ def test_action_that_raises_does_not_block_the_next_one() -> None:
 
     hands = Hands()
     condition = rule("below", "/d", AlarmAction("stop"), AlarmAction("banner"), path="r", limit=1)
-    scene = Scene(condition, carriers={"stop": broken, "banner": hands})
+    scene = Scene(condition, action_starters={"stop": broken, "banner": hands})
     scene.graph(("/d",))
     near(scene)
     scene.wait(0.1)

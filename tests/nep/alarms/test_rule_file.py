@@ -88,7 +88,7 @@ def test_example_file_is_valid() -> None:
         ({"when": {"topic": "/t", "is": "loses", "than": 101}}, "0 to 100"),
         ({"when": {"topic": "/t", "is": "rate_below", "than": 0}}, "0.001 to 1e+06"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["baner"]}, "did you mean 'banner'"),
-        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action is"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action must be"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "the name is missing"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "at most 10 actions"),
         ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),

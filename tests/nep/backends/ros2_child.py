@@ -374,7 +374,8 @@ def test_reliable_subscriber_does_not_receive_from_a_best_effort_publisher(make:
     (alert,) = node.graph().alerts
     assert (
         alert.sentence
-        == "“b” doesn't receive “t” from “a”: it requests “reliable”, but the publisher offers “best effort”"
+        == "“t” from “a” doesn't reach “b”: the subscriber requests “reliable”, but the publisher "
+        "offers “best effort”"
     )
     wants.close()
     assert node.graph().alerts == ()
@@ -387,8 +388,8 @@ def test_type_mismatch_on_a_topic_raises_an_alert_and_delivers_nothing(make: Mak
     code += "pub.publish({'data': 1.0})\nsys.stdin.read()"
     with nep_program(code) as other:
         assert other.line() == "ready"
-        said = "it requests “std_msgs/msg/Int64”, but the publisher offers “std_msgs/msg/Float64”"
-        said = f"“a” doesn't receive “t” from “/other”: {said}"
+        said = "the subscriber requests “std_msgs/msg/Int64”, but the publisher offers “std_msgs/msg/Float64”"
+        said = f"“t” from “/other” doesn't reach “a”: {said}"
         eventually(lambda: [each.sentence for each in node.graph().alerts] == [said])
         assert sub.listen() == (False, {})
     eventually(lambda: node.graph().alerts == ())
@@ -444,7 +445,7 @@ def test_invalid_payload_field_is_named_in_log_error_and_alert(
     sub = make("b").new_sub("t", "geometry_msgs/Twist")
     pub.publish({"linear": {"x": 1}, "angular": {"z": "fast"}})
     assert "'angular.z' is a 'str'; expected a number" in caplog.text
-    assert "it is at" not in caplog.text
+    assert "the value is at" not in caplog.text
     with pytest.raises(nep.EncodeError, match="publish a map of the fields of 'geometry_msgs/msg/Twist'"):
         pub.publish([1])
     (alert,) = node.graph().alerts

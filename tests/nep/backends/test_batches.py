@@ -60,7 +60,7 @@ def stranger(node: nep.Node) -> Iterator[Callable[..., zmq.Socket[bytes]]]:
 
 
 def able(topic: str) -> bytes:
-    return wire.hello_part(next(IDS), topic, batches=True)
+    return wire.hello_part(next(IDS), topic, reads_batches=True)
 
 
 def heard(socket: zmq.Socket[bytes], count: int) -> list[tuple[int, int]]:
@@ -259,27 +259,27 @@ def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
 
 
 def test_batching_requires_a_permitting_publisher_and_supporting_subscribers() -> None:
-    batch = PendingBatch(may_wait=True)
+    batch = PendingBatch(is_enabled=True)
     batch.open_window(1000)
     assert batch.until_ns == 0  # no subscriber accepts batches yet
-    batch.set_allowed(reads_batches=True)
+    batch.set_allowed(is_supported=True)
     batch.open_window(1000)
     assert batch.until_ns == 1000 + BATCH_WINDOW_NS
-    never = PendingBatch(may_wait=False)
-    never.set_allowed(reads_batches=True)
+    never = PendingBatch(is_enabled=False)
+    never.set_allowed(is_supported=True)
     never.open_window(1000)
     assert (never.is_allowed, never.until_ns) == (False, 0)
 
 
 def test_next_flush_check_is_scheduled_by_the_maximum_delay() -> None:
-    batch = PendingBatch(may_wait=True)
+    batch = PendingBatch(is_enabled=True)
     batch.is_flush_scheduled = True
     waiting(batch, 10_000, 12_000)
     assert batch.next_check_s(20_000) == pytest.approx((MAX_DELAY_NS - 10_000) / 1e9)
     assert batch.next_check_s(10_000 + MAX_DELAY_NS) == 0.0
     assert batch.pop_batch() == [(b"x", 10_000), (b"x", 12_000)]
     assert (batch.burst_check_s, batch.is_flush_scheduled) == (0.0, False)
-    batch.is_flush_scheduled = batch.has_sent_full = True  # the publisher sends full batches itself
+    batch.is_flush_scheduled = batch.has_sent_full_batch = True  # the publisher sends full batches itself
     waiting(batch, 200_000)
     assert batch.next_check_s(200_001) > MAX_DELAY_NS / 1e9
     assert batch.next_check_s(10**9) == 0.0
@@ -288,7 +288,7 @@ def test_next_flush_check_is_scheduled_by_the_maximum_delay() -> None:
 
 
 def test_clock_set_back_does_not_delay_a_flush() -> None:
-    batch = PendingBatch(may_wait=True)
+    batch = PendingBatch(is_enabled=True)
     waiting(batch, 10**18)
     assert batch.next_check_s(5 * 10**17) == 0.0
 
@@ -340,6 +340,6 @@ def test_encoded_payload_is_not_encoded_again() -> None:
     asked = PublishHooks(
         _HeardWay(), None, lambda payload: encoded.append(payload) or b"", None, passed.append
     )
-    publish = PendingBatch(may_wait=False).publish_function(asked, _HeardWay(), threading.Lock())
+    publish = PendingBatch(is_enabled=False).publish_function(asked, _HeardWay(), threading.Lock())
     publish(Encoded(b"1"))
     assert (encoded, passed) == ([], [Encoded(b"1")])

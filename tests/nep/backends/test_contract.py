@@ -146,7 +146,7 @@ def test_payload_that_cannot_be_encoded_is_rejected_with_and_without_a_subscribe
     pub.publish(bad)
     assert (pub.subscribers, pub.count, pub.refused) == (0, 0, 1)
     assert "a message on 'topic' can't be sent (1 so far): can't encode a 'dict' as 'json'" in caplog.text
-    assert "it is at 'joints[1].angle'" in caplog.text
+    assert "the value is at 'joints[1].angle'" in caplog.text
     sub = make("b").new_sub("topic")
     assert pub.subscribers == 1
     pub.publish(bad)
@@ -245,7 +245,7 @@ def test_strict_publisher_raises_with_and_without_a_subscriber(make: Make, is_he
     pub = make("a").new_pub("topic")
     sub = make("b").new_sub("topic") if is_heard else None
     for payload, sentence in (
-        ({"joints": [0, {"angle": {1, 2}}]}, "it is at 'joints[1].angle'"),
+        ({"joints": [0, {"angle": {1, 2}}]}, "the value is at 'joints[1].angle'"),
         ({"a": "\ud800"}, "can't encode a 'dict' as 'json'"),
         (2**70, "can't encode a 'int' as 'json'"),
         ({Treacherous(): Treacherous()}, "can't encode a 'dict' as 'json'"),

@@ -39,7 +39,7 @@ def run(task: Coroutine[Any, Any, Any]) -> Any:
 
 async def armed(sub: nep.Subscriber) -> None:
     """Wait until the event loop's thread waits for this subscriber."""
-    while sub._transport not in loop_wait()._shared_wait._armed:
+    while sub._transport not in loop_wait()._shared_wait._armed_callbacks:
         await yield_to_loop()
 
 
@@ -130,7 +130,7 @@ def test_cancelled_receive_consumes_no_message(make: Make) -> None:
         await armed(sub)
         pub.publish(1)
         # The thread has notified the loop, which hasn't resumed the coroutine yet.
-        eventually(lambda: sub._transport not in loop_wait()._shared_wait._armed)
+        eventually(lambda: sub._transport not in loop_wait()._shared_wait._armed_callbacks)
         first.cancel()
         with pytest.raises(asyncio.CancelledError):
             await first

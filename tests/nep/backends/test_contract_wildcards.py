@@ -158,7 +158,7 @@ def test_latched_messages_arrive_and_a_full_inbox_drops_the_oldest(make: Make) -
     assert latest.lost == 0
 
 
-def test_patterns_and_plain_subscribers_receive_the_same_topic_independently(make: Make) -> None:
+def test_pattern_and_plain_subscribers_receive_the_same_topic_independently(make: Make) -> None:
     other, node = make("b"), make("a")
     subs = [other.new_sub(topic) for topic in ("a/*/c", "**", "a/b/c", "a/b/*", "*")]
     pub = node.new_pub("a/b/c")

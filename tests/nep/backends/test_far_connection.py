@@ -66,7 +66,7 @@ def test_hello_over_another_connection_closes_the_previous_one() -> None:
     ENDED.clear()
     subscriptions = Subscriptions("t", 7)
     one, two = (Connection(number, ("10.0.0.1", number)) for number in (1, 2))
-    hello = hello_part(5, "t", batches=True)
+    hello = hello_part(5, "t", reads_batches=True)
     for connection in (one, one, two):
         assert (
             subscriptions.handle_event(WANTED + hello, 0, lambda connection=connection: connection) == hello
@@ -74,9 +74,9 @@ def test_hello_over_another_connection_closes_the_previous_one() -> None:
     assert ENDED == [1]
     subscriptions.handle_event(GONE + hello, 0)
     subscriptions.handle_event(WANTED + hello, 0, lambda: one)
-    subscriptions.handle_event(WANTED + hello_part(6, "t", batches=True), 0, lambda: two)
+    subscriptions.handle_event(WANTED + hello_part(6, "t", reads_batches=True), 0, lambda: two)
     assert ENDED == [1], "one that left, and another subscriber's"
-    subscriptions.handle_event(WANTED + hello_part(5, "other", batches=True), 0, lambda: two)
+    subscriptions.handle_event(WANTED + hello_part(5, "other", reads_batches=True), 0, lambda: two)
     assert ENDED == [1], "no hello to this publisher"
 
 
@@ -86,6 +86,6 @@ def test_only_connections_to_other_computers_use_keep_alive() -> None:
         for host in ("127.0.0.1", "0.0.0.0", "127.0.0.1"):
             enable_keep_alive(socket_, f"tcp://{host}:*")
             seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
-            enable_keep_alive(socket_, "tcp://0.0.0.0:*", is_watched=True)
+            enable_keep_alive(socket_, "tcp://0.0.0.0:*", has_silence_check=True)
             seen.append((socket_.getsockopt(zmq.TCP_KEEPALIVE), socket_.getsockopt(zmq.TCP_MAXRT)))
     assert seen == [(-1, 0), (1, 0), (1, 15_000), (1, 0), (-1, 0), (1, 0)]

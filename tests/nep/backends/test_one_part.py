@@ -67,7 +67,7 @@ def test_capable_subscriber_receives_single_part_messages_while_no_other_subscri
     node: nep.Node, stranger: Stranger
 ) -> None:
     pub = node.new_pub("t", "bytes")
-    hello = wire.hello_part(next(IDS), "t", one_part=True)
+    hello = wire.hello_part(next(IDS), "t", reads_one_part=True)
     able = stranger("t", b"t\0", hello)
     assert able.recv_multipart()[0] == hello  # the publisher's echo
     heard(pub, able, b"small", 1)
@@ -97,7 +97,7 @@ def test_subscriber_without_hello_receives_three_parts(
     debugger.close()
     sub.close()
     eventually(lambda: pub.subscribers == 0)
-    hello = wire.hello_part(next(IDS), "t", one_part=True)
+    hello = wire.hello_part(next(IDS), "t", reads_one_part=True)
     heard(pub, stranger("t", b"t\0", hello), b"one again", 1)
 
 
@@ -105,7 +105,7 @@ def test_other_subscribers_and_topics_do_not_change_single_part_delivery_afterwa
     node: nep.Node, stranger: Stranger
 ) -> None:
     pub = node.new_pub("t", "bytes")
-    stays = wire.hello_part(next(IDS), "t", one_part=True)
+    stays = wire.hello_part(next(IDS), "t", reads_one_part=True)
     able = stranger("t", b"t\0", stays)
     heard(pub, able, b"at first", 1)
     for _ in range(5):

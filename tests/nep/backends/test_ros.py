@@ -332,7 +332,7 @@ def test_finder_imports_only_ros_packages_from_outside_the_environment(tmp_path:
         name for name in ("rospy", "numpy_of_debian", "my_msgs", "turtle") if finder.find_spec(name, None)
     ]
     assert found == ["rospy", "my_msgs"]
-    finder.extra.add("turtle")
+    finder.extra_names.add("turtle")
     assert finder.find_spec("turtle", None) is not None
     assert finder.find_spec("rospy", [str(tmp_path)]) is None
 

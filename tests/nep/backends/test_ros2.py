@@ -240,7 +240,7 @@ def test_compatible_endpoints_raise_no_alert() -> None:
 
 
 def test_incompatible_endpoints_raise_alerts_with_the_differing_settings() -> None:
-    heard = "“c” doesn't receive “t” from “a”: it requests "
+    heard = "“t” from “a” doesn't reach “c”: the subscriber requests "
     assert alerts([party("a", is_reliable=False)], [party("c")]) == {
         "ros2-reliability:t": heard + "“reliable”, but the publisher offers “best effort”"
     }
@@ -408,9 +408,9 @@ def test_invalid_file_in_a_definition_folder_is_reported_when_its_type_is_used(
         "a": -1, "b": {"c": [False, False]},
     }  # fmt: skip
     with pytest.raises(nep.NepError, match=r"'folder/msg/Wide' .*wstring"):
-        types.checked("folder/Wide")
+        types.validate("folder/Wide")
     with pytest.raises(nep.NepError, match=r"'folder/msg/Uses' has .*'a' .*'folder/msg/Wide'"):
-        types.checked("folder/Uses")
+        types.validate("folder/Uses")
 
 
 def test_scalar_array_bounded_and_nested_fields_round_trip(types: MessageTypes) -> None:

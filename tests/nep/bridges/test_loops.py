@@ -265,7 +265,7 @@ def test_one_of_two_parallel_bridges_without_trails_suspends_until_the_other_end
         strong = min(pair, key=lambda bridge: bridge.id)
         eventually(lambda: all(each.rival == strong.configuration.name for each in weak.routes))
         assert not any(each.rival for each in strong.routes)
-        assert f"the bridge '{strong.configuration.name}' also forwards '/t' and '/t'" in caplog.text
+        assert f"the bridge '{strong.configuration.name}' also connects '/t' and '/t'" in caplog.text
         here, there = (opened.enter_context(nep.node(at, "nameless", master=at)) for at in ("here", "there"))
         hears_here, hears_there, says = here.new_sub("/t"), there.new_sub("/t"), here.new_pub("/t")
         for number in range(20):
@@ -287,8 +287,8 @@ def test_second_bridge_between_the_same_networks_is_reported_once(caplog):
         bridged(a, b, topic("/t"), topic("/u"), name="one"),
         bridged(b, a, topic("/u"), name="two"),
     ):
-        eventually(lambda: caplog.text.count("the bridge 'one' also forwards '/u' and '/u'") == 1)
-        eventually(lambda: caplog.text.count("the bridge 'two' also forwards '/u' and '/u'") == 1)
+        eventually(lambda: caplog.text.count("the bridge 'one' also connects '/u' and '/u'") == 1)
+        eventually(lambda: caplog.text.count("the bridge 'two' also connects '/u' and '/u'") == 1)
         assert "'/t' and" not in caplog.text
 
 
@@ -302,7 +302,7 @@ def test_bridges_with_different_topics_or_networks_do_not_conflict(caplog):
         told = b.node("watches").new_sub(BRIDGES_TOPIC)
         for _time in range(6):
             told.receive(30.0)
-        assert {each.name for each in one._others.parallel_bridges(time.monotonic())} == {"two"}
+        assert {each.name for each in one._other_bridges.parallel_bridges(time.monotonic())} == {"two"}
         assert "too: messages arrive twice" not in caplog.text
 
 
@@ -428,4 +428,4 @@ def test_number_of_remembered_echoes_is_bounded():
         echoes.record_sent(str(number).encode(), 0.0)
     assert not echoes.is_echo(b"0", 0.0)
     assert echoes.is_echo(b"9999", 0.0)
-    assert len(echoes._sent) < 5_000
+    assert len(echoes._sent_counts) < 5_000

@@ -61,7 +61,7 @@ def test_blackboard_command_watches_topics_and_shows_values(master: Master, run:
         shown = run("show")
         assert shown.returncode == 0
         head, _line, *rows = shown.stdout.splitlines()
-        assert head.split() == ["key", "value", "age", "by", "from", "robot"]
+        assert head.split() == ["key", "value", "age", "based", "on", "from", "robot"]
         assert [row.split()[0] for row in rows if row] == keys
         assert rows[2].split()[-3:] == ["stamp", "/blackboard", "Pepper"]
         assert "\x1b" not in shown.stdout

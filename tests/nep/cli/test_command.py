@@ -125,7 +125,7 @@ def test_master_option_is_accepted_before_and_after_the_command(running_master, 
     )
 
 
-def test_command_does_not_modify_the_environment(type_in):
+def test_type_in_restores_the_environment_after_a_command(type_in):
     before = dict(os.environ)
     assert type_in("--master", "nosuchhost.invalid:7781", "topic", "list").returncode == 1
     assert dict(os.environ) == before

@@ -20,14 +20,14 @@ def error_of(text: str, **named) -> str:
 
 
 def test_incomplete_json_error_names_its_end_without_advice_about_quotes():
-    said = error_of('{"fix": {"lat": 35.7}', other_types=True)
+    said = error_of('{"fix": {"lat": 35.7}', suggest_types=True)
     assert "line 1, column 22" in said
     assert "quotes" not in said
     assert "--type" not in said
 
 
 def test_nan_error_suggests_msgpack_which_accepts_it():
-    assert error_of('{"lat": NaN}', other_types=True).endswith("use null, or use --type msgpack")
+    assert error_of('{"lat": NaN}', suggest_types=True).endswith("use null, or use --type msgpack")
     assert "--type" not in error_of('{"lat": NaN}')
     value = parse_payload('{"lat": NaN}', "msgpack")
     assert isinstance(value, dict)
@@ -49,7 +49,7 @@ def test_json_error_in_a_file_names_the_file_and_line(tmp_path):
 @pytest.mark.parametrize("text", ["hello", "it's 5 o'clock", 'say "hi"', "$HOME", "Grüße", "\x1b[31m"])
 def test_quoting_advice_is_valid_json_after_shell_parsing(text, monkeypatch):
     monkeypatch.setattr("os.name", "posix")
-    said = error_of(text, other_types=True)
+    said = error_of(text, suggest_types=True)
     assert "--type string" in said
     assert "\x1b" not in said
     advice = re.search(r"such as (.*), or use", said)

@@ -22,7 +22,7 @@ def robot(master):
         yield node
 
 
-def test_info_shows_the_program_and_topics_with_types(robot, type_in):
+def test_info_shows_the_topics_and_services_of_a_node_with_their_types(robot, type_in):
     code, out, _err = type_in("node", "info", robot.id)
     assert code == 0
     assert out.startswith(f"node: Pepper\nid: {robot.id}\n")

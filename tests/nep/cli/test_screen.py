@@ -77,6 +77,7 @@ def test_long_table_is_aligned_like_a_short_one(capsys):
 
 
 def test_long_topic_is_not_wrapped_on_a_narrow_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
     columns = [

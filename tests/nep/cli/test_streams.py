@@ -154,7 +154,7 @@ OUT = "nep: can't write the output: it is closed\n"
         ("0<&-", "topic list", 0, ""), ("0<&- 1>&-", "topic list", 1, OUT), ("1>&-", "--version", 1, OUT),
         ("1>&-", "topic list --json", 1, OUT), ("1>&-", "topic echo big --json", 1, OUT),
         ("1>&-", "topic echo text", 1, OUT), ("0<&- 1>&- 2>&-", "topic list", 1, ""),
-        ("1>&-", "topic pub new 1", 0, "published 1 on 'new' (json) to no subscribers\n"),
+        ("1>&-", "topic pub new 1", 0, "published 1 message on 'new' (json) to no subscribers\n"),
         ("2>&-", "topic echo nobody --timeout 0.1", 1, ""), ("2>&-", "topic pub new 1", 0, ""),
     ],
 )  # fmt: skip

@@ -22,7 +22,7 @@ import zmq
 from nep.errors import WireError
 from nep.messages.codecs import codec_by_number, codec_for
 from nep.protocol import wire
-from nep.protocol.batch import read_parts
+from nep.protocol.batch import parse_parts
 from tests.nep.conformance.client_connections import Connections, Handshakes
 from tests.nep.conformance.client_services import Services
 from tests.nep.conformance.client_state import Pub, Source, Stream, Sub
@@ -228,7 +228,7 @@ class Client(Connections, Services):
         return {"sub": sub.number}
 
     def hello(self, id: int, topic: str) -> bytes:
-        return wire.hello_part(id, topic, batches=True)
+        return wire.hello_part(id, topic, reads_batches=True)
 
     def filters(self, topic: str, hello: bytes) -> list[bytes]:
         return [wire.topic_part(topic), hello]
@@ -423,7 +423,7 @@ class Client(Connections, Services):
                 self.message(sub, each, is_alone=is_alone)
 
     def parsed(self, sub: Sub, parts: list[bytes]) -> list[wire.ParsedMessage]:
-        return read_parts(parts)
+        return parse_parts(parts)
 
     def is_its_topic(self, sub: Sub, topic: str) -> bool:
         return topic == sub.record["topic"] or topic in sub.topics

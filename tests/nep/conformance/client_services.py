@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -86,7 +87,9 @@ class Services:
 
     def call_at(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
         socket.connect(endpoint)
-        socket.send_multipart(call)
+        # After a failed handshake a blocking send would never return; the call is then repeated.
+        with contextlib.suppress(zmq.Again):
+            socket.send_multipart(call, zmq.NOBLOCK)
 
     def repeat_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
         socket.disconnect(endpoint)

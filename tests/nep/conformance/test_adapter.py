@@ -24,7 +24,9 @@ def test_nep_passes_every_rule() -> None:
             range(4),
         )
         outcomes = [each for some in found for each in some]
-    assert [(each.rule.id, each.status, each.observed) for each in outcomes if each.status != "passed"] == []
+    assert [
+        (each.rule.id, each.status, each.observation) for each in outcomes if each.status != "passed"
+    ] == []
     assert len(outcomes) == len(rules)
 
 

@@ -30,14 +30,14 @@ def test_correct_client_passes_every_rule() -> None:
     with ThreadPoolExecutor() as pool:  # the rules mostly wait
         found = pool.map(lambda first: list(check(Client, rules[first::8], SCALE)), range(8))
         outcomes = [each for some in found for each in some]
-    assert [(each.rule.id, each.observed) for each in outcomes if each.status != "passed"] == []
+    assert [(each.rule.id, each.observation) for each in outcomes if each.status != "passed"] == []
     assert {each.rule.id for each in outcomes} == set(RULES)
 
 
 @pytest.mark.parametrize("rule", list(RULES))
 def test_client_with_one_error_fails_the_matching_rule(rule: str, outcomes: Mapping[str, Outcome]) -> None:
     assert outcomes[rule].status == "failed"
-    assert outcomes[rule].observed
+    assert outcomes[rule].observation
 
 
 def test_rule_whose_feature_is_not_announced_is_skipped() -> None:
@@ -47,4 +47,4 @@ def test_rule_whose_feature_is_not_announced_is_skipped() -> None:
 
     (outcome,) = check(Plain, select_rules(["latched"]), SCALE)
     assert outcome.status == "skipped"
-    assert "latched" in outcome.observed
+    assert "latched" in outcome.observation

@@ -140,10 +140,10 @@ def test_unwritable_folders_are_reported_with_the_reason(tmp_path):
 
 
 def test_file_that_shadows_the_package_is_found(tmp_path):
-    assert collect_facts("127.0.0.1:1", working_folder=tmp_path).shadow == ""
+    assert collect_facts("127.0.0.1:1", working_folder=tmp_path).shadowing_file == ""
     (tmp_path / "nep.py").touch()
-    assert collect_facts("127.0.0.1:1", working_folder=tmp_path).shadow == str(tmp_path / "nep.py")
-    assert collect_facts("127.0.0.1:1", working_folder=REPOSITORY).shadow == ""
+    assert collect_facts("127.0.0.1:1", working_folder=tmp_path).shadowing_file == str(tmp_path / "nep.py")
+    assert collect_facts("127.0.0.1:1", working_folder=REPOSITORY).shadowing_file == ""
 
 
 def test_loopback_check_passes():

@@ -81,7 +81,7 @@ def test_master_of_another_version_is_reported_with_a_fix():
         "0.2.0. New features and fixes may not work with it."
     )
     assert (one.severity, one.command) == ("warning", "kill 41")
-    assert one.fix.startswith("Stop it. If Studio is open, it starts a new master")
+    assert one.fix.startswith("Stop that master. If Studio is open, it starts a new one")
     there = found(versions=versions, master_install=older, platform="win32")["master:version"]
     assert there.command == "taskkill /F /PID 41"
 
@@ -249,7 +249,7 @@ def test_original_package_its_leftover_files_and_shadowing_files_are_reported():
     assert "package:files" not in both, "the first fix cures both"
     left = found(original_files=("publisher.py", "master.py"))["package:files"]
     assert "publisher.py, master.py" in left.sentence
-    assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
+    assert found(shadowing_file="/home/me/nep.py")["package:shadow"].severity == "warning"
 
 
 OUR_JS = PackageFact("nep-js", "0.2.0", "/home/me/node_modules/nep-js")
@@ -329,7 +329,7 @@ def test_folder_clock_and_loopback_problems_are_reported():
 
 
 def test_findings_are_sorted_by_severity_and_the_worst_sets_the_exit_code():
-    made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False), shadow="x"))
+    made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False), shadowing_file="x"))
     assert [each.severity for each in made][:2] == ["error", "warning"]
     assert exit_code(made) == 2
 
@@ -346,6 +346,6 @@ def test_report_is_plain_text_with_fixes():
 
 
 def test_findings_are_complete_sentences():
-    for each in (*findings(HEALTHY), *found(view=None, master_port=None, shadow="/x").values()):
+    for each in (*findings(HEALTHY), *found(view=None, master_port=None, shadowing_file="/x").values()):
         assert each.sentence.endswith(".")
         assert each.sentence[0].isupper() or each.sentence[0] in "“/"

@@ -149,7 +149,7 @@ def test_readable_unreadable_and_blocked_messages_are_reported():
     assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is not valid JSON."
     blocked = found(**publisher(last_message_s=NOW))["topic:blocked"]
     assert blocked.sentence.startswith(
-        "camera_driver (lab) sends /robot/camera, but no messages were received"
+        "/robot/camera is published by camera_driver (lab), but no messages were received"
     )
 
 

@@ -45,11 +45,11 @@ def test_repeated_registration_is_stored_once_and_other_programs_separately():
 
 
 def test_registrations_are_discarded_and_ports_kept_after_a_reboot(tmp_path):
-    before = PortMap(tmp_path / "map.json", boot=1000.0)
+    before = PortMap(tmp_path / "map.json", boot_time_s=1000.0)
     before.assign(JSON_A, 9000)
     before.add(registration())
     before.save()
-    after = PortMap(tmp_path / "map.json", boot=5000.0)
+    after = PortMap(tmp_path / "map.json", boot_time_s=5000.0)
     assert after.port_of(JSON_A) == 9000
     assert not after.registrations
 

@@ -17,13 +17,13 @@ class FakeProcesses:
         self.joined = set()
         self.is_secret = False
 
-    def started(self, pid):
+    def start_time_s(self, pid):
         return self.running.get(pid)
 
     def language(self, pid):
         return "python"
 
-    def is_connected(self, pid, port, *, binds):
+    def is_connected(self, pid, port, *, is_bound_by_process):
         return None if self.is_secret else (pid, port) in self.joined
 
 
@@ -34,7 +34,7 @@ def scene():
     pair = SimpleNamespace(
         ends=endpoints_of(LINE, 9000),
         connections={"publisher": 0, "subscriber": 0},
-        openings=0,
+        connect_count=0,
         unsupported_versions={},
     )
     now = [0.0]
@@ -114,7 +114,7 @@ def test_program_without_process_id_lives_as_long_as_its_connection(scene):
 def test_program_that_left_between_polls_is_removed(scene):
     register(scene)
     scene.programs.update()
-    scene.pair.openings = 1
+    scene.pair.connect_count = 1
     scene.now[0] = 11.0
     scene.programs.update()
     assert scene.programs.remove_ended()
@@ -123,7 +123,7 @@ def test_program_that_left_between_polls_is_removed(scene):
 def test_short_foreign_connection_does_not_remove_a_connecting_program(scene):
     register(scene)
     scene.programs.update()
-    scene.pair.openings = 1
+    scene.pair.connect_count = 1
     scene.now[0] = 3.0
     scene.programs.update()
     assert not scene.programs.remove_ended()

@@ -28,10 +28,10 @@ def test_newest_departed_publishers_are_kept_for_a_minute_and_bounded() -> None:
     departed.tick(69.0)
     assert departed.for_topic("t")[99] == "again"
     assert 99 not in departed.for_topic("**")
-    before = departed.changes
+    before = departed.removal_count
     departed.tick(70.0)
     assert list(departed.for_topic("t")) == [99]
-    assert departed.changes > before
+    assert departed.removal_count > before
     departed.tick(129.0)
     assert not departed.for_topic("t")
 

@@ -186,7 +186,7 @@ def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
         assert port.peer_address() == "127.0.0.1"
     sockets.pop(b"b").close()
     now = 100.0
-    eventually(lambda: port.take_ended_senders(now) == [] and b"b" in port._ended)
+    eventually(lambda: port.take_ended_senders(now) == [] and b"b" in port._ended_at)
     assert port.take_ended_senders(now + 0.4) == []
     assert port.take_ended_senders(now + 0.6) == [b"b"]
     assert port.take_ended_senders(now + 9.0) == []
@@ -195,7 +195,7 @@ def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
     assert port.receive()[0] == b"d"
     for socket in (*sockets.values(), again):
         socket.close()
-    eventually(lambda: port.take_ended_senders(now) == [] and set(port._ended) == {b"a", b"c", b"d"})
+    eventually(lambda: port.take_ended_senders(now) == [] and set(port._ended_at) == {b"a", b"c", b"d"})
     assert sorted(port.take_ended_senders(now + 1.0)) == [b"a", b"c", b"d"]
     assert port._senders == {}
     context.term()

@@ -64,6 +64,7 @@ def test_arbitrary_bytes_decode_or_raise_decode_error(name: str, data: bytes) ->
 
 
 def test_codecs_are_found_by_name_number_and_message_type() -> None:
+    assert [codec(name) for name in CODECS] == list(CODECS.values())
     assert [codec_by_number(number) for number in range(1, 6)] == list(CODECS.values())
     assert codec_by_number(99) is None
     assert codec_for("robot/description").name == codec_for("dictionary").name == "json"

@@ -241,7 +241,7 @@ def test_invalid_endpoint_does_not_block_other_publishers(
             assert re.search(r"'.*' of 'bad': .*\(2 so far\)", transport.counts().problem)
             assert "\x1b" not in transport.counts().problem + caplog.text
             for each in bad:
-                transport.publisher_removed(each.publisher.id, 0, is_closed=False)
+                transport.handle_publisher_removed(each.publisher.id, 0, is_closed=False)
             socket.rejections = type(socket.rejections)()
             assert transport.counts().problem == ""
 

@@ -61,7 +61,7 @@ def test_removed_topics_leave_no_entries_in_master_tables() -> None:
             assert len(viewer._topics) == 2
         registry.remove_publisher("n", 1)
         registry.remove_subscriber("n", 2)
-    assert (registry.touched, registry._topic_revisions) == (set(), {})
+    assert (registry.changed_topics, registry._topic_revisions) == (set(), {})
     assert (registry.publisher_owners, registry.subscriber_owners) == ({}, {})
     assert viewer.view(7).topics == {}
     assert (viewer._topics, viewer._alerts) == ({}, {})
@@ -120,7 +120,7 @@ def test_graph_is_decoded_in_the_calling_thread_and_not_the_node_thread(pair: Si
     topics = {f"/t{n}": TopicInfo(f"/t{n}", "json", "json") for n in range(3)}
     seen = GraphReply(7, 1, GraphView(7, 1, {}, topics))
     pair.router.send_multipart([sender, encoding.encode_reply(seen, encoding.decode_request(body).call)])
-    eventually(lambda: pair.calls.read() == [] and asked.view is not None)
+    eventually(lambda: pair.calls.read() == [] and asked.graph_reply is not None)
     assert asked.reply is None  # nothing was decoded yet
     assert pair.calls.wait(asked, 1.0) == seen
 
@@ -235,7 +235,7 @@ def test_oldest_unconnected_registration_is_evicted_first() -> None:
 
 def test_original_request_with_oversized_text_is_rejected() -> None:
     request = b'{"node":"n","topic":"t","socket":"publisher","msg_type":"%s"}' % (b"x" * 10_000)
-    with pytest.raises(RequestError, match="has 10000 letters"):
+    with pytest.raises(RequestError, match="has 10000 characters"):
         parse_request(request, PORT_A)
 
 
@@ -255,7 +255,7 @@ def test_undecodable_graph_reply_raises_in_the_waiting_thread(pair: SimpleNamesp
 
     thread = threading.Thread(target=wait)
     thread.start()
-    eventually(lambda: pair.calls.read() == [] and asked.view is not None)
+    eventually(lambda: pair.calls.read() == [] and asked.graph_reply is not None)
     thread.join(5.0)
     assert re.match("RequestRefusedErrorthe master's .*msgpack", failed[0])
 

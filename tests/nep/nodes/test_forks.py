@@ -166,7 +166,7 @@ def forever(do):
     return thread
 
 def come_and_go():
-    with nep.node("guest") as guest:
+    with nep.node("guest", wait_s=30.0) as guest:
         guest.new_pub("topic").publish("guest")
 
 logging.getLogger().addHandler(node.log_handler)

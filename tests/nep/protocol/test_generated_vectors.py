@@ -12,7 +12,7 @@ import pytest
 from nep.errors import WireError
 from nep.messages.packing import unpack
 from nep.protocol import wire
-from nep.protocol.batch import read_parts
+from nep.protocol.batch import parse_parts
 from nep.protocol.encoding import decode_reply, decode_request, encode_reply, encode_request
 from tests.nep.protocol import wire_tables
 from tools import wire_vectors
@@ -32,7 +32,7 @@ def name_of(vector: dict[str, Any]) -> str:
 
 def code_of(parts: list[bytes]) -> str:
     with pytest.raises(WireError) as refused:
-        read_parts(parts)
+        parse_parts(parts)
     return refused.value.code
 
 
@@ -57,7 +57,7 @@ def test_batch_is_decoded_or_rejected_with_its_error_code(vector: dict[str, Any]
     if "error" in vector:
         assert code_of([part]) == vector["error"]
         return
-    for read, means in zip(read_parts([part]), vector["means"], strict=True):
+    for read, means in zip(parse_parts([part]), vector["means"], strict=True):
         assert bytes(read.payload).hex() == means["payload"]
         assert (str(read.header.seq), str(read.header.stamp_ns)) == (means["seq"], means["stamp_ns"])
         assert str(read.header.publisher) == means["publisher"]
@@ -80,14 +80,14 @@ def test_subscription_filter_is_parsed_and_encoded_or_rejected(vector: dict[str,
         assert wire.topic_part(said["topic"]) == part
     elif kind == "hello":
         assert hello is not None
-        level = hello.reads_one_part + hello.acknowledges + hello.reads_batches
+        level = hello.reads_one_part + hello.acknowledges_echoes + hello.reads_batches
         assert (str(hello.subscriber), hello.topic, level) == (
             said["subscriber"],
             said["topic"],
             said["level"],
         )
         again = wire.hello_part(
-            *hello[:2], one_part=level > 0, acknowledges_echoes=level > 1, batches=level > 2
+            *hello[:2], reads_one_part=level > 0, acknowledges_echoes=level > 1, reads_batches=level > 2
         )
         assert again == part
     elif kind == "read":

@@ -101,7 +101,9 @@ def test_single_part_message_is_split_like_three_parts(
 
 @given(st.integers(0, 2**64 - 1), TOPICS, st.booleans(), st.booleans(), st.booleans())
 def test_hello_round_trip(subscriber: int, topic: str, one_part: bool, tells: bool, batches: bool) -> None:
-    part = wire.hello_part(subscriber, topic, one_part=one_part, acknowledges_echoes=tells, batches=batches)
+    part = wire.hello_part(
+        subscriber, topic, reads_one_part=one_part, acknowledges_echoes=tells, reads_batches=batches
+    )
     said = (one_part or tells or batches, tells or batches, batches)
     assert wire.parse_hello(part) == (subscriber, topic, *said)
     assert part > wire.topic_part(topic)  # libzmq sends filters in byte order

@@ -98,11 +98,11 @@ def test_publisher_sends_the_bytes_of_the_vector(
     monkeypatch.setattr("nep.backends.zeromq.publisher._time_ns", lambda: said["stamp_ns"])
     theirs.subscribe(wire.topic_part(said["topic"]))
     if len(parts) == 1:  # sent only to subscribers that announce support
-        theirs.subscribe(wire.hello_part(7, said["topic"], one_part=True))
+        theirs.subscribe(wire.hello_part(7, said["topic"], reads_one_part=True))
     theirs.connect(known.endpoints[0])
     eventually(lambda: publisher.subscribers if len(parts) == 1 else sends.has_subscribers)
     if len(parts) == 1:
-        assert theirs.recv_multipart()[0] == wire.hello_part(7, said["topic"], one_part=True)
+        assert theirs.recv_multipart()[0] == wire.hello_part(7, said["topic"], reads_one_part=True)
     payload = bytes.fromhex(said["payload"])
     sends.send(Encoded(payload, said["extension"] or None))
     got = theirs.recv_multipart()

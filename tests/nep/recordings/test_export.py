@@ -201,9 +201,9 @@ def test_failed_video_export_raises_and_leaves_no_file(tmp_path, monkeypatch):
 
 def truncate(film):
     """Truncate the video as a full disk does; OpenCV reports no error."""
-    film._film.release()
+    film._writer.release()
     with suppress(FileNotFoundError):
-        os.truncate(film._written, 100)
+        os.truncate(film._video_path, 100)
 
 
 def test_export_of_a_time_range_contains_only_its_messages(recording, tmp_path):

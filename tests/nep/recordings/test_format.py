@@ -39,7 +39,7 @@ VALUES = st.recursive(
 
 def there_and_back(message: Message, *, is_self_contained: bool = False) -> Message:
     encoding = encoding_of(message, START_NS, is_self_contained=is_self_contained)
-    data = memoryview(encoding.before + bytes(message.data))
+    data = memoryview(encoding.prefix + bytes(message.data))
     raw = RawMessage(0, 1, encoding.sequence, START_NS, encoding.publish_ns, data)
     return ChannelDecoder(definition_of(message, encoding)).message(raw)
 
@@ -144,7 +144,7 @@ def test_images_are_foxglove_messages_with_the_original_bytes():
     ):
         encoding = encoding_of(message, START_NS)
         definition = definition_of(message, encoding)
-        found = dict(fields(memoryview(encoding.before + bytes(message.data))))
+        found = dict(fields(memoryview(encoding.prefix + bytes(message.data))))
         assert (definition.schema_name, definition.message_encoding) == (name, "protobuf")
         assert bytes(found[data_field]) == bytes(message.data)
         if name.endswith("CompressedImage"):
@@ -168,7 +168,7 @@ def test_google_protobuf_parses_a_recorded_image():
     for file in descriptor_pb2.FileDescriptorSet.FromString(descriptor_set("foxglove.CompressedImage")).file:
         pool.Add(file)
     kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("foxglove.CompressedImage"))
-    made = kind.FromString(encoding_of(message, START_NS).before + bytes(message.data))
+    made = kind.FromString(encoding_of(message, START_NS).prefix + bytes(message.data))
     assert (made.data, made.format) == (bytes(message.data), "jpeg")
     assert made.timestamp.seconds * 10**9 + made.timestamp.nanos == message.stamp_ns
 
@@ -214,7 +214,7 @@ def test_recordings_of_other_programs_are_read_with_every_compression(tmp_path: 
             encoding = encoding_of(wrapped, 0)
             for seq in range(20):  # other programs don't sort by time
                 writer.add_message(odom, 1000 - seq, b"{}", 5, seq)
-            writer.add_message(camera, 1000, encoding.before + bytes(wrapped.data), 6, 3)
+            writer.add_message(camera, 1000, encoding.prefix + bytes(wrapped.data), 6, 3)
             writer.add_message(ros, 7, b"\0\1", 7, 1)
             writer.finish()
         with Recording(path) as recording:

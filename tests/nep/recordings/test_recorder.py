@@ -80,7 +80,7 @@ def test_each_message_is_recorded_once_including_the_first_of_later_topics(make)
     node, heard = make("recorder"), Heard()
     before = make("before").new_pub("/arm/joints")
     selection = TopicSelection(("/arm/*", "/arm/joints", "/cam*"), ("/arm/secret",))
-    with Recorder(node, heard, selection, look_s=0.05):
+    with Recorder(node, heard, selection, poll_interval_s=0.05):
         later = make("later")
         publishers = {
             topic: later.new_pub(topic) for topic in ("/camera", "/other", "/arm/secret", "/arm/leg")
@@ -109,7 +109,7 @@ def test_robot_descriptions_and_alerts_are_recorded_for_any_selection(master):
         robot.new_pub("/pepper/description", "robot/description", latched=True).publish({"n": 1})
         robot.new_pub("/twice", "json")
         robot.new_pub("/twice", "string")  # two types on one topic are an alert
-        with Recorder(node, heard, TopicSelection(("/other",)), look_s=0.05):
+        with Recorder(node, heard, TopicSelection(("/other",)), poll_interval_s=0.05):
             until(lambda: heard.of("/pepper/description") == [1])
             until(lambda: any(role == "alerts" and "/twice" in json.dumps(each) for role, each in heard.said))
         descriptions = [each for each in heard.messages if each.topic == "/pepper/description"]

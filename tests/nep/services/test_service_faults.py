@@ -341,7 +341,7 @@ def test_spin_wakes_for_a_new_server_and_for_each_call(
     with nep.node("server") as a, nep.node("client") as b:
         spinner = threading.Thread(target=a.spin, name="spin")
         spinner.start()  # before any server exists
-        eventually(lambda: a._transport._waiting)  # no wake-up is lost after the first wait
+        eventually(lambda: a._transport._thread_waits)  # no wake-up is lost after the first wait
         a.new_server("/x", lambda request: request)
         client = b.new_client("/x", timeout_s=LONG_S)
         assert [client.call(n) for n in range(300)] == list(range(300))

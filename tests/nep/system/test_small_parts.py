@@ -174,13 +174,13 @@ class Bell:
         rest = self.rests.pop(0)
         if rest.due == -1.0:
             raise ZeroDivisionError
-        return PollState(rest.pause_reading, None if rest.due is None else now + rest.due)
+        return PollState(rest.is_reading_paused, None if rest.due is None else now + rest.due)
 
 
 def test_io_thread_serves_on_wake_requests_and_deadlines() -> None:
     io = IoThread("nep-io-test")
     io.start()
-    bell = Bell([PollState(), PollState(pause_reading=True, due=0.05), PollState(), PollState()])
+    bell = Bell([PollState(), PollState(is_reading_paused=True, due=0.05), PollState(), PollState()])
     io.add(bell)
     assert bell.served.acquire(timeout=30.0)
     bell.waker.wake()
@@ -215,7 +215,7 @@ def test_io_thread_serves_a_sender_as_soon_as_its_socket_is_writable() -> None:
                     self.left -= ours.send(bytes(min(self.left, 65_536)))
             if not self.left:
                 self.sent.set()
-            return PollState(pause_reading=True, sends=self.left > 0)
+            return PollState(is_reading_paused=True, wants_write=self.left > 0)
 
     with ours, theirs:
         ours.setblocking(False)

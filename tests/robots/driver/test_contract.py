@@ -141,7 +141,7 @@ class Bench:
 
 def required(action: Action) -> dict[str, object]:
     """Return an input with the required parameters only."""
-    return {p.name: good_for(p) for p in action.parameters if p.required}
+    return {p.name: good_for(p) for p in action.parameters if p.is_required}
 
 
 def good_for(parameter: Parameter) -> object:
@@ -157,7 +157,7 @@ def good_for(parameter: Parameter) -> object:
         held = parameter.item or Parameter("value", "value", "text")
         return [good_for(each) for each in parameter.prefix_items] or [good_for(held)] * parameter.min_length
     if parameter.kind == "object":
-        return {each.name: good_for(each) for each in parameter.fields if each.required}
+        return {each.name: good_for(each) for each in parameter.fields if each.is_required}
     return {"boolean": False, "colour": "#20c0e0"}.get(parameter.kind, "x" * max(1, parameter.min_length))
 
 
@@ -240,7 +240,7 @@ def test_description_is_valid_and_every_declared_action_has_a_function(bench, re
             continue
         assert f"\n{action.icon}\t" in resources.path("icons", "lucide.txt").read_text("utf-8")
     assert bench.robot.heartbeat_interval_s is not None
-    assert bench.robot.safe_stop.confirmed
+    assert bench.robot.safe_stop.can_confirm
     assert bench.robot.safe_stop.watchdog_s is not None
 
 
@@ -315,7 +315,7 @@ def test_each_action_has_exactly_one_final_reply_and_cancellable_ones_can_be_can
             assert bench.ears.states(wanted)[:2] == ["accepted", "running"]
             # an action with nothing to do (standing up while standing) may finish before its cancel,
             # and an action with a made-up value may reject it
-            made_up = any(p.required and p.default is None for p in action.parameters)
+            made_up = any(p.is_required and p.default is None for p in action.parameters)
             allowed = ["succeeded", *["canceled"] * action.cancellable, *["failed"] * made_up]
             assert ended in allowed, (action.name, bench.finals(wanted))
             canceled += [action.name] * (ended == "canceled")
@@ -370,7 +370,7 @@ def test_busy_robot_queues_replaces_or_rejects_actions_as_declared(shared) -> No
             bench.running(second)
 
 
-def test_missing_heartbeat_of_the_program_stops_a_moving_robot(bench) -> None:
+def test_missing_heartbeat_of_the_program_cancels_its_running_action(bench) -> None:
     wanted = bench.begun("silent")
     bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
     ended = bench.ears.final(wanted)
@@ -395,7 +395,7 @@ def test_invalid_inputs_are_rejected_with_a_message_and_no_action_runs(bench) ->
     for action in bench.actions():
         inputs: list[object] = [{"no such thing": 1}, "text", [1, 2]]
         inputs += [{**required(action), p.name: wrong_for(p.kind)} for p in action.parameters]
-        inputs += [{**required(action), p.name: None} for p in action.parameters if not p.nullable]
+        inputs += [{**required(action), p.name: None} for p in action.parameters if not p.is_nullable]
         limited = [p for p in action.parameters if p.maximum is not None]
         inputs += [{**required(action), p.name: (p.maximum or 0) + 1} for p in limited]
         for given in inputs:
@@ -438,7 +438,7 @@ def test_robot_stops_and_accepts_an_action_after_hostile_messages(bench) -> None
             assert bench.stop()["state"] == "succeeded", payload[:200]
     assert bench.stop()["state"] == "succeeded"
     wanted = bench.invoke(bench.any_action())
-    eventually(lambda: bench.ears.states(wanted))
+    eventually(lambda: "accepted" in bench.ears.states(wanted))
 
 
 def test_duplicate_command_runs_once(bench) -> None:
@@ -477,7 +477,7 @@ def test_actions_that_use_different_parts_succeed_concurrently_with_the_real_clo
         taken: set[str] = set()
         asked: dict[str, Mapping[str, object]] = {}
         for action in robot.actions:
-            made_up = any(p.required and p.default is None for p in action.parameters)
+            made_up = any(p.is_required and p.default is None for p in action.parameters)
             if taken & set(action.uses) or action.name == robot.safe_stop.action or made_up:
                 continue
             taken |= set(action.uses)
@@ -485,3 +485,4 @@ def test_actions_that_use_different_parts_succeed_concurrently_with_the_real_clo
             ears.invoke(action.name, action.name, **required(action))
         for wanted in asked:
             assert ears.final(wanted)["state"] == "succeeded", wanted
+            assert all("waits_for" not in reply for reply in ears.answers(wanted)), wanted

@@ -132,7 +132,7 @@ def test_busy_policies_queue_replace_and_reject(turtle):
     assert [entry for entry in body.done if entry[0] == "say"] == [("say", "one"), ("say", "two")]
 
 
-def test_call_of_a_non_cancellable_action_is_marked_as_non_cancellable(turtle):
+def test_omitted_parameter_has_its_default_value(turtle):
     body, ears, _ = turtle
     ears.invoke("1", "light", colour="#102030")
     assert ears.final("1")["state"] == "succeeded"

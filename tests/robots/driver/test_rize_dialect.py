@@ -26,7 +26,7 @@ def robot():
 
 def test_rize_robot_has_the_rize_dialect_and_capabilities(robot):
     assert (robot.name, robot.dialect, robot.virtual) == ("Pepper", "rize", False)
-    assert not robot.safe_stop.confirmed
+    assert not robot.safe_stop.can_confirm
     assert robot.safe_stop.watchdog_s is None
     assert (robot.topics.command, robot.topics.reply) == ("robot_action", "action_state")
     assert all(action.topic == "robot_action" for action in robot.actions)

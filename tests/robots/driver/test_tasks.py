@@ -82,6 +82,17 @@ def test_non_cancellable_task_is_not_replaced(world: World) -> None:
     assert world.states("kick") == ["accepted", "running", "succeeded"]
 
 
+def test_cancel_of_a_running_non_cancellable_task_is_rejected(world: World) -> None:
+    world.ask("kick", ("legs",), cancellable=False)
+    eventually(ran(world, "kick"))
+    errors: list[str | None] = []
+    world.tasks.call_soon(lambda: errors.append(world.tasks.cancel(lambda _task: True)))
+    eventually(lambda: errors)
+    assert errors == ["kick can't be cancelled; it ends on its own"]
+    world.let_go["kick"].set()
+    eventually(lambda: world.states("kick") == ["accepted", "running", "succeeded"])
+
+
 def test_full_queue_rejects_a_task_with_a_message(world: World) -> None:
     world.ask("first", ("arm",))
     eventually(ran(world, "first"))

@@ -24,7 +24,7 @@ def run(body: Body, until, limit_s: float = 60.0) -> float:
 
 
 def events(body: Body) -> list[tuple[str, dict[str, object]]]:
-    return [(happening.event, happening.data) for happening in body.events]
+    return [(event.name, event.data) for event in body.events]
 
 
 def test_robot_turns_by_the_angle_within_the_requested_speed():
@@ -134,16 +134,16 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     body.touch("head", down=True)
     body.touch("head", down=False)
     body.step(MIN_TOUCH_S - 0.05)
-    assert list(body.touched) == ["head"]
+    assert list(body.touch_durations_s) == ["head"]
     body.step(0.1)
     assert events(body) == [("touched", {"place": "head"}), ("released", {"place": "head"})]
-    assert not body.touched
+    assert not body.touch_durations_s
     body.touch("head", down=True)
     body.touch("head", down=False)
     body.step(0.1)
     body.touch("head", down=True)  # pressed during the tap: held from now on
     body.step(5)
-    assert list(body.touched) == ["head"]
+    assert list(body.touch_durations_s) == ["head"]
 
 
 def test_drawing_state_contains_the_speech_progress():
@@ -182,7 +182,7 @@ def test_reset_restores_pose_touches_and_room():
     body.room = body.room.with_moved("ball", 0.5, 1.0)
     body.reset(Room())
     run(body, lambda: body.is_still)
-    assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
+    assert (body.x, body.theta_deg, body.touch_durations_s, body.room) == (-0.5, 0.0, {}, Room())
 
 
 def test_drawing_state_has_position_speech_touches_and_objects():

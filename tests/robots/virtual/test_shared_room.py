@@ -176,7 +176,7 @@ def place(ears: Ears, name: str) -> tuple[float, float]:
     return next(((t["x"], t["y"]) for t in things if t["name"] == name), (99.0, 99.0))
 
 
-def test_objects_moved_added_or_removed_by_the_user_change_for_present_and_later_robots(
+def test_user_changes_to_the_room_reach_running_robots_and_robots_started_later(
     robots: Robots,
 ) -> None:
     pepper = robots.start(PEPPER, "Pepper")
@@ -205,7 +205,7 @@ def test_pushed_ball_moves_for_the_other_robot(robots: Robots) -> None:
     eventually(lambda: place(pepper, "ball") == place(turtle, "ball"))
 
 
-def test_distance_sensor_measures_another_robot_until_its_process_ends(robots: Robots) -> None:
+def test_distance_sensor_measures_another_robot_until_its_driver_is_closed(robots: Robots) -> None:
     here = RoomMap()
     here.remove("Aiko")
     robots.room.publish(here.message())
@@ -221,7 +221,7 @@ def test_distance_sensor_measures_another_robot_until_its_process_ends(robots: R
     eventually(lambda: pepper.heard["distance"][-1]["value"] > 3.0)
 
 
-def test_two_robots_of_the_same_kind_do_not_start_overlapping(robots: Robots) -> None:
+def test_second_robot_of_the_same_kind_moves_away_from_the_start_of_the_first(robots: Robots) -> None:
     first, second = robots.start(PEPPER, "Ada"), robots.start(PEPPER, "Bob")
 
     def gap() -> float:

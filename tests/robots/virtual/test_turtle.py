@@ -70,7 +70,7 @@ def test_robot_stops_at_an_obstacle_and_publishes_the_bumped_side(start, speed, 
     body.step(3.0)
     assert body.pressed_bumper == side
     assert body.is_still
-    assert [(h.event, h.data) for h in body.events] == [("bump", {"side": side})]
+    assert [(h.name, h.data) for h in body.events] == [("bump", {"side": side})]
     body.drive(-speed, 0.0)
     body.step(0.5)
     assert body.pressed_bumper == ""
@@ -94,7 +94,7 @@ def test_pressed_bumper_stops_the_robot_and_is_released_after_its_press_duration
     assert (body.pressed_bumper, body.is_still) == ("left", True)
     body.step(PRESS_DURATION_S)
     assert body.pressed_bumper == ""
-    assert [(h.event, h.data) for h in body.events] == [("bump", {"side": "left"})]
+    assert [(h.name, h.data) for h in body.events] == [("bump", {"side": "left"})]
 
 
 # ---- camera ----------------------------------------------------------------------------------------
@@ -228,7 +228,7 @@ def test_stop_during_a_move_ends_the_move_immediately(turtle) -> None:
     assert pose(ears) == where
 
 
-def test_move_into_an_obstacle_fails_and_publishes_a_bump_event(turtle) -> None:
+def test_go_to_a_position_inside_an_obstacle_fails_and_publishes_a_bump_event(turtle) -> None:
     _, ears = turtle
     ears.invoke("1", "go_to", x=0.3, y=-2.2)  # inside the shelf
     ended = ears.final("1")

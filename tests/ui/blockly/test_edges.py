@@ -65,7 +65,7 @@ def test_outlines_follow_a_moved_script(qtbot, view, person) -> None:
 @pytest.mark.parametrize("mode", ["light", "dark"])
 def test_outline_has_enough_contrast_on_every_colour(view, person, mode) -> None:
     them = person(LOOPS)
-    view.set_theme(TOKENS, dark=mode == "dark")
+    view.set_theme(TOKENS, is_dark=mode == "dark")
     style = "getComputedStyle(document.querySelector('[data-id=inner] > .blocklyPath'))"
     them.wait_for(f"{style}.stroke", "rgb(255, 255, 255)")
     share = float(them.ask(f"{style}.strokeOpacity"))
@@ -83,7 +83,7 @@ def mixed(front: str, back: str, share: float) -> str:
 @pytest.mark.parametrize("mode", ["light", "dark"])
 def test_selected_block_has_two_tones_with_enough_contrast(view, person, mode) -> None:
     them = person(LOOPS, at(SAY, 420, 56))
-    view.set_theme(TOKENS, dark=mode == "dark")
+    view.set_theme(TOKENS, is_dark=mode == "dark")
     tones = "[...document.querySelectorAll('.nepSelection path')].map(e => getComputedStyle(e).stroke)"
     for name in ("say", "below", "inner"):
         them.click(f"[data-id={name}] > .blocklyPath", dx=8, dy=8)

@@ -117,7 +117,7 @@ def test_show_me_points_to_the_category_and_then_to_the_block_until_the_block_is
 
 def test_keyboard_user_is_shown_keyboard_hints_and_the_category_is_focused(empty: Person) -> None:
     said = "document.querySelector('.nepBeginKeys').textContent"
-    assert empty.ask(said).startswith("With the keyboard: press Ctrl+B, choose it with the arrow keys")
+    assert empty.ask(said).startswith("With the keyboard: press Ctrl+B, choose the block with the arrow keys")
     empty.view.setFocus()
     empty.wait_for("document.hasFocus()")
     for _ in range(MANY):

@@ -134,5 +134,5 @@ def test_focus_moves_to_the_connection_of_the_deleted_block(qtbot, them):
 
 
 def test_block_shortcuts_are_listed_as_fixed_shortcuts():
-    listed = {key for fixed in FIXED_KEYS if fixed.scope == "Blocks" for key in fixed.key.split(", ")}
+    listed = {key for fixed in FIXED_KEYS if fixed.scope == "Blocks" for key in fixed.keys.split(", ")}
     assert {"Ctrl+D", "Ctrl+M", "Ctrl+L", "Ctrl+B", "Delete", "Alt+Down"} <= listed

@@ -17,7 +17,7 @@ def test_theme_change_keeps_program_and_undo(qtbot, view, person):
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_Delete)
     qtbot.waitUntil(lambda: them.tops() == [], timeout=WAIT_MS)
-    view.set_theme(TOKENS, dark=True)
+    view.set_theme(TOKENS, is_dark=True)
     dark = TOKENS["colour"]["dark"]["workspace"]
     them.wait_for(
         "getComputedStyle(document.querySelector('.blocklyMainBackground').closest('svg')).backgroundColor",
@@ -40,7 +40,7 @@ def test_flat_theme_tokens_are_supported(view, person):
         "block": {name: {**each["light"], "icon": each["icon"]} for name, each in TOKENS["block"].items()},
         "reducedMotion": True,
     }
-    view.set_theme(flat, dark=False)
+    view.set_theme(flat, is_dark=False)
     them.wait_for("getComputedStyle(document.documentElement).getPropertyValue('--nep-grid')", "#123456")
     them.wait_for("document.documentElement.classList.contains('reduced')")
 
@@ -165,7 +165,7 @@ def test_empty_program_shows_only_the_grid_and_zoom_buttons(person):
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
     assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0
     assert them.ask("document.querySelectorAll('.nepZoom button').length") == 6
-    assert them.view.web.fence.blocked == []
+    assert them.view.web.request_blocker.blocked_urls == []
 
 
 def test_zoom_in_zoom_out_and_zoom_to_fit_change_the_scale(qtbot, view, person):

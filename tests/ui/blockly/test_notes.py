@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import pytest
@@ -10,9 +11,12 @@ from PySide6.QtTest import QTest
 
 from app import resources
 from app.blocks import editor_definitions
+from app.core.documents.examples import translated
+from app.core.documents.file_format import read_file
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from app.ui.blockly.view import BlocklyView
+from nep.i18n import install
 from tests.blocks.samples import robot, workspace
 from tests.ui.blockly.test_block_menu import ROWS, choose, looked_at, program
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor
@@ -168,26 +172,62 @@ def test_canvas_note_is_added_by_menu_saved_and_removed_by_the_delete_key(qtbot,
 
 
 NOTES = "[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyComment')]"
+SCRIPTS = "[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyBlockCanvas > .blocklyDraggable')]"
+BOX = "(r => [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect())"
 
 
-def test_notes_of_examples_do_not_overlap_blocks(qtbot):
+def overlap(a: list[float], b: list[float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+@pytest.fixture
+def language(request):
+    install(request.param)
+    yield request.param
+    install("en")
+
+
+@pytest.mark.parametrize("language", ["en", "fr", "ja"], indirect=True)
+def test_scripts_and_notes_of_translated_examples_do_not_overlap(qtbot, language):
     pepper = parse(thing_description(PEPPER.thing_model, "Pepper"))
     view = editor(qtbot, editor_definitions([pepper]), 1320, 760)
     view.set_toolbox_pinned(False)
     them = Person(qtbot, view)
     with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
         view.show()
-    places = f"{NOTES}.map(e => (r => [r.left, r.top, r.right, r.bottom])(e.getBoundingClientRect()))"
     for path in sorted((resources.folder() / "examples").glob("*.nepb")):
-        state = json.loads(path.read_text("utf-8"))["workspace"]
+        state = translated(read_file(path)).workspace
         view.load(state)
         first = state["blocks"]["blocks"][0]["id"]
         them.wait_for(f"!!document.querySelector('.nepTab:not([hidden]) [data-id={json.dumps(first)}]')")
         them.wait_for(f"{NOTES}.length", 1)
-        ((left, top, right, bottom),) = them.ask(places)
-        hidden = [
-            box
-            for box in boxes_of_blocks(them)
-            if box[0] < right and box[2] > left and box[1] < bottom and box[3] > top
+        scripts = [
+            them.ask(f"[...{SCRIPTS}[{number}].querySelectorAll('.blocklyPath')].map(e => {BOX})")
+            for number in range(len(state["blocks"]["blocks"]))
         ]
-        assert hidden == [], path.name
+        groups = [*scripts, them.ask(f"{NOTES}.map(e => {BOX})")]
+        overlaps = [
+            (a, b)
+            for one, other in itertools.combinations(groups, 2)
+            for a, b in itertools.product(one, other)
+            if overlap(a, b)
+        ]
+        assert overlaps == [], path.name
+
+
+def test_scripts_are_separated_on_loading_only_in_programs_with_the_key_for_it(qtbot, view):
+    second = {"type": "control_wait", "id": "second", "x": 90, "y": 70}
+    state = workspace({"type": "events_started", "id": "start", "x": 28, "y": 28}, second)
+    view.load(state)
+    with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
+        view.show()
+    them = Person(qtbot, view)
+    assert [(top["x"], top["y"]) for top in them.tops()] == [(28, 28), (90, 70)]
+    edits = []
+    view.changed.connect(lambda *edit: edits.append(edit))
+    view.load({**state, "separateScripts": True})
+    qtbot.waitUntil(lambda: them.tops()[1]["x"] > 90, timeout=WAIT_MS)
+    assert "separateScripts" not in them.newest()
+    start, moved = them.tops()
+    assert (start["x"], start["y"], moved["y"]) == (28, 28, 70)
+    assert edits == []  # the file isn't modified until the user edits it

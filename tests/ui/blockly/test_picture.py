@@ -57,7 +57,7 @@ def test_exported_image_without_background_is_transparent_around_blocks(qtbot, v
 
 def test_exported_image_is_the_same_in_dark_theme_and_theme_is_kept(qtbot, view, them):
     light = taken(qtbot, view, "svg")
-    view.set_theme(TOKENS, dark=True)
+    view.set_theme(TOKENS, is_dark=True)
     assert taken(qtbot, view, "svg") == light
     them.wait_for("getComputedStyle(document.documentElement).colorScheme", "dark")
 

@@ -98,7 +98,7 @@ def test_wide_block_is_scaled_to_the_page_and_canvas_is_unchanged_after_printing
     wide = stack(1) | {"id": "wide", "x": 60, "y": 60, "inputs": {"SECONDS": {"block": list_of(*items)}}}
     them: Person = person(state=workspace(wide))
     before = them.box("[data-id=wide] > .blocklyPath")
-    view.set_theme(TOKENS, dark=True)
+    view.set_theme(TOKENS, is_dark=True)
     pages = printed(qtbot, view, "A long name " * 30)
     assert pages is not None
     assert pages.count == 1
@@ -113,7 +113,7 @@ def test_wide_block_is_scaled_to_the_page_and_canvas_is_unchanged_after_printing
 def test_screen_text_size_does_not_enlarge_the_printout(qtbot, view, person) -> None:
     person(state=workspace(stack(3) | {"x": 60, "y": 60}))
     usual = printed(qtbot, view)
-    view.set_theme({**TOKENS, "textPercent": 200}, dark=False)
+    view.set_theme({**TOKENS, "textPercent": 200}, is_dark=False)
     large = printed(qtbot, view)
     assert usual is not None
     assert large is not None

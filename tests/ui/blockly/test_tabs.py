@@ -24,26 +24,26 @@ TABS = "document.querySelectorAll('.nepTab').length"
 
 def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     tabs = Tabs()
-    assert tabs.shown.workspace.blocks == EMPTY_WORKSPACE
+    assert tabs.shown_tab.workspace.blocks == EMPTY_WORKSPACE
     assert tabs.show("a", WorkspaceJson.from_blocks(A)) == ""
     assert tabs[""] is None
     assert tabs.show("b", WorkspaceJson.from_blocks(B)) is None
     assert tabs.show("a", WorkspaceJson.from_blocks({})) is None
-    assert tabs.shown.workspace.blocks == A
+    assert tabs.shown_tab.workspace.blocks == A
 
 
 def test_edits_of_a_closed_tab_or_a_replaced_workspace_are_ignored() -> None:
     tabs = Tabs()
     tabs.show("a", WorkspaceJson.from_blocks(A))
-    before = tabs.shown.generation
-    assert tabs.tab_for_edit("a", before) is tabs.shown
+    before = tabs.shown_tab.generation
+    assert tabs.tab_for_edit("a", before) is tabs.shown_tab
     tabs.replace(WorkspaceJson.from_blocks(B))
     assert tabs.tab_for_edit("a", before) is None
-    generation = tabs.shown.generation
+    generation = tabs.shown_tab.generation
     assert tabs.close("a")
     assert tabs.tab_for_edit("a", generation) is None
     assert not tabs.close("a")
-    assert tabs.shown.workspace.blocks == EMPTY_WORKSPACE
+    assert tabs.shown_tab.workspace.blocks == EMPTY_WORKSPACE
 
 
 @pytest.fixture
@@ -144,7 +144,7 @@ def test_hidden_tab_applies_changed_definitions_and_theme_when_shown(qtbot, view
     changed = copy.deepcopy(DEFINITIONS)
     next(each for each in changed["blocks"] if each["type"] == "control_wait")["message0"] = "%1 pause %2 s"
     view.set_definitions(changed)
-    view.set_theme(TOKENS, dark=True)
+    view.set_theme(TOKENS, is_dark=True)
     turn_to(two, "b")
     two.wait_for(f"{SHOWN}.querySelector('[data-id=w]').textContent.includes('pause')")
     dark = TOKENS["block"]["control"]["dark"]["primary"].lower()

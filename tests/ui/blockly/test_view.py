@@ -150,7 +150,7 @@ def test_killed_web_process_loses_no_edits(qtbot, view, person, caplog):
     with qtbot.waitSignal(view.changed, timeout=WAIT_MS):
         them.drag(".blocklyFlyout .control_wait", QPoint(700, 400))
     before = them.newest()
-    view.set_theme(TOKENS, dark=True)
+    view.set_theme(TOKENS, is_dark=True)
     view.highlight(["start"])
     got: list[WorkspaceJson] = []
     with qtbot.waitSignal(view.ready, timeout=60_000):
@@ -186,7 +186,7 @@ def test_blockly_uses_the_selected_language_or_falls_back_to_english(qtbot, lang
     them.wait_for(f"!!document.querySelector('.blocklyContextMenu')?.textContent.includes({words!r})")
 
 
-def test_page_texts_are_translated_by_the_window(qtbot, monkeypatch):
+def test_editor_texts_use_translations_of_the_app_and_fall_back_to_english(qtbot, monkeypatch):
     monkeypatch.setattr(
         "nep.i18n.editor_translations", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
     )

@@ -111,7 +111,7 @@ class Session(session_module.Session):
         self.runs = Runs(
             self.documents, self.fleet, self,
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
-            make_runner=self._make_runner,  # type: ignore[arg-type]
+            create_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
         self.runs.starting_robots = lambda: self.starting_robots
         self.runs.before_stop = self.acting.disarm
@@ -176,7 +176,7 @@ class Session(session_module.Session):
         if topic.age_s is not None:
             topic.last_stamp_ns = self.clock.ns() - round(topic.age_s * 1e9)
         if topic.gone_s is not None:
-            topic.gone_since = self.clock() - topic.gone_s
+            topic.gone_since_s = self.clock() - topic.gone_s
         self.topics._topics[topic.name] = topic
         self.topics.revision += 1
         self.topics.values_revision += 1

@@ -37,7 +37,7 @@ class Journal(journal_module.Journal):
         path: Path | None,
         text: str,
         robots: Mapping[str, Mapping[str, object]],
-        others: Mapping[str, object] | None = None,
+        unknown_fields: Mapping[str, object] | None = None,
     ) -> None:
         self.kept = text
 

@@ -106,9 +106,9 @@ def test_robot_process_that_exits_reports_its_last_output_once(
     for _ in range(2):
         launcher.check()
     assert told == [LaunchFailed("Pepper", "The virtual robot Pepper stopped unexpectedly.", "no room left")]
-    assert launcher.ended == {"Pepper"}
+    assert launcher.ended_robots == {"Pepper"}
     launcher.start_virtual_robot("Pepper")
-    assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
+    assert (launcher.virtual_robots, launcher.ended_robots) == (("Pepper",), frozenset())
 
 
 def test_process_killed_by_another_program_is_reported_as_killed(

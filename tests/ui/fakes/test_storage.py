@@ -39,7 +39,7 @@ def test_setting_is_saved_and_a_value_of_another_type_is_ignored(settings: Setti
     settings.set("theme", "dark")
     settings.set("theme", ["a", {"b": None}])
     assert settings.get("theme", []) == ["a", {"b": None}]
-    assert (settings.write_error, settings.damaged) == (None, None)
+    assert (settings.write_error, settings.damaged_path) == (None, None)
 
 
 @pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, b"bytes"])
@@ -185,4 +185,4 @@ def test_doctor_stores_its_findings(look: Callable[[object], Doctor]) -> None:
 def test_doctor_that_crashes_reports_the_error(look: Callable[[object], Doctor]) -> None:
     (finding,) = look(None).findings
     assert (finding.id, finding.severity) == ("doctor", "error")
-    assert finding.sentence.startswith("The doctor couldn't finish: TypeError")
+    assert finding.sentence.startswith("The doctor couldn't finish (TypeError")

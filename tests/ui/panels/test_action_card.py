@@ -116,7 +116,7 @@ def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
 
 
 def test_last_tries_are_listed_with_buttons_that_restore_their_input_values(card) -> None:
-    assert not card.past.isVisible()
+    assert not card.history_button.isVisible()
     done = Invocation(
         "1", "go_far", "succeeded", input={"distance": 0.25}, output={"moved": 0.25}, elapsed_s=1
     )
@@ -127,9 +127,9 @@ def test_last_tries_are_listed_with_buttons_that_restore_their_input_values(card
         "distance -0.5 m: Go far took longer than 10 s",
         "distance 0.25 m: done in 1.0 s, moved 0.25 m",
     ]
-    assert card.past.isVisible()
+    assert card.history_button.isVisible()
     assert not card.tries.isVisible()
-    QTest.mouseClick(card.past, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(card.history_button, Qt.MouseButton.LeftButton)
     assert card.tries.isVisible()
     QTest.mouseClick(card.tries.rows[1], Qt.MouseButton.LeftButton)
     assert card.form.input() == {"distance": 0.25}

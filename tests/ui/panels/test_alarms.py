@@ -196,11 +196,11 @@ def test_active_alarm_is_shown_in_row_title_alerts_and_history(panel, window) ->
     (alert,) = [each for each in session.alerts.active if each.id == "alarm:d"]
     assert alert.title == "Robots.Pepper.battery of /blackboard is 12, below 20."
     assert panel.model.cell_at(0, 1).text == "robots.Pepper.battery of /blackboard is 12, below 20"
-    press(panel.rows[0].snooze)
+    press(panel.rows[0].snooze_button)
     panel._show_states()
     assert "snoozed until" in panel.rows[0].chip.text
     assert session.alerts.is_dismissed("alarm:d")
-    press(panel.rows[0].snooze)
+    press(panel.rows[0].snooze_button)
     panel._show_states()
     assert "snoozed" not in panel.rows[0].chip.text
 
@@ -211,7 +211,7 @@ def test_alarm_is_disabled_deleted_and_restored(panel, window) -> None:
     press(panel.rows[0].switch)
     assert not panel.alarms.rules[0].is_enabled
     assert panel.alarms.alarms.evaluator.topics == frozenset()
-    press(panel.rows[0].more)
+    press(panel.rows[0].more_button)
     choose("Delete")
     assert panel.alarms.rules == ()
     assert window.toasts[-1].startswith("Deleted the alarm")
@@ -220,7 +220,7 @@ def test_alarm_is_disabled_deleted_and_restored(panel, window) -> None:
     undo()
     panel.refresh()
     assert len(panel.rows) == 1
-    press(panel.rows[0].more)
+    press(panel.rows[0].more_button)
     choose("Duplicate")
     assert len({rule.id for rule in panel.alarms.rules}) == 2
 

@@ -33,7 +33,7 @@ def test_alerts_are_sorted_by_severity_and_disappear_when_resolved(panel, window
     alerts = window.session.alerts
     alerts.raise_alert("silent:/cam", "warn", "The camera has been silent for 4 s.")
     panel.refresh()
-    assert [alert.severity for alert in panel.shown] == ["error", "warn"]
+    assert [alert.severity for alert in panel.shown_alerts] == ["error", "warn"]
     assert not panel.rows[1].button.isVisibleTo(panel)
     alerts.resolve("message:/faces")
     panel.refresh()

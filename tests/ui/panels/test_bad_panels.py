@@ -47,7 +47,7 @@ def test_failed_panel_does_not_affect_other_panels_and_works_again_when_reopened
     before = other.refreshed
     for _ in range(5):
         window.tick()
-    assert topics.failed
+    assert topics.has_failed
     assert other.refreshed == before + 5
     assert [r.text for r in window.session.console.records].count("RuntimeError: no such luck") == 0
     assert [r.text for r in window.session.console.records].count("ValueError: no such luck") == 1
@@ -55,7 +55,7 @@ def test_failed_panel_does_not_affect_other_panels_and_works_again_when_reopened
     topics.panel.explode = False
     topics.close()
     bench.open("topics")
-    assert not topics.failed
+    assert not topics.has_failed
     assert topics.panel.isVisible()
     before = topics.panel.refreshed
     window.tick()
@@ -173,17 +173,17 @@ def test_panel_that_cannot_be_created_shows_the_error_until_a_retry_succeeds(
     dock = seen(qtbot, window)
     for _ in range(3):
         window.tick()
-    assert dock.failed
+    assert dock.has_failed
     assert told(window).count("RuntimeError: no such luck") == 1
     dock.retry()
     window.tick()
-    assert dock.failed
+    assert dock.has_failed
     assert told(window).count("RuntimeError: no such luck") == 2
     bad.clear()
     dock.retry()
     window.tick()
     window.tick()
-    assert not dock.failed
+    assert not dock.has_failed
     assert isinstance(dock.panel, Bad)
     qtbot.waitUntil(dock.panel.isVisible)
     assert dock.panel.refreshed == 1
@@ -277,7 +277,7 @@ def test_panel_that_calls_exit_does_not_end_the_window(
         assert dock.panel.sizeHint() == QSize()
         assert set(heard) == {"SystemExit('so long')"}
     else:
-        assert dock.failed
+        assert dock.has_failed
         assert told(window).count("SystemExit: so long") == 1
     other = seen(qtbot, window, "console").panel
     assert other.refreshed

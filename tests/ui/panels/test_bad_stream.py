@@ -70,10 +70,10 @@ def test_undecodable_stream_raises_one_alert_with_exact_count_and_no_dialog(
 
         def counted() -> bool:
             window.tick()
-            return [alert.count for alert in panel.shown] == [SENT]
+            return [alert.count for alert in panel.shown_alerts] == [SENT]
 
         qtbot.waitUntil(counted)
-        assert f"({SENT} messages)" in window.banner.banner.accessibleName()
+        assert f"{SENT} messages on /bad" in window.banner.banner.accessibleName()
         assert window.banner.isVisible()
         assert len(seen) == 1, "it is the same row all the time: its button can be pressed"
         assert [each for each in QApplication.topLevelWidgets() if each.isVisible()] == windows
@@ -83,7 +83,7 @@ def test_undecodable_stream_raises_one_alert_with_exact_count_and_no_dialog(
         button = panel.rows[0].button
         QTest.mousePress(button, Qt.MouseButton.LeftButton)
         publisher.publish_bytes(BAD)
-        qtbot.waitUntil(lambda: (window.tick(), panel.shown[0].count == SENT + 1)[1])
+        qtbot.waitUntil(lambda: (window.tick(), panel.shown_alerts[0].count == SENT + 1)[1])
         QTest.mouseRelease(button, Qt.MouseButton.LeftButton)
         assert window.bench is not None
         assert window.bench.docks["inspector"].panel.topics == ["/bad"], "its next step was taken"

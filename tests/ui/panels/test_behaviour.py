@@ -368,7 +368,7 @@ def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
     monkeypatch.setattr(title.tabs, "scroll_at", scroll_at)
     editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
     qtbot.waitUntil(lambda: len(asked) == 3)
-    scrolling = panel._block_drag._scrolling
+    scrolling = panel._block_drag._scroll_timer
     assert asked == [place] * 3
     assert not scrolling.isActive(), "nothing moved: it waits for the mouse"
     editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
@@ -392,9 +392,9 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     carried = panel._block_drag
     editor(panel).blocks_dragged_outside.emit(place, home.key)
     assert tab.is_drop_target
-    assert carried._opening.isActive()
+    assert carried._open_timer.isActive()
     editor(panel).blocks_dragged_outside.emit(place + QPoint(0, 400), home.key)
-    assert not carried._opening.isActive(), "moved away: it stays closed"
+    assert not carried._open_timer.isActive(), "moved away: it stays closed"
     editor(panel).blocks_dragged_outside.emit(place, home.key)
     picture = QPixmap(60, 40)
     picture.fill(QColor("#00ff00"))

@@ -273,14 +273,14 @@ def test_dragging_near_an_end_of_the_tab_bar_scrolls_to_hidden_tabs(qtbot, tabs)
     tabs.resize(180, 30)
     tabs.show_tabs([A, B, C], "a")
     last, first = tabs.tabs["c"], tabs.tabs["a"]
-    left, right = tabs.mapToGlobal(QPoint(2, 15)), tabs.mapToGlobal(QPoint(tabs._room.width() - 2, 15))
-    middle = tabs.mapToGlobal(QPoint(tabs._room.width() // 2, 15))
+    left, right = tabs.mapToGlobal(QPoint(2, 15)), tabs.mapToGlobal(QPoint(tabs._clip_area.width() - 2, 15))
+    middle = tabs.mapToGlobal(QPoint(tabs._clip_area.width() // 2, 15))
     assert not tabs.scroll_at(middle)
     assert not tabs.scroll_at(left), "nothing more is there"
     while tabs.scroll_at(right):
         pass
     assert tabs.target_at(right) == "c"
-    assert last.geometry().right() <= tabs._room.width()
+    assert last.geometry().right() <= tabs._clip_area.width()
     while tabs.scroll_at(left):
         pass
     assert first.geometry().left() == 0

@@ -13,16 +13,16 @@ def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_l
     place.resize(600, 400)
     now = [10.0]
     wait = LoadingMessage(place, lambda: now[0])
-    wait.set_ready(ready=False)
+    wait.set_ready(is_ready=False)
     now[0] += LOADING_TEXT_DELAY_S - 0.01
-    wait.set_ready(ready=False)
+    wait.set_ready(is_ready=False)
     assert wait.text_label.isHidden()
     now[0] += 0.02
-    wait.set_ready(ready=False)
+    wait.set_ready(is_ready=False)
     assert not wait.text_label.isHidden()
     assert wait.text_label.text() == "Loading blocks…"
     assert wait.text_label.geometry() == place.rect()
-    wait.set_ready(ready=True)
+    wait.set_ready(is_ready=True)
     assert wait.text_label.isHidden()
-    wait.set_ready(ready=False)  # its process died: the delay starts again
+    wait.set_ready(is_ready=False)  # its process died: the delay starts again
     assert wait.text_label.isHidden()

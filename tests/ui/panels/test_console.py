@@ -164,7 +164,7 @@ def test_lines_are_filtered_by_node_and_text(qtbot, panel, window) -> None:
     logged(window, text="walks 2 m", node="Turtle")
     panel.set_node("Turtle")
     assert lines(panel) == ["info Turtle [app.robots.driver.tasks] walks 2 m"]
-    assert panel.filter.accessibleName() == "Showing: Everything of Turtle"
+    assert panel.filter_button.accessibleName() == "Showing: Everything from Turtle"
     panel.set_node("")
     panel.focus_filter()
     qtbot.keyClicks(panel.find_field, "PEPPER walks")
@@ -192,11 +192,11 @@ def test_scroll_position_is_kept_while_reading_older_lines(qtbot, panel, window)
         logged(window, text=f"new {number}")
     panel.refresh()
     assert panel.list.indexAt(panel.list.viewport().rect().center()).data() == read
-    assert panel.newer.isVisible()
-    assert panel.newer.accessibleName() == "3 new"
-    qtbot.mouseClick(panel.newer, Qt.MouseButton.LeftButton)
+    assert panel.newest_button.isVisible()
+    assert panel.newest_button.accessibleName() == "3 new"
+    qtbot.mouseClick(panel.newest_button, Qt.MouseButton.LeftButton)
     assert bar.value() == 0
-    assert not panel.newer.isVisible()
+    assert not panel.newest_button.isVisible()
     logged(window, text="newest")
     panel.refresh()
     assert bar.value() == 0
@@ -229,11 +229,11 @@ def test_larger_text_enlarges_rows_and_the_button_to_the_newest_line(qtbot, pane
     bar = panel.list.verticalScrollBar()
     qtbot.waitUntil(lambda: bar.maximum() > 500)
     bar.setValue(300)
-    before = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newer.width())
+    before = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newest_button.width())
     window.theme.set_text_percent(200)
-    after = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newer.width())
+    after = (panel.list.visualRect(panel.model.index(5, 0)).height(), panel.newest_button.width())
     assert after[0] == 2 * before[0]
-    assert after[1] >= panel.newer.sizeHint().width() > before[1]
+    assert after[1] >= panel.newest_button.sizeHint().width() > before[1]
 
 
 def test_twenty_thousand_lines_scroll_and_only_visible_rows_are_painted(qtbot, qapp, monkeypatch) -> None:

@@ -119,7 +119,7 @@ def test_text_that_is_too_long_is_kept_and_reported_when_editing_ends(qtbot, the
     form = form_of(
         qtbot,
         theme,
-        Parameter("t", "text", "text", max_length=5, required=True),
+        Parameter("t", "text", "text", max_length=5, is_required=True),
         Parameter("o", "other", "text"),
     )
     first, second = form.findChildren(QLineEdit)
@@ -138,7 +138,7 @@ def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_shows_its_row(qtbo
         qtbot,
         theme,
         Parameter("how", "how", "choice", choices=KEEP, default=0),
-        Parameter("s", "speed", "number", 0, 1, default=0.5, advanced=True),
+        Parameter("s", "speed", "number", 0, 1, default=0.5, is_advanced=True),
     )
     assert form.input() == {"how": 0, "s": 0.5}
     slider = child(form, SliderWithUnit)
@@ -152,7 +152,7 @@ def test_zero_is_a_valid_choice_and_an_invalid_advanced_value_shows_its_row(qtbo
 
 
 def test_text_field_grows_to_at_most_five_lines(qtbot, theme) -> None:
-    form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, required=True))
+    form = form_of(qtbot, theme, Parameter("t", "text", "text", max_length=500, is_required=True))
     field = child(form, LongTextField)
     one = field.height()
     assert one >= MIN_HEIGHT
@@ -301,7 +301,7 @@ def drawn(path: Path, width: int, height: int) -> Path:
 
 
 def test_image_file_is_previewed_and_sent_as_base64_at_most_1280_px_wide(qtbot, theme, tmp_path) -> None:
-    form = form_of(qtbot, theme, Parameter("p", "picture", "image", required=True))
+    form = form_of(qtbot, theme, Parameter("p", "picture", "image", is_required=True))
     assert form.input() == {}
     assert form.action.check(form.input()) == ("do: picture is missing",)
     choice = child(form, PictureChoice)
@@ -318,7 +318,7 @@ def test_file_that_is_not_an_image_is_reported_and_not_sent(qtbot, theme, tmp_pa
     choice = child(form, PictureChoice)
     (tmp_path / "not.png").write_text("hello")
     choice.use_file(tmp_path / "not.png")
-    assert choice.sentence == "“not.png” can't be used: not a JPEG or PNG image."
+    assert choice.error_text == "“not.png” can't be used: not a JPEG or PNG image."
     assert choice.thumbnail.image is None
     assert read_picture(tmp_path / "none.png")[1] == "“none.png” can't be read: no such file or directory."
     with (tmp_path / "big.png").open("wb") as big:
@@ -332,7 +332,7 @@ def test_decompression_bomb_is_rejected_as_file_and_as_url(qtbot, theme, tmp_pat
     choice = child(form, PictureChoice)
     (tmp_path / "photo.png").write_bytes(BOMBS[name])
     choice.use_file(tmp_path / "photo.png")
-    assert choice.sentence.startswith("“photo.png” can't be used: ")
+    assert choice.error_text.startswith("“photo.png” can't be used: ")
     assert choice.thumbnail.image is None
     choice.set_value("data:image/png;base64," + base64.b64encode(BOMBS[name]).decode())
     assert choice.thumbnail.image is None
@@ -352,7 +352,7 @@ def test_image_button_opens_the_file_dialog_in_the_last_folder(theme, qtbot, tmp
     qtbot.addWidget(choice)
     choice.choose.click()
     assert choice.field.text() == str(tmp_path / "no.png")
-    assert choice.sentence
+    assert choice.error_text
     choice.choose.click()
     assert folders == ["", str(tmp_path)]
 
@@ -435,8 +435,8 @@ def test_url_is_sent_unchanged_and_bare_base64_where_the_robot_expects_it(qtbot,
 
 
 def test_number_list_and_object_fields_are_parsed_and_validated(qtbot, theme) -> None:
-    speeds = parameter_of("speeds", {"type": "array", "items": {"type": "number"}}, required=True)
-    pose = parameter_of("pose", {"type": "object", "properties": {"x": {"type": "number"}}}, required=True)
+    speeds = parameter_of("speeds", {"type": "array", "items": {"type": "number"}}, is_required=True)
+    pose = parameter_of("pose", {"type": "object", "properties": {"x": {"type": "number"}}}, is_required=True)
     form = form_of(qtbot, theme, speeds, pose)
     first, second = form.findChildren(QLineEdit)
     assert first.placeholderText() == "Numbers separated by commas"

@@ -40,9 +40,13 @@ def panel(qtbot, window) -> DoctorPanel:
     return made
 
 
-def test_doctor_runs_when_first_shown_and_lists_the_most_severe_finding_first(panel, window) -> None:
+def test_doctor_runs_when_first_shown_and_lists_the_most_severe_finding_first(qtbot, window) -> None:
+    *more_severe, reachable, files = FOUND
+    window.session.doctor.found = (reachable, files, *reversed(more_severe))
+    panel = window.make(PANEL)
+    qtbot.addWidget(panel)
     assert window.session.doctor.looked == 1
-    assert panel.shown == list(FOUND)
+    assert panel.shown_findings == list(FOUND)
     assert len(panel.rows) == len(FOUND)
     assert panel.rows[0].accessibleName().startswith("error: “python3 server.py” (process 77) uses port 7780")
     assert panel.chip.accessibleName() == "2"
@@ -61,9 +65,10 @@ def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
         doctor.looked += 1
         doctor.is_running = True
         for done, found in enumerate(((FINE,), (FULL, FINE))):
-            doctor._report(found, done + 1, 4)
+            doctor._report_progress(found, done + 1, 4)
             panel.refresh()
-            told.append(([each.id for each in panel.shown], panel.looked.text(), panel.chip.accessibleName()))
+            shown_ids = [each.id for each in panel.shown_findings]
+            told.append((shown_ids, panel.progress_label.text(), panel.chip.accessibleName()))
         doctor._run_checks()
         doctor.is_running = False
 
@@ -77,15 +82,16 @@ def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
     look()
     assert told == [(["master"], "Checking: 1 of 4", ""), (["disk", "master"], "Checking: 2 of 4", "1")]
     panel.refresh()
-    assert [each.id for each in panel.shown] == ["disk", "master", "loopback"]
-    assert panel.looked.text() == "3 checks done"
+    assert [each.id for each in panel.shown_findings] == ["disk", "master", "loopback"]
+    assert panel.progress_label.text() == "3 checks done"
     told.clear()
     doctor.found = (FINE, ALSO_FINE)
     look()  # the previous findings stay until all checks are done
     panel.refresh()
     assert [shown for shown, _looked, _chip in told] == [["disk", "master", "loopback"]] * 2
     assert [looked for _shown, looked, _chip in told] == ["Checking: 1 of 4", "Checking: 2 of 4"]
-    assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 checks passed", "no problems")
+    assert panel.progress_label.text() == "All 2 checks passed"
+    assert panel.chip.accessibleName() == "no problems"
 
 
 def test_panels_waiting_for_a_topic_are_listed_with_the_suggested_topic(
@@ -132,7 +138,7 @@ def test_suggested_command_is_copied(qtbot, panel, window) -> None:
 def test_doctor_starts_the_master_and_checks_again_when_the_master_runs(qtbot, panel, window) -> None:
     missing = Finding("master:none", "error", "No master runs.", "Start a master.", "nep master")
     window.session.doctor.found = (missing,)
-    qtbot.mouseClick(panel.again, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(panel.check_button, Qt.MouseButton.LeftButton)
     panel.refresh()
     (row,) = panel.rows
     assert row.button.accessibleName() == "Start the master"
@@ -141,7 +147,7 @@ def test_doctor_starts_the_master_and_checks_again_when_the_master_runs(qtbot, p
     window.session.doctor.found = (Finding("master", "ok", "A master runs."),)
     window.session.master = MasterState("searching", "127.0.0.1:7780")
     panel.refresh()
-    assert [each.id for each in panel.shown] == ["master"]
+    assert [each.id for each in panel.shown_findings] == ["master"]
     assert panel.chip.accessibleName() == "no problems"
 
 
@@ -157,11 +163,11 @@ def test_report_is_copied_as_text(panel, window) -> None:
 def test_check_button_is_disabled_and_findings_are_kept_during_a_check(panel, window) -> None:
     window.session.doctor.is_running = True
     panel.refresh()
-    assert not panel.again.isEnabled()
+    assert not panel.check_button.isEnabled()
     assert len(panel.rows) == len(FOUND)
     window.session.doctor.is_running = False
     panel.refresh()
-    assert panel.again.isEnabled()
+    assert panel.check_button.isEnabled()
 
 
 NEAR = Finding(
@@ -210,7 +216,7 @@ def test_suggested_topic_name_is_applied_to_the_panel_that_opened_the_doctor(
     asker.paused = False
     panel.set_stalled_panel(asker)
     assert panel.topic_choice.value == "/robot/deph"
-    assert panel.terminal.text() == "In a terminal: nep doctor /robot/deph"
+    assert panel.command_label.text() == "In a terminal: nep doctor /robot/deph"
     assert names(panel) == ["Use /robot/depth"]
     window.session.doctor.found = (Finding("topic", "ok", "Messages of /robot/depth come here."),)
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
@@ -300,7 +306,7 @@ def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
     panel.topic_choice.activated.emit(panel.topic_choice.currentIndex())
     assert window.session.doctor.expected_topic == "/odom"
     assert "paused" not in panel.rows[0].accessibleName()
-    panel.copy.click()
+    panel.copy_button.click()
     assert QGuiApplication.clipboard().text().startswith("Missing: /odom\n")
 
 
@@ -311,7 +317,7 @@ def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
     panel.refresh()
     assert panel.rows[0].accessibleName().startswith("error: ROS 2: no daemon answers.")
     assert names(panel)[0] == "Other networks"
-    assert panel.terminal.text() == "In a terminal: nep doctor"
+    assert panel.command_label.text() == "In a terminal: nep doctor"
 
 
 def test_empty_panels_open_the_doctor_with_their_topic_if_they_have_one(qtbot, qapp) -> None:
@@ -359,7 +365,7 @@ def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
     made._add_typed("/odom.speed", False)
     ticks(window, made, 6)
     assert made.advice.topic == "/odom"
-    press(made.advice.why)
+    press(made.advice.doctor_link)
     assert window.asked_why == [(made, "/odom")]
     made.dispose()
 
@@ -378,7 +384,7 @@ def test_doctor_shows_an_empty_state_before_the_first_result(qtbot, qapp) -> Non
 def test_missing_system_libraries_of_the_block_editor_are_a_finding(panel, window) -> None:
     alert_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
     panel.refresh()
-    (found,) = [each for each in panel.shown if "libnss3.so" in each.sentence]
+    (found,) = [each for each in panel.shown_findings if "libnss3.so" in each.sentence]
     assert found.severity == "error"
     assert "sudo apt install libnss3" in found.fix
-    assert not panel.rows[panel.shown.index(found)].button.isVisibleTo(panel)
+    assert not panel.rows[panel.shown_findings.index(found)].button.isVisibleTo(panel)

@@ -43,7 +43,7 @@ SAYS, TURNS = "robot_pepper_do_say", "robot_pepper_do_turn"
 
 def test_blocks_nested_below_when_started_count_and_detached_blocks_do_not() -> None:
     assert find_tutorial_blocks({}) == TutorialBlocks()
-    assert find_tutorial_blocks(page(block("events_started"))) == TutorialBlocks(started=True)
+    assert find_tutorial_blocks(page(block("events_started"))) == TutorialBlocks(has_start_block=True)
     inside = block("events_started", block("control_repeat", block(TURNS), BODY=block(SAYS)))
     assert find_tutorial_blocks(page(inside)) == TutorialBlocks(True, frozenset({SAYS}), True)
     loose = page(block("events_started"), block(SAYS))
@@ -63,7 +63,7 @@ def test_each_step_is_completed_once_and_stays_completed() -> None:
     now, done = TutorialState(), frozenset[str]()
     for change, step in (
         ({"can_speak": True}, "robot"),
-        ({"blocks": TutorialBlocks(started=True)}, "start"),
+        ({"blocks": TutorialBlocks(has_start_block=True)}, "start"),
         ({"blocks": TutorialBlocks(True, frozenset({"a"}))}, "say"),
         ({"executed_ids": ("a",)}, "run"),
         ({"blocks": TutorialBlocks(True, frozenset({"a"}), True), "executed_ids": ()}, "turn"),
@@ -80,9 +80,9 @@ def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
     shipped = read_file(min(resources.path("examples").glob("*.nepb"))).workspace
     tops = shipped["blocks"]["blocks"]
     build(panel, *tops)
-    assert panel.done == {"robot"}
+    assert panel.completed_ids == {"robot"}
     build(panel, *tops, block("events_started", block(SAYS, block(TURNS))))
-    assert panel.done == {"robot", "start", "say", "turn"}
+    assert panel.completed_ids == {"robot", "start", "say", "turn"}
 
 
 def test_stopping_a_program_without_tutorial_blocks_does_not_complete_the_last_step() -> None:
@@ -180,7 +180,7 @@ def test_hint_for_a_detached_block_says_where_to_attach_it(panel, window) -> Non
     assert panel.rows[2].hint.text() == "You'll find it under Speech, on the left."
     build(panel, block("events_started"), block(SAYS))
     assert panel.rows[2].hint.text() == "Drag it up until it snaps below “when started”."
-    assert "say" not in panel.done
+    assert "say" not in panel.completed_ids
 
 
 def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> None:
@@ -192,9 +192,9 @@ def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> Non
     for widget in again.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(again, FirstStepsPanel)
-    assert again.done == {"robot", "start"}
+    assert again.completed_ids == {"robot", "start"}
     window.session.settings.set(PROGRESS_SETTING, "nonsense")
-    assert FirstStepsPanel(window.context()).done == frozenset()
+    assert FirstStepsPanel(window.context()).completed_ids == frozenset()
 
 
 def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, clock) -> None:
@@ -216,13 +216,13 @@ def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, 
 
 
 def test_completed_first_steps_show_next_steps_and_can_be_restarted(panel, window) -> None:
-    panel.done = frozenset(step.id for step in STEPS) - {"robot"}
+    panel.completed_ids = frozenset(step.id for step in STEPS) - {"robot"}
     window.session.join(pepper())
     panel.refresh()
-    assert panel.pages.currentWidget() is panel.end
+    assert panel.pages.currentWidget() is panel.end_page
     assert panel.chip.text == "6 of 6"
     build(panel, block("events_started"))
     panel.start_again()
     assert window.commands == ["file.new"], "nobody's blocks are touched"
-    assert panel.done == frozenset()
+    assert panel.completed_ids == frozenset()
     assert panel.pages.currentIndex() == 0

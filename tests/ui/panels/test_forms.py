@@ -105,7 +105,8 @@ def test_choices_offered_by_the_robot_at_runtime_fill_the_list(qtbot, theme) -> 
 
 def test_problems_are_shown_below_their_rows_and_general_problems_at_the_end(qtbot, theme) -> None:
     form = ActionForm(
-        theme, action(Parameter("t", "text", "text", required=True), Parameter("s", "speed", "number", 0, 1))
+        theme,
+        action(Parameter("t", "text", "text", is_required=True), Parameter("s", "speed", "number", 0, 1)),
     )
     qtbot.addWidget(form)
     form.show()
@@ -122,7 +123,7 @@ def test_problems_are_shown_below_their_rows_and_general_problems_at_the_end(qtb
 
 def test_advanced_parameters_are_shown_by_the_more_button(qtbot, theme) -> None:
     form = ActionForm(
-        theme, action(Parameter("a", "a", "text"), Parameter("b", "b", "text", default="x", advanced=True))
+        theme, action(Parameter("a", "a", "text"), Parameter("b", "b", "text", default="x", is_advanced=True))
     )
     qtbot.addWidget(form)
     form.show()
@@ -163,7 +164,7 @@ def test_ampersand_in_a_parameter_name_is_shown_literally(qtbot, theme) -> None:
 
 
 def test_problems_are_matched_to_rows_in_a_translated_form(qtbot, theme, pseudo) -> None:
-    made = action(Parameter("p", "p", "number", required=True), Parameter("q", "q", "number"))
+    made = action(Parameter("p", "p", "number", is_required=True), Parameter("q", "q", "number"))
     form = ActionForm(theme, made)
     qtbot.addWidget(form)
     form.show_problems(made.problems({"q": "x"}))

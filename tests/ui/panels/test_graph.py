@@ -116,7 +116,7 @@ def settle(qtbot, panel: GraphPanel) -> None:
         panel.refresh()
         scene = panel.canvas.scene
         is_shown = scene is not None and scene.graph == panel._requested_graph
-        return not panel._thread.is_busy and is_shown and not panel.canvas._waiting
+        return not panel._thread.is_busy and is_shown and not panel.canvas._pending_items
 
     qtbot.waitUntil(is_there, timeout=20_000)
 
@@ -157,7 +157,7 @@ def test_graph_shows_nodes_edges_and_rates(panel: GraphPanel) -> None:
     assert words_at(panel) == {"/touch 20/s", "/blackboard 10/s", "robot_action 0.5/s", "remember"}
     scene = panel.canvas.scene
     assert scene is not None
-    lines = {item.node.name: item.line for item in scene.nodes.values()}
+    lines = {item.node.name: item.elided_detail for item in scene.nodes.values()}
     assert lines == {
         "pepper_driver": "Python, 1.2 %", "blackboard": "Python, 1.2 %", "greeting": "behaviour, 1.2 %",
         "studio": "this window", "RIZE": "NEP 0.5.4.8",
@@ -172,17 +172,17 @@ def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtb
         return panel.canvas.update_stats(panel._stats_of)
 
     qtbot.wait(1)
-    painted = panel.canvas.painted
+    painted = panel.canvas.paint_count
     show(window, graph())  # an unchanged graph
     assert renewed() == 0
     panel.refresh()
     qtbot.wait(1)
-    assert panel.canvas.painted == painted
+    assert panel.canvas.paint_count == painted
     more = graph()
     touch = replace(more.topics["/touch"], rate_hz=31.0)
     show(window, replace(more, topics={**more.topics, "/touch": touch}))
     assert renewed() == 1
-    qtbot.waitUntil(lambda: panel.canvas.painted > painted)
+    qtbot.waitUntil(lambda: panel.canvas.paint_count > painted)
     assert "/touch 31/s" in words_at(panel)
 
 
@@ -209,7 +209,7 @@ def test_click_on_an_edge_shows_its_topic_and_inspect_opens_the_topic(
     item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
     assert item.label is not None
     click(panel.canvas, at(panel, item.label.center()))
-    assert panel.canvas.choice == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
+    assert panel.canvas.selection == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
     content = panel.card.content
     assert content is not None
     assert (content.title, content.kind) == ("/blackboard", "json")
@@ -228,7 +228,7 @@ def test_click_on_an_edge_shows_its_topic_and_inspect_opens_the_topic(
     press(panel.card.alarm)
     assert window.commands == ["record.topic:/blackboard", "alarm.topic:/blackboard"]
     press(panel.card.close_button)
-    assert panel.canvas.choice is None
+    assert panel.canvas.selection is None
     assert not panel.card.isVisible()
 
 
@@ -256,9 +256,9 @@ def test_node_card_links_to_its_topics(panel: GraphPanel, window: Window) -> Non
     press(panel.card.alarm)
     assert window.commands == ["alarm.node:blackboard"]
     press(button(panel.card, "/touch"))
-    assert panel.canvas.choice == GraphSelection("topic", "/touch")
+    assert panel.canvas.selection == GraphSelection("topic", "/touch")
     press(button(panel.card, "pepper_driver"))
-    assert panel.canvas.choice == GraphSelection("node", key_of(panel, "pepper_driver"))
+    assert panel.canvas.selection == GraphSelection("node", key_of(panel, "pepper_driver"))
     assert window.opened == []
 
 
@@ -267,7 +267,7 @@ def test_service_card_shows_its_details(panel: GraphPanel) -> None:
     content = panel.card.content
     assert content is not None
     assert [(figure.title, figure.value) for figure in content.stats] == [("Calls", "7"), ("Errors", "1")]
-    assert not panel.card.steps.isVisible()
+    assert not panel.card.button_row.isVisible()
     panel.canvas.opened.emit("remember")  # Enter: a service can't be inspected
 
 
@@ -302,7 +302,7 @@ def test_context_menu_of_an_edge_lists_the_commands_of_its_topic(panel: GraphPan
         "Show messages", "Open in another panel", "Plot a field", "Publish to this topic",
         "New alarm", "Record topic", "Copy name",
     ]  # fmt: skip
-    assert panel.canvas.choice == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
+    assert panel.canvas.selection == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
     assert (window.opened, window.beside, window.plotted) == (
         ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
     )  # fmt: skip
@@ -373,17 +373,17 @@ def test_arrow_keys_move_along_edges_and_announce_the_selection(panel: GraphPane
     canvas = panel.canvas
     canvas.select(GraphSelection("node", key_of(panel, "pepper_driver")))
     QTest.keyClick(canvas, Qt.Key.Key_Right)
-    assert canvas.choice is not None
-    assert canvas.choice.key == "/touch"
+    assert canvas.selection is not None
+    assert canvas.selection.key == "/touch"
     assert canvas.accessibleDescription() == "/touch, 20/s, 10 kB/s, from pepper_driver to blackboard"
     QTest.keyClick(canvas, Qt.Key.Key_Right)
-    assert canvas.choice.key == key_of(panel, "blackboard")
+    assert canvas.selection.key == key_of(panel, "blackboard")
     assert canvas.accessibleDescription().startswith("blackboard, Python, 1.2 %. Outgoing lines: 1.")
     QTest.keyClick(canvas, Qt.Key.Key_Right)
     QTest.keyClick(canvas, Qt.Key.Key_Return)
     assert window.opened == ["/blackboard"]
     QTest.keyClick(canvas, Qt.Key.Key_Escape)
-    assert canvas.choice is None
+    assert canvas.selection is None
 
 
 def test_enter_on_a_node_moves_focus_into_its_card(panel: GraphPanel) -> None:
@@ -517,7 +517,7 @@ def test_groups_of_a_graph_with_many_nodes_are_collapsed_initially(qtbot, window
     settle(qtbot, made)
     scene = made.canvas.scene
     assert scene is not None
-    assert {item.line for item in scene.nodes.values()} == {"67 nodes"}
+    assert {item.elided_detail for item in scene.nodes.values()} == {"67 nodes"}
     made.dispose()
 
 
@@ -538,11 +538,11 @@ def test_graph_is_panned_and_zoomed(panel: GraphPanel) -> None:
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
     QTest.mouseMove(canvas, QPoint(160, 130))
     QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 130))
-    assert canvas.choice is None
+    assert canvas.selection is None
     for _ in range(80):
         canvas.zoom_by(1 / 1.2)
     assert canvas.scale == 0.05
-    press(panel.tools.whole)
+    press(panel.tools.show_all_button)
     assert canvas.scale == fits
     assert not panel.overview.isVisible()
 
@@ -580,7 +580,7 @@ def test_svg_and_dot_are_exported(panel: GraphPanel, window: Window, tmp_path: P
 
 
 def test_export_menu_opens_a_file_dialog(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
-    actions = {action.text(): action for action in panel._menu.actions()}
+    actions = {action.text(): action for action in panel._export_menu.actions()}
     window.answers.path = tmp_path / "mine.dot"
     actions["Graph (DOT)"].trigger()
     assert window.answers.asked == [f"Export the graph: {Path.home() / 'graph'}"]

@@ -39,7 +39,7 @@ def test_healthy_robot_shows_a_row_per_fact_and_no_problems(panel, asked) -> Non
     assert said(panel)["Battery"] == "84 %"
     assert said(panel)["Stop"] == "confirmed in 41 ms, at 8:40"
     assert panel.chip.text == ""
-    assert not panel.step.isVisible()
+    assert not panel.step_button.isVisible()
     assert panel.rows[0].accessibleName() == "Connection"
     assert panel.rows[0].accessibleDescription() == panel.rows[0].text_label.text()
     asked.session.fleet.links[0].last_stop, asked.session.fleet.links[0].last_stop_status = (
@@ -53,11 +53,11 @@ def test_healthy_robot_shows_a_row_per_fact_and_no_problems(panel, asked) -> Non
 def test_problems_are_counted_and_listed_first(panel, asked) -> None:
     asked.session.fleet.links[0].values["battery"] = 7
     panel.refresh()
-    assert (panel.chip.text, panel.chip.status) == ("1 warning", "warn")
+    assert (panel.chip.text, panel.chip.status) == ("1 problem", "warn")
     assert panel.rows[0].title.text() == "Battery"
     asked.session.fleet.links[0].is_unresponsive = True
     panel.refresh()
-    assert (panel.chip.text, panel.chip.status) == ("2 warnings", "error")
+    assert (panel.chip.text, panel.chip.status) == ("2 problems", "error")
 
 
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
@@ -65,9 +65,9 @@ def test_unresponsive_robot_shows_a_next_step(panel, asked, virtual: bool, does:
     link = asked.session.fleet.links[0]
     link.robot, link.is_unresponsive = replace(link.robot, virtual=virtual), True
     panel.refresh()
-    assert panel.step.isVisible()
-    assert panel.rows[0].y() < panel.step.parentWidget().y() < panel.rows[1].y()
-    press(panel.step)
+    assert panel.step_button.isVisible()
+    assert panel.rows[0].y() < panel.step_button.parentWidget().y() < panel.rows[1].y()
+    press(panel.step_button)
     assert asked.commands == [does]
 
 

@@ -15,7 +15,7 @@ def test_new_bytes_are_painted_at_the_kept_scroll_position(qtbot, qapp) -> None:
     view.resize(600, 200)
     view.show()
     view.show_bytes(bytes(1_000_000))
-    assert view.per_line() == 16
+    assert view.bytes_per_line() == 16
     assert view.verticalScrollBar().maximum() == 62_500 - view.verticalScrollBar().pageStep()
     view.verticalScrollBar().setValue(30_000)
     before = view.viewport().grab().toImage()
@@ -30,5 +30,5 @@ def test_narrow_view_has_eight_bytes_per_line(qtbot, qapp) -> None:
     view.resize(330, 200)
     view.show()
     view.show_bytes(bytes(20))
-    assert view.per_line() == 8
+    assert view.bytes_per_line() == 8
     assert view.text().splitlines()[2].startswith("0010")

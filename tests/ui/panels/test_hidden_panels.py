@@ -265,7 +265,7 @@ def test_unwatched_robot_is_not_stale_when_its_panel_is_shown_again(qtbot, case:
     case.hide_for_long()
     panel._last_drawing_s -= 60
     settle(qtbot, case, case.dock("robot"))
-    assert not panel.view.stale
+    assert not panel.view.is_stale
 
 
 def test_robot_values_from_before_hiding_are_unknown_when_shown_again(qtbot, case: Case) -> None:
@@ -295,12 +295,12 @@ def test_failed_panel_watches_no_topics_until_retried(qtbot, case: Case) -> None
     assert case.source.wanted >= {CAMERA}
     view, camera.panel.view = camera.panel.view, None  # type: ignore[assignment]  # whatever makes it raise
     case.tick()
-    assert camera.failed
+    assert camera.has_failed
     assert CAMERA not in case.source.wanted
     camera.panel.view = view
     camera.retry()
     case.tick()
-    assert not camera.failed
+    assert not camera.has_failed
     assert CAMERA in case.source.wanted
 
 

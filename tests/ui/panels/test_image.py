@@ -127,7 +127,7 @@ def test_stale_image_is_drawn_differently_and_shows_its_age(view) -> None:
 
 @pytest.fixture
 def camera_view(qtbot, qapp) -> PictureView:
-    view = PictureView(Theme("light"), fill=True, labelled=False)
+    view = PictureView(Theme("light"), fills_view=True, has_label=False)
     qtbot.addWidget(view)
     view.resize(400, 160)
     view.show()
@@ -150,12 +150,12 @@ def test_unchanged_image_is_not_repainted(qtbot, camera_view, monkeypatch) -> No
     assert asked
 
 
-@pytest.mark.parametrize("labelled", [True, False])
+@pytest.mark.parametrize("has_label", [True, False])
 def test_image_age_is_updated_once_per_second_and_repaints_only_its_text(
-    qtbot, monkeypatch, labelled: bool
+    qtbot, monkeypatch, has_label: bool
 ) -> None:
     clock = Clock()
-    view = PictureView(Theme("light"), labelled=labelled, clock=clock)
+    view = PictureView(Theme("light"), has_label=has_label, clock=clock)
     qtbot.addWidget(view)
     view.resize(400, 300)
     stream, first = stream_of(picture(320, 240)), picture(320, 240)
@@ -175,7 +175,7 @@ def test_image_age_is_updated_once_per_second_and_repaints_only_its_text(
     clock.now += 0.2
     takes(600.0)
     assert (words != view.label_text, "10 min" in view.label_text) == (True, True)
-    assert len(asked) == labelled
+    assert len(asked) == has_label
     assert all(where[1] > 200 for where in asked), "not the picture above its words"
 
 
@@ -281,14 +281,14 @@ def test_camera_panel_shows_a_robot_and_keeps_its_last_image_after_disconnection
     link.values["faces"] = FACES
     panel.refresh()
     assert panel.subtitle() == "/Pepper/camera"
-    assert panel.rate.text() == "15 fps (15 shown)"
+    assert panel.rate_label.text() == "15 fps (15 shown)"
     assert len(panel.view.boxes) == 1
     link.is_connected = False
     window.session.fleet.revision += 1
     window.session.clock.now += 4.0
     panel.refresh()
     assert panel.view.label_text == "Last image 4 s ago"  # the last image stays, in grey
-    assert panel.rate.text() == ""
+    assert panel.rate_label.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.dispose()
     assert window.session.images.streams[0].is_closed
@@ -307,7 +307,7 @@ def wheel(view: ZoomablePicture, at: QPoint, notches: int) -> None:
 
 
 def under(view: ZoomablePicture, at: QPoint) -> str:
-    view.mouse = QPointF(at)
+    view.mouse_position = QPointF(at)
     return view._hovered_pixel_text()
 
 
@@ -342,7 +342,7 @@ def test_pixels_have_sharp_edges_from_200_per_cent_zoom(view) -> None:
 def test_pixel_values_and_boxes_follow_rotation_and_flipping(view, turned: int, flipped: bool) -> None:
     view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
-        view.placement.flip(horizontally=True)
+        view.placement.flip(is_horizontal=True)
     view.placement.rotate(turned)
     ball = view.placement.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
     assert under(view, ball.toPoint()).endswith("210 62 58  #D23E3A")
@@ -384,7 +384,7 @@ def test_image_is_decoded_at_display_size_and_in_full_under_the_mouse(view) -> N
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size == (1920, 960)
     view.placement.set_zoom(None)
-    view.mouse = QPointF(200, 200)
+    view.mouse_position = QPointF(200, 200)
     view.show_image(stream)  # type: ignore[arg-type]
     assert stream.requested_size is None
 
@@ -561,7 +561,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     assert panel.empty._title.text() == "Can't show the message as an image"
     next(each for each in panel.empty._buttons).click()
     assert window.commands == ["inspect:/cam"]
-    assert panel.fit.isHidden()
+    assert panel.fit_button.isHidden()
 
 
 def test_camera_panel_shows_the_selected_robot(qtbot, qapp) -> None:
@@ -585,9 +585,10 @@ def test_camera_panel_shows_the_selected_robot(qtbot, qapp) -> None:
 
 def test_narrow_title_hides_buttons_and_the_menu_has_all_actions(qtbot, qapp) -> None:
     panel = made(qtbot, Window(Session.full()))
-    assert not panel.fit.isHidden()
+    assert not panel.fit_button.isHidden()
     panel.resize(220, 220)
-    assert (panel.fit.isHidden(), panel.keep.isHidden(), panel.freeze.isHidden()) == (True, True, False)
+    buttons = (panel.fit_button, panel.save_button, panel.freeze)
+    assert [button.isHidden() for button in buttons] == [True, True, False]
     assert len([action for action in panel.more_actions() if action.text()]) == len(ACTION_SPECS) + 2
     empty = made(qtbot, Window(Session()))
-    assert (empty.fit.isHidden(), empty.freeze.isHidden()) == (True, True)
+    assert (empty.fit_button.isHidden(), empty.freeze.isHidden()) == (True, True)

@@ -66,21 +66,21 @@ def test_depth_image_has_a_colour_bar_with_selectable_colours_and_range(panel, w
     assert panel.view.picture.scale is not None
     assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (500.0, 4500.0)
     usual = shown(panel).copy()
-    press(panel.tune)
+    press(panel.style_button)
     assert panel.style_bar.isVisible()
-    panel.style_bar.colours.set_value("turbo")
-    panel.style_bar.colours.activated.emit(panel.style_bar.colours.currentIndex())
+    panel.style_bar.colour_map_choice.set_value("turbo")
+    panel.style_bar.colour_map_choice.activated.emit(panel.style_bar.colour_map_choice.currentIndex())
     ticks(window, panel)
     assert not np.array_equal(shown(panel), usual)  # the same image with another colour map
-    press(panel.style_bar.own_range)
-    assert panel.style_bar.low.isVisible()
-    assert (panel.style_bar.low.text(), panel.style_bar.high.text()) == ("500", "4500")
-    panel.style_bar.low.setText("1000")
-    panel.style_bar.high.setText("2000")
-    panel.style_bar.high.editingFinished.emit()
+    press(panel.style_bar.range_button)
+    assert panel.style_bar.low_field.isVisible()
+    assert (panel.style_bar.low_field.text(), panel.style_bar.high_field.text()) == ("500", "4500")
+    panel.style_bar.low_field.setText("1000")
+    panel.style_bar.high_field.setText("2000")
+    panel.style_bar.high_field.editingFinished.emit()
     ticks(window, panel)
     assert (panel.view.picture.scale.low, panel.view.picture.scale.high) == (1000.0, 2000.0)
-    press(panel.style_bar.again)
+    press(panel.style_bar.reset_button)
     ticks(window, panel)
     assert np.array_equal(shown(panel), usual)
 
@@ -89,7 +89,7 @@ def test_brightness_and_contrast_apply_to_a_frozen_image(panel, window) -> None:
     panel.show_topic(CAMERA)
     sends(window, panel, CAMERA, np.full((24, 32, 3), 100, np.uint8), "bgr8")
     assert panel.view.picture.scale is None
-    assert not panel.style_bar.colours.isEnabled()  # colour maps need a single-channel image
+    assert not panel.style_bar.colour_map_choice.isEnabled()  # colour maps need a single-channel image
     panel.freeze.setChecked(True)
     panel.style_bar.brightness.setValue(panel.style_bar.brightness.maximum())
     ticks(window, panel)
@@ -103,7 +103,7 @@ def test_brightness_and_contrast_apply_to_a_frozen_image(panel, window) -> None:
 def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic(DEPTH)
     panel.style_bar.contrast.setValue(150)
-    panel.tune.setChecked(True)
+    panel.style_button.setChecked(True)
     panel.overlays.set_visible(MARKS, visible=True)
     look = panel.style_bar.picture_style
     panel.show_topic(CAMERA)
@@ -115,8 +115,8 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
     assert isinstance(again, ImagePanel)
     again.restore_state(panel.save_state())
     assert again.style_bar.picture_style == look
-    assert again.tune.isChecked()
-    assert again.overlays.selected == (MARKS,)
+    assert again.style_button.isChecked()
+    assert again.overlays.selected_topics == (MARKS,)
     again.restore_state({"look": {"contrast": "much"}, "layers": [3], "topic": DEPTH})
     again.dispose()
 
@@ -141,7 +141,7 @@ def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, w
     assert MARKS not in window.session.watched
     for number in range(MAX_OVERLAYS + 3):
         panel.overlays.set_visible(f"/m{number}", visible=True)
-    assert len(panel.overlays.selected) == MAX_OVERLAYS
+    assert len(panel.overlays.selected_topics) == MAX_OVERLAYS
 
 
 def painted(payload: object, turned: int = 0) -> QImage:

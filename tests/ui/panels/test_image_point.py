@@ -58,9 +58,9 @@ def arm(window: Window, panel: ImagePanel) -> Subscriber:
     """Arm the publishing of points and return a subscriber to them."""
     heard = window.session.source.listen(POINTS, "json")
     panel.actions_of["point"].trigger()
-    press(panel.points.strip.switch)
+    press(panel.point_bar.strip.switch)
     ticks(window, panel)
-    assert panel.points.is_armed
+    assert panel.point_bar.is_armed
     return heard
 
 
@@ -79,7 +79,7 @@ def click(qtbot, window: Window, panel: ImagePanel, x: float, y: float, key=LEFT
 
 
 def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot, window, panel) -> None:
-    session, points = window.session, panel.points
+    session, points = window.session, panel.point_bar
     assert not points.isVisible()
     QTest.keyClick(panel.view, Qt.Key.Key_P)
     ticks(window, panel)
@@ -98,19 +98,19 @@ def test_panel_names_the_topic_to_arm_and_one_click_publishes_one_message(qtbot,
     point = click(qtbot, window, panel, 16.5, 8.5)
     told = {"width": 320, "height": 240, "stamp": {"sec": 1_795_164_093, "nanosec": 7}, "topic": CAMERA}
     assert heard.listen(timeout_s=20.0) == (True, {"x": 16, "y": 8, "button": "left", **told})
-    assert panel.view.marked == point
+    assert panel.view.marked_point == point
     assert not panel.view.grab().isNull()
-    assert points.strip.counts.text() == "1 point sent, received by 1"
-    entry = session.acting.sent.records[-1]
-    assert (entry.origin, entry.name, entry.result_text) == ("image", POINTS, "Point (16, 8), received by 1")
-    qtbot.waitUntil(lambda: panel.view.marked is None, timeout=20_000)
+    assert points.strip.summary_label.text() == "1 point sent, 1 subscriber"
+    entry = session.acting.sent_log.records[-1]
+    assert (entry.origin, entry.name, entry.result_text) == ("image", POINTS, "Point (16, 8), 1 subscriber")
+    qtbot.waitUntil(lambda: panel.view.marked_point is None, timeout=20_000)
 
     panel.actions_of["right"].trigger()
     panel.actions_of["across"].trigger()
     panel.view.zoom_by(1.5)
     click(qtbot, window, panel, 200.5, 100.5, MIDDLE)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 200, "y": 100, "button": "middle", **told})
-    assert points.strip.counts.text() == "2 points sent, received by 1"
+    assert points.strip.summary_label.text() == "2 points sent, 1 subscriber"
     assert session.acting.resend(entry.number) == ""
     assert heard.listen(timeout_s=20.0)[1]["x"] == 16
     session.runs.stop()
@@ -123,11 +123,11 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
     view = panel.view
     for key in (Qt.Key.Key_Left, Qt.Key.Key_Return):
         QTest.keyClick(view, key)  # not armed: no point is selected
-    assert view.pointed is None
+    assert view.cursor_pixel is None
     heard = arm(window, panel)
     QTest.keyClick(view, Qt.Key.Key_Return)  # no point is selected yet
     QTest.keyClick(view, Qt.Key.Key_Left)
-    assert view.pointed == (160, 120)
+    assert view.cursor_pixel == (160, 120)
     plain = view.grab().toImage()
     for key, shift in (
         (Qt.Key.Key_Left, True),
@@ -135,9 +135,9 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
         (Qt.Key.Key_Right, False),
         (Qt.Key.Key_Down, False),
     ):
-        before = view.pointed
+        before = view.cursor_pixel
         QTest.keyClick(view, key, SHIFT if shift else Qt.KeyboardModifier.NoModifier)
-        moved = tuple(now - then for now, then in zip(view.pointed, before, strict=True))
+        moved = tuple(now - then for now, then in zip(view.cursor_pixel, before, strict=True))
         wanted = {Qt.Key.Key_Left: (-1, 0), Qt.Key.Key_Up: (0, -1), Qt.Key.Key_Right: (1, 0)}.get(key, (0, 1))
         near = 10 if shift else 1
         assert all(
@@ -145,7 +145,7 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
             for is_so, way in zip(moved, wanted, strict=True)
         )
     assert view.grab().toImage() != plain
-    x, y = view.pointed
+    x, y = view.cursor_pixel
     QTest.keyClick(view, Qt.Key.Key_Return)
     ticks(window, panel)
     told = heard.listen(timeout_s=20.0)[1]
@@ -153,20 +153,22 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
     panel.actions_of["right"].trigger()  # rotated right: the top of the view is the image's left edge
     for _step in range(60):
         QTest.keyClick(view, Qt.Key.Key_Up, SHIFT)
-    assert view.pointed[0] == 0
+    assert view.cursor_pixel[0] == 0
     view.zoom_by(8)
     for _step in range(12):
         QTest.keyClick(view, Qt.Key.Key_Down, SHIFT)
     view.zoom_by(0.5)
     view.repaint()
-    assert view._hovered_pixel_text().startswith(f"({view.pointed[0]}, {view.pointed[1]})"), (
+    assert view._hovered_pixel_text().startswith(f"({view.cursor_pixel[0]}, {view.cursor_pixel[1]})"), (
         "its value is told"
     )
-    assert view.rect().contains(view._view_position(view.pointed).toPoint()), "an enlarged picture goes along"
+    assert view.rect().contains(view._view_position(view.cursor_pixel).toPoint()), (
+        "an enlarged picture goes along"
+    )
     QTest.mouseMove(view, QPoint(30, 30))
-    qtbot.waitUntil(lambda: view.pointed is None)
+    qtbot.waitUntil(lambda: view.cursor_pixel is None)
     QTest.keyClick(view, Qt.Key.Key_Left)
-    assert view.pointed is not None
+    assert view.cursor_pixel is not None
     small = np.zeros((4, 4, 3), np.uint8)
     sent = Message(
         CAMERA, small.tobytes(), "image", "image", stamp_ns=STAMP_NS + 1,
@@ -180,7 +182,7 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
     assert (told["x"], told["y"], told["width"]) == (3, 3, 4)
     window.session.runs.stop()
     ticks(window, panel)
-    assert view.pointed is None
+    assert view.cursor_pixel is None
 
 
 def test_drag_double_click_and_click_outside_the_image_publish_no_point(qtbot, window, panel) -> None:
@@ -209,13 +211,13 @@ def test_drag_double_click_and_click_outside_the_image_publish_no_point(qtbot, w
     QApplication.sendEvent(view, turned)
     QTest.mouseRelease(view, LEFT, none, start)
     QTest.mouseClick(view, LEFT, none, at(panel, 100, 100))
-    panel.points.topic.setText("/elsewhere")
-    panel.points.topic.textEdited.emit("/elsewhere")
+    panel.point_bar.topic_field.setText("/elsewhere")
+    panel.point_bar.topic_field.textEdited.emit("/elsewhere")
     assert not view.accepts_clicks, "what goes elsewhere is armed anew, also what was clicked before"
     assert not window.session.acting.arming.is_on
-    panel.points.topic.setText("")
-    panel.points.topic.textEdited.emit("")
-    press(panel.points.strip.switch)
+    panel.point_bar.topic_field.setText("")
+    panel.point_bar.topic_field.textEdited.emit("")
+    press(panel.point_bar.strip.switch)
     ticks(window, panel)
     point = click(qtbot, window, panel, 150.5, 110.5)
     assert told == [point]
@@ -229,12 +231,12 @@ def test_two_clicks_at_two_positions_publish_two_points(qtbot, window, panel) ->
         for x in (20, 300):
             QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, x + 0.5, 50.5))
     ticks(window, panel)
-    words = [each.result_text for each in window.session.acting.sent.records if each.origin == "image"]
-    assert words == ["Point (20, 50), received by 1", "Point (300, 50), received by 1"]
+    words = [each.result_text for each in window.session.acting.sent_log.records if each.origin == "image"]
+    assert words == ["Point (20, 50), 1 subscriber", "Point (300, 50), 1 subscriber"]
 
 
 def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot, window, panel) -> None:
-    acting, points = window.session.acting, panel.points
+    acting, points = window.session.acting, panel.point_bar
     acting.arm()
     acting.allow(Target("topic", POINTS))
     acting.allow(Target("topic", "/other"))
@@ -262,21 +264,21 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
     for broken in (None, 7, {"on": 1, "topic": 3, "type": []}, {"type": "no type", "topic": "two words"}):
         panel.restore_state({**kept, "point": broken})
         ticks(window, panel)
-    assert points.problem.text()
-    assert points.arm() == points.problem.text()
-    assert points.kind.value == MESSAGE_TYPES[1]
+    assert points.problem_label.text()
+    assert points.arm() == points.problem_label.text()
+    assert points.type_choice.value == MESSAGE_TYPES[1]
 
 
 def test_robot_command_topic_requires_confirmation_and_a_source_change_disarms(qtbot, window, panel) -> None:
-    acting, points = window.session.acting, panel.points
+    acting, points = window.session.acting, panel.point_bar
     topic = window.session.fleet.connected[0].robot.topics.command
     panel.restore_state({**panel.save_state(), "point": {"on": True, "topic": topic, "type": "json"}})
     press(points.strip.switch)
     ticks(window, panel)
     assert acting.question is not None
-    assert topic in points.strip.question.text()
+    assert topic in points.strip.question_label.text()
     assert not points.is_armed
-    press(points.strip.cancel)
+    press(points.strip.cancel_button)
     ticks(window, panel)
     assert not points.is_armed
     assert not panel.view.accepts_clicks
@@ -286,8 +288,8 @@ def test_robot_command_topic_requires_confirmation_and_a_source_change_disarms(q
     ticks(window, panel)
     assert points.is_armed
     acting.disarm()
-    points.topic.setText("")
-    points.topic.textEdited.emit("")
+    points.topic_field.setText("")
+    points.topic_field.textEdited.emit("")
     press(points.strip.switch)
     ticks(window, panel)
     assert points.is_armed
@@ -301,11 +303,11 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window, panel) -> None:
     panel.actions_of["point"].trigger()
     window.session.acting.arm()
     ticks(window, panel)
-    assert panel.points.arm_button.isVisible()
+    assert panel.point_bar.arm_button.isVisible()
     data = ("robot", "camera", "point", "json", "geometry_msgs/Point", "geometry_msgs/PointStamped")
-    assert untranslated_in(panel.points, *data) == []
-    assert clipped(panel.points) == []
+    assert untranslated_in(panel.point_bar, *data) == []
+    assert clipped(panel.point_bar) == []
     window.session.acting.disarm()
     ticks(window, panel)
-    assert untranslated_in(panel.points, *data) == []
-    assert clipped(panel.points) == []
+    assert untranslated_in(panel.point_bar, *data) == []
+    assert clipped(panel.point_bar) == []

@@ -215,13 +215,13 @@ def test_undecodable_message_is_shown_as_bytes_with_the_reason(panel, window) ->
     panel.refresh()
     assert panel.body.page == RAW
     assert panel.mode.value == "raw"
-    assert panel.body.sentence.isVisible()
-    assert panel.body.sentence.text().startswith("Can't decode the message as json: ")
+    assert panel.body.error_label.isVisible()
+    assert panel.body.error_label.text().startswith("Can't decode the message as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     window.session.send("/faces", {"good": 1})
     panel.refresh()
     assert panel.body.page == TREE
-    assert not panel.body.sentence.isVisible()
+    assert not panel.body.error_label.isVisible()
 
 
 def test_raw_view_shows_the_bytes_of_a_valid_message(panel, window) -> None:
@@ -231,7 +231,7 @@ def test_raw_view_shows_the_bytes_of_a_valid_message(panel, window) -> None:
     press(button(panel.mode, "Raw"))
     assert panel.body.page == RAW
     assert "7b" in panel.bytes.text()
-    assert not panel.body.sentence.isVisible()
+    assert not panel.body.error_label.isVisible()
     window.session.send("/blackboard", {"b": 1})
     panel.refresh()
     assert "62" in panel.bytes.text()
@@ -261,7 +261,7 @@ def test_frozen_undecodable_message_is_shown_as_bytes_in_both_views(panel, windo
     ticks(window, panel)
     press(button(panel.mode, "Tree"))
     assert panel.body.page == RAW
-    assert panel.body.sentence.text().startswith("Can't decode the message as json: ")
+    assert panel.body.error_label.text().startswith("Can't decode the message as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     panel.freeze.setChecked(False)
     assert panel.model.value() == {"good": 1}
@@ -278,7 +278,7 @@ def test_value_and_field_path_are_copied(panel, window) -> None:
     assert QGuiApplication.clipboard().text() == "people[0].name"
     assert window.toasts == ["Copied people[0].name", "Copied the path people[0].name"]
     choose(panel, "robots", "Pepper", "pose")
-    panel.own.copy_value()
+    panel.inspector_actions.copy_value()
     assert json.loads(QGuiApplication.clipboard().text())["y"] == pytest.approx(-0.297)
 
 
@@ -360,7 +360,7 @@ def test_large_malformed_json_message_is_shown_as_bytes(qtbot, panel, window) ->
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", b"[" * 1_100_000)
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])
-    assert panel.body.sentence.text() == "Can't decode the message as json: unbalanced brackets."
+    assert panel.body.error_label.text() == "Can't decode the message as json: unbalanced brackets."
 
 
 def test_images_are_summarised() -> None:
@@ -434,7 +434,7 @@ def test_topic_is_restored_with_the_layout(qtbot, panel, window) -> None:
 @pytest.mark.parametrize(
     ("value", "words"), [("a", "a"), (1.5, "1.5"), (None, "null"), (b"\x01\x02", "01 02"), ([1], "[\n  1\n]")]
 )
-def test_values_are_copied_to_the_clipboard_as_plain_text(value: object, words: str) -> None:
+def test_values_are_formatted_as_text_for_the_clipboard(value: object, words: str) -> None:
     assert clipboard_text(value) == words
 
 
@@ -452,12 +452,12 @@ def test_search_counts_matches_and_steps_forwards_and_backwards_across_messages(
     assert panel.foot.path.text() == "b"
     window.session.send("/blackboard", {"a": "x1", "b": "y", "c": "x3", "d": "x4", "e": "x5"})
     panel.refresh()
-    press(panel.finder.after)
+    press(panel.finder.next_button)
     assert (panel.finder.field.count, panel.foot.path.text()) == ("3 of 4", "d")
-    press(panel.finder.before)
+    press(panel.finder.previous_button)
     assert panel.foot.path.text() == "c"
     field.clear()
-    assert panel.finder.before.isHidden()
+    assert panel.finder.previous_button.isHidden()
     assert panel.focus_filter()
     field.setText("nowhere")
     assert panel.finder.field.count == "none"
@@ -474,7 +474,7 @@ def test_message_is_compared_with_the_previous_message_and_only_changes_can_be_s
     assert panel.strip.text_label.text() == "Previous message: 1 changed, 1 added, 1 removed"
     marks = {node.key: node.mark for node in top(panel)}
     assert marks == {"same": "", "n": "changed", "new": "added", "gone": "removed"}
-    panel.strip.only.setChecked(True)
+    panel.strip.changes_only_button.setChecked(True)
     assert [node.key for node in top(panel)] == ["n", "new", "gone"]
     window.session.send("/blackboard", {"same": 1, "n": 2, "new": {"x": 1}})
     panel.refresh()
@@ -508,13 +508,13 @@ def test_whole_message_is_copied_as_json(panel, window) -> None:
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"a": [1, 2]})
     panel.refresh()
-    panel.own.copy_message()
+    panel.inspector_actions.copy_message()
     assert QGuiApplication.clipboard().text() == '{"a": [1, 2]}'
     assert window.toasts == ["Copied the message of /blackboard"]
     panel.show_topic("/speech/words")
     window.session.send("/speech/words", b"hello")
     panel.refresh()
-    panel.own.copy_message()
+    panel.inspector_actions.copy_message()
     assert json.loads(QGuiApplication.clipboard().text()) == {"value": "hello"}
     words = [action.text() for action in panel.more_actions()]
     assert words[:3] == ["Copy value", "Copy path", "Copy the message as JSON"]
@@ -523,7 +523,7 @@ def test_whole_message_is_copied_as_json(panel, window) -> None:
 def test_comparison_is_restored_with_the_layout(qtbot, panel, window) -> None:
     panel.show_topic("/odom")
     panel.compare.setChecked(True)
-    panel.strip.only.setChecked(True)
+    panel.strip.changes_only_button.setChecked(True)
     again = window.make(PANEL)
     qtbot.addWidget(again)
     for widget in again.header:
@@ -531,7 +531,7 @@ def test_comparison_is_restored_with_the_layout(qtbot, panel, window) -> None:
     again.restore_state(panel.save_state())
     assert isinstance(again, InspectorPanel)
     assert again.is_comparing
-    assert again.strip.only.isChecked()
+    assert again.strip.changes_only_button.isChecked()
 
 
 def test_nested_change_counts_only_the_changed_value() -> None:
@@ -554,7 +554,7 @@ def test_topic_without_publisher_is_reported_while_waiting(panel, window) -> Non
     assert panel.body.empty._text.text() == "The next message on /odom appears here."
     window.session.topics["/odom"].publishers = 0
     panel.refresh()
-    assert panel.body.empty._text.text().startswith("No publisher now.")
+    assert panel.body.empty._text.text().startswith("There is no publisher at the moment.")
 
 
 def test_inspector_ctrl_f_takes_precedence_over_the_window_shortcut(qtbot, panel, window) -> None:
@@ -609,7 +609,7 @@ def test_value_is_plotted_by_action_or_footer_button_and_can_be_dragged(panel, w
         (("a b.c",), '["a b.c"][*]'),
     ):
         choose(panel, *path)
-        panel.own.plot()
+        panel.inspector_actions.plot()
         press(panel.foot.plot)
         assert plotted[-2:] == [("/blackboard", said)] * 2
         place = panel.tree.visualRect(panel.tree.currentIndex()).center()
@@ -623,6 +623,6 @@ def test_value_is_plotted_by_action_or_footer_button_and_can_be_dragged(panel, w
         QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place)
         assert dragged[-1] == ("/blackboard", said)
     choose(panel, "robots", "Pepper", "pose")
-    panel.own.plot()
-    assert window.toasts[-1] == "robots.Pepper.pose isn't a number, text or boolean"
+    panel.inspector_actions.plot()
+    assert window.toasts[-1].startswith("Can't plot robots.Pepper.pose. ")
     assert len(plotted) == 8

@@ -76,11 +76,11 @@ def test_input_starting_with_dollar_is_a_query_and_the_tree_shows_its_results(pa
     send(window, panel, seen(30, 41))  # the query is repeated for every message
     soon(lambda: rows(panel) == ["people[0].name", "people[1].name"])
     panel.tree.setCurrentIndex(panel.model.index(1, 0))
-    panel.own.copy_path()
+    panel.inspector_actions.copy_path()
     assert QGuiApplication.clipboard().text() == "people[1].name"
-    panel.own.plot()
+    panel.inspector_actions.plot()
     assert window.plotted == [(TOPIC, "people[1].name")]
-    panel.own.copy_message()
+    panel.inspector_actions.copy_message()
     assert '"doors"' in QGuiApplication.clipboard().text()
     panel.finder.field.clear()
     assert rows(panel) == ["stamp", "people", "doors"]

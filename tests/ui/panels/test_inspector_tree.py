@@ -115,7 +115,7 @@ def test_change_mark_fades_and_with_reduced_motion_stays_for_a_second(qtbot, mod
     for now[0] in (7.0, 7.4, 7.9):
         shares.append(view.highlight_opacity(node))
     assert shares == [1.0, pytest.approx(0.5), 0.0]
-    theme.reduced_motion = True
+    theme.is_motion_reduced = True
     now[0] = 7.9
     assert view.highlight_opacity(node) == 1.0
     now[0] = 8.1

@@ -42,7 +42,7 @@ def look(window: Window) -> Look:
         made.append(Fake(*told))  # type: ignore[arg-type]
         return made[-1]
 
-    window.session.networks._make = make  # type: ignore[assignment]
+    window.session.networks._create_source = make  # type: ignore[assignment]
 
     def choose(kind: str) -> Fake:
         window.session.networks.select(kind, "")
@@ -108,7 +108,7 @@ def test_ros_topics_are_listed_with_native_topics_and_mark_unknown_values(
     ros = look("ros")
     ros.tell(GraphReceived(ros_graph(), 0.0))
     ticks(window, panel, 2)
-    assert panel.count.text() == "15 topics, 9 nodes"
+    assert panel.count_label.text() == "15 topics, 9 nodes"
     assert cells(panel, "/blackboard")["network"] == "NEP"
     theirs = cells(panel, "ros /blackboard")
     assert (theirs["topic"], theirs["network"], theirs["type"]) == ("/blackboard", "ROS 1", "String")

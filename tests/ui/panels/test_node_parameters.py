@@ -52,7 +52,7 @@ class World:
 
     def _refreshed(self) -> str:
         ticks(self.window, self.panel)
-        return self.panel._parameters.setting
+        return self.panel._parameters.pending_name
 
     def cells(self) -> list[tuple[str, ...]]:
         model = self.part.model
@@ -112,28 +112,28 @@ def test_parameters_are_shown_with_their_allowed_values(world: World) -> None:
     assert world.cells()[4][1].endswith("x… (5000 characters)")
     assert len(world.cells()[4][1]) < 250
     assert world.window.session.watched == [parameters_topic(world.robot.id)]
-    assert world.part.sentence.text() == "Choose a parameter to change its value."
+    assert world.part.status_label.text() == "Choose a parameter to change its value."
 
 
 def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World) -> None:
     part = world.part
     part.table.select_key("speed")
     assert (part.editors.currentIndex(), part.field.text()) == (LINE, "0.5")
-    assert part.sentence.text() == "in m/s; 0 to 2"
+    assert part.status_label.text() == "in m/s; 0 to 2"
     QTest.keyClick(part.table, Qt.Key.Key_Return)
     part.field.selectAll()
     QTest.keyClicks(part.field, "9")
     QTest.keyClick(part.field, Qt.Key.Key_Return)
     world.settle(qtbot)
-    assert part.sentence.text() == "The parameter 'speed' can't be 9.0: the maximum is 2."
+    assert part.status_label.text() == "The parameter 'speed' can't be 9.0: the maximum is 2."
     assert (part.field.text(), part.field.property("wrong")) == ("9", "true")
     part.field.selectAll()
     QTest.keyClicks(part.field, "fast")
-    part.button.click()
-    assert part.sentence.text() == "Enter a number."
+    part.set_button.click()
+    assert part.status_label.text() == "Enter a number."
     part.field.selectAll()
     QTest.keyClicks(part.field, "1.25")
-    part.button.click()
+    part.set_button.click()
     world.settle(qtbot)
     assert world.robot.parameters["speed"] == 1.25
     assert (part.field.text(), part.field.property("wrong")) == ("1.25", "false")
@@ -164,15 +164,16 @@ def test_selected_parameter_choice_is_applied_immediately(qtbot, world: World) -
     part = world.part
     part.table.select_key("gait")
     assert part.editors.currentIndex() == CHOICE
-    assert not part.button.isVisibleTo(part)
-    part.choice.set_value("run")
-    part.choice.activated.emit(1)
+    assert not part.set_button.isVisibleTo(part)
+    part.choice_field.set_value("run")
+    part.choice_field.activated.emit(1)
     world.settle(qtbot)
     assert world.robot.parameters["gait"] == "run"
     part.table.select_key("lights")
-    assert [part.choice.itemData(place) for place in range(part.choice.count())] == ["false", "true"]
-    part.choice.set_value("false")
-    part.choice.activated.emit(0)
+    choice = part.choice_field
+    assert [choice.itemData(place) for place in range(choice.count())] == ["false", "true"]
+    part.choice_field.set_value("false")
+    part.choice_field.activated.emit(0)
     world.settle(qtbot)
     assert world.robot.parameters["lights"] is False
 
@@ -181,12 +182,12 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     part = world.part
     part.table.select_key("serial")
     assert not part.field.isEnabled()
-    assert not part.button.isEnabled()
-    assert part.sentence.text() == "Only its own node can set it."
+    assert not part.set_button.isEnabled()
+    assert part.status_label.text() == "Only its own node can set it."
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.select_key("speed")
-    assert (part.field.isEnabled(), part.sentence.text()) == (False, "The node has disappeared.")
+    assert (part.field.isEnabled(), part.status_label.text()) == (False, "The node has left.")
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 

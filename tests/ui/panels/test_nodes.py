@@ -159,7 +159,7 @@ def test_removed_node_is_struck_through_for_ten_seconds(panel, window) -> None:
 
 def test_limitations_of_a_selected_original_nep_node_are_shown(panel, window) -> None:
     panel.table.select_key(NodeRow(window.session.nodes.get("2")).key)
-    assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, connected since ")
+    assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, running since ")
     assert "up to 0.5.4.5" in panel.foot.text()
     assert "no sequence numbers or time stamps" in panel.foot.text()
     panel.table.select_key(NodeRow(window.session.nodes.get("1")).key)

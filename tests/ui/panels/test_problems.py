@@ -71,7 +71,7 @@ def test_panel_without_problems_shows_an_empty_state(qtbot, qapp) -> None:
     for widget in panel.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(panel, ProblemsPanel)
-    assert panel.nothing.isVisible()
+    assert panel.empty_label.isVisible()
     assert (panel.chip.text, panel.chip.status) == ("No problems", "ok")
 
 
@@ -123,7 +123,7 @@ def test_old_problems_are_kept_while_a_long_behaviour_is_checked(panel, window, 
     monkeypatch.setattr(window.session.document, "newest_program", lambda: None)
     panel.refresh()
     assert panel.rows == rows
-    assert panel.checked.text() == "Checking"
+    assert panel.status_label.text() == "Checking"
 
 
 def test_fixing_a_problem_keeps_keyboard_focus_in_the_panel(panel, window) -> None:
@@ -146,14 +146,14 @@ def test_hundreds_of_problems_are_counted_and_only_the_first_are_listed(panel, w
     document.edits = 30
     panel.refresh()
     assert (len(panel.rows), panel.chip.text) == (60, "500")
-    assert panel.others.text() == "440 more, shown once these are fixed"
+    assert panel.overflow_label.text() == "440 more, shown once these are fixed"
     document.found, document.edits = document.found[400:], 31
     panel.refresh()
     assert panel.rows[0].problem.subject == "b400"
-    assert panel.others.text() == "40 more, shown once these are fixed"
+    assert panel.overflow_label.text() == "40 more, shown once these are fixed"
     document.found, document.edits = document.found[:1], 32
     panel.refresh()
-    assert not panel.others.isVisibleTo(panel)
+    assert not panel.overflow_label.isVisibleTo(panel)
 
 
 def test_unavailable_block_editor_is_a_problem_regardless_of_the_blocks(panel, window) -> None:

@@ -55,17 +55,17 @@ def states(panel: PublishPanel) -> list[str]:
 def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
     form = panel.form
     assert form.message == LOOK
-    assert form.sentence.text().startswith("Line 3, column ")
+    assert form.problem_label.text().startswith("Line 3, column ")
     assert form.edit.invalid_line == 3
-    assert not form.send.isEnabled()
-    assert states(panel) == ["line 3", "not armed"]
-    press(form.fix)
+    assert not form.send_button.isEnabled()
+    assert states(panel) == ["error, line 3", "not armed"]
+    press(form.fix_button)
     assert form.edit.invalid_line == 0
-    assert form.sentence.text() == "Fill in “yaw” first. The message can't be sent yet."
-    QTest.keyClicks(form.values.fields["yaw"], "-12.5")
+    assert form.problem_label.text() == "Fill in “yaw” first. The message can't be sent yet."
+    QTest.keyClicks(form.value_fields.fields["yaw"], "-12.5")
     ticks(window, panel)
-    assert not form.sentence.isVisible()
-    assert form.send.isEnabled()
+    assert not form.problem_label.isVisible()
+    assert form.send_button.isEnabled()
     kept = acting_of(window).saved_messages.get("a")
     assert kept is not None
     assert kept.payload() == {"yaw": -12.5, "pitch": 4.0, "speed": 0.3}
@@ -84,7 +84,7 @@ def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
     QTest.keyClicks(edit, '"y": 2}')
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2}'
     assert panel.form.edit.invalid_line == 0
-    press(panel.form.tidy)
+    press(panel.form.format_button)
     assert edit.toPlainText() == '{\n  "x": 1,\n  "y": 2\n}'
 
 
@@ -92,21 +92,21 @@ def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(windo
     session, acting = window.session, acting_of(window)
     heard = session.source.listen("/cmd_vel", "json")
     panel.list.select_key("b")
-    assert panel.form.send.text() == "Arm and send"
+    assert panel.form.send_button.text() == "Arm and send"
     QTest.keyClick(panel.form.edit.edit, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
     ticks(window, panel, 7)
     assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
-    assert panel.form.send.text() == "Send"
-    assert panel.form.last.text().endswith("received by 1")
+    assert panel.form.send_button.text() == "Send"
+    assert panel.form.last_result_label.text().endswith("1 subscriber")
     assert [token.text() for token in panel.strip.tokens] == ["/cmd_vel"]
     assert panel.strip.text_label.text() == "5:00 left"
-    press(panel.form.repeat)
+    press(panel.form.repeat_button)
     assert heard.listen(timeout_s=20.0)[0]
     ticks(window, panel, 7)
     assert states(panel)[1] == "50.0/s"
     assert panel.badge() == ("1", "warn")
-    assert panel.form.count.text()
+    assert panel.form.count_label.text()
     press(panel.strip.switch)
     assert not acting.arming.is_on
     assert acting.outbox.repeated_messages == ()
@@ -145,22 +145,22 @@ def test_robot_command_topic_requires_another_confirmation(window, panel) -> Non
     acting.saved_messages.set_message(replace(STILL, topic=topic))
     panel.list.select_key("b")
     ticks(window, panel)
-    press(panel.form.send)
+    press(panel.form.send_button)
     ticks(window, panel)
-    assert panel.strip.question.text().startswith(f"{topic} moves Pepper.")
+    assert panel.strip.question_label.text().startswith(f"{topic} moves Pepper.")
     assert acting.arming.targets == ()
-    press(panel.strip.cancel)
+    press(panel.strip.cancel_button)
     ticks(window, panel)
-    assert not panel.strip.question.isVisible()
+    assert not panel.strip.question_label.isVisible()
     assert heard.receive(0.0) is None
-    press(panel.form.send)
+    press(panel.form.send_button)
     ticks(window, panel)
     press(panel.strip.allow_button)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
-    press(panel.form.send)  # still armed: no second question
+    press(panel.form.send_button)  # still armed: no second question
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
     acting.disarm()
-    press(panel.form.send)
+    press(panel.form.send_button)
     assert acting.question is not None
     acting.disarm()
     assert acting.question is None
@@ -173,7 +173,7 @@ def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
     topic = link.robot.topics.command
     heard = session.source.listen(topic, "json")
     acting.arm()
-    acting.allow(Target("topic", topic), is_sure=True)
+    acting.allow(Target("topic", topic), is_confirmed=True)
     assert acting.send(replace(STILL, topic=topic)) == ""
     question = session.fleet.permission.question
     assert question is not None
@@ -186,13 +186,13 @@ def test_last_message_is_the_template(window, panel) -> None:
     panel.open_for("/blackboard")
     assert panel.message is not None
     assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
-    assert panel.form.template.text() == "Waiting for a message"
+    assert panel.form.template_button.text() == "Waiting for a message"
     window.session.send("/blackboard", {"mood": "happy", "n": [1, 2]})
     ticks(window, panel)
     kept = panel.message
     assert kept is not None
     assert kept.payload() == {"mood": "happy", "n": [1, 2]}
-    assert panel.form.template.text() == "Use the last message"
+    assert panel.form.template_button.text() == "Use the last message"
     assert window.session.watched == []
     panel.open_for("/blackboard")
     assert panel.message == kept, "one that is kept is shown again"
@@ -200,22 +200,22 @@ def test_last_message_is_the_template(window, panel) -> None:
 
 def test_without_a_publisher_the_message_type_is_the_template(window, panel) -> None:
     panel.list.select_key("b")
-    panel.form.topic.setText("/nowhere")
-    panel.form.kind.clear()
-    QTest.keyClicks(panel.form.kind, "geometry_msgs/Point")
-    press(panel.form.template)
+    panel.form.topic_field.setText("/nowhere")
+    panel.form.type_field.clear()
+    QTest.keyClicks(panel.form.type_field, "geometry_msgs/Point")
+    press(panel.form.template_button)
     assert window.toasts[-1] == "No publisher on this topic: using the fields of the message type"
     assert panel.message is not None
     assert panel.message.payload() == {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
 def test_topic_names_are_suggested_and_their_type_is_adopted(panel) -> None:
-    completer = panel.form.topic.completer()
+    completer = panel.form.topic_field.completer()
     completer.setCompletionPrefix("black")
     assert completer.currentCompletion() == "/blackboard"
-    panel.form.topic.setText("/robot/camera")
-    assert panel.form.kind.text() == "image"
-    assert panel.form.sentence.text().startswith("Messages of type image can't be edited by hand.")
+    panel.form.topic_field.setText("/robot/camera")
+    assert panel.form.type_field.text() == "image"
+    assert panel.form.problem_label.text().startswith("Messages of type image can't be edited by hand.")
 
 
 def test_saved_messages_are_duplicated_deleted_and_restored_by_undo(window, panel) -> None:
@@ -243,7 +243,7 @@ def test_saved_messages_are_filtered_and_an_empty_list_offers_a_new_message(wind
     assert panel.pages.currentIndex() == 0
     press(button(panel.empty, "New"))
     assert panel.message is not None
-    assert panel.form.sentence.text().startswith("Choose a topic first.")
+    assert panel.form.problem_label.text().startswith("Choose a topic first.")
 
 
 def test_publish_is_in_the_menu_of_topics_with_fields(qtbot, window) -> None:
@@ -262,7 +262,7 @@ def test_sending_cannot_be_armed_while_a_recording_is_shown(window, panel, monke
     assert acting_of(window).send(STILL) == "A recording is open. Return to live to send."
     ticks(window, panel, 7)
     assert not panel.strip.switch.isEnabled()
-    assert not panel.form.send.isEnabled()
+    assert not panel.form.send_button.isEnabled()
 
 
 def test_controls_have_accessible_names_and_fit_a_narrow_panel(panel, qtbot) -> None:

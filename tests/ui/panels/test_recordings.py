@@ -86,14 +86,14 @@ def test_each_recording_is_listed_with_its_details_and_badges(qtbot, panel, wind
     facts = {each.path.stem: each for each in panel._scan.files}
     assert [badge_of(facts[name], False) for name in ("arm", "cut")] == ["", "cut"]
     assert badge_of(facts["arm"], True) == "recording"
-    assert panel.count.text().startswith("3 recordings, ")
+    assert panel.count_label.text().startswith("3 recordings, ")
     row = panel.model.index_of(str(folder / "arm.mcap"))
     cells = [panel.model.cell_at(row.row(), place) for place in range(panel.model.columnCount())]
     assert cells[0].accessible_text == "arm, first try"
     assert [cell.text for cell in cells[4:]] == ["5", "0"]
     qtbot.waitUntil(lambda: panel._collect_thumbnails() or bool(panel._pictures))
     choose(panel, folder, "arm")
-    assert panel.details.counts.text() == "1 topic, 5 messages"
+    assert panel.details.counts_label.text() == "1 topic, 5 messages"
     assert not list(unsaid(panel))
 
 
@@ -195,8 +195,8 @@ def test_active_recording_shows_its_stats_and_cannot_be_renamed_or_deleted(qtbot
 def test_export_runs_in_the_background_and_reports_its_result(qtbot, panel, window, folder):
     seen(qtbot, panel, "arm", "camera", "cut")
     choose(panel, folder, "arm")
-    panel.details.export.click()
-    assert panel.details.export.text() == "Cancel"
+    panel.details.export_button.click()
+    assert panel.details.export_button.text() == "Cancel"
 
     def is_over() -> bool:
         panel.refresh()
@@ -205,7 +205,7 @@ def test_export_runs_in_the_background_and_reports_its_result(qtbot, panel, wind
     qtbot.waitUntil(is_over)
     assert window.toasts == ["Exported 1 file"]
     assert [each.name for each in (folder / "arm, CSV").iterdir()] == ["odom.csv"]
-    assert panel.details.export.text() == "Export"
+    assert panel.details.export_button.text() == "Export"
 
 
 def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
@@ -226,13 +226,14 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     sizes = [sum(each.size_bytes for each in messages[first::2]) for first in range(2)]
     whole, shown = picture(1).size_bytes, size_text(sum(sizes))
     assert (
-        details.about.text() == f"{group_digits(1000)} messages, about {shown}"
+        details.size_label.text() == f"{group_digits(1000)} messages, about {shown}"
     )  # images can't be exported as a table
-    details.format.set_value("mcap")
-    details.format.changed.emit("mcap")
-    assert details.about.text() == f"{group_digits(1001)} messages, about {size_text(sum(sizes) + whole)}"
-    details.format.set_value("csv")
-    details.format.changed.emit("csv")
+    details.format_choice.set_value("mcap")
+    details.format_choice.changed.emit("mcap")
+    size = size_text(sum(sizes) + whole)
+    assert details.size_label.text() == f"{group_digits(1001)} messages, about {size}"
+    details.format_choice.set_value("csv")
+    details.format_choice.changed.emit("csv")
     qtbot.waitUntil(lambda: strip.height() == strip.sizeHint().height())
     painted = strip.grab().toImage()
     assert painted.pixelColor(painted.width() // 2, 30) != strip._theme.colour("sunken")
@@ -243,16 +244,16 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     QTest.mouseClick(strip, Qt.MouseButton.LeftButton, pos=place)
     assert abs(strip.end_ns - strip.preview.start_ns - 6 * 10**9) < 10**8
     strip.set_part(strip.begin_ns, strip.preview.start_ns + 6 * 10**9)
-    QTest.keyClicks(details.topics.edit, "/a ")
+    QTest.keyClicks(details.topics_field.edit, "/a ")
     assert details.part_label.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
-    assert details.about.text() == f"about 200 messages, {size_text(sizes[0] * 200 / 500)}"
+    assert details.size_label.text() == f"about 200 messages, {size_text(sizes[0] * 200 / 500)}"
     assert details.folder_label.text() == f"{folder.name}/long, 0.02.0 to 0.06.0, CSV"
-    assert details.files.text() == "1 file"
+    assert details.file_count_label.text() == "1 file"
     window.answers.path = tmp_path
-    details.choose.click()
+    details.choose_button.click()
     assert details.folder_label.text() == f"{tmp_path.name}/long, 0.02.0 to 0.06.0, CSV"
     assert details.folder_label.toolTip() == str(tmp_path / "long, 0.02.0 to 0.06.0, CSV")
-    details.export.click()
+    details.export_button.click()
 
     def is_over() -> bool:
         panel.refresh()
@@ -261,39 +262,40 @@ def test_time_range_and_topics_to_export_are_selected_by_mouse_and_keyboard(
     qtbot.waitUntil(is_over)
     (made,) = (tmp_path / "long, 0.02.0 to 0.06.0, CSV").iterdir()
     assert (made.name, len(made.read_text("utf-8").splitlines())) == ("a.csv", 1 + 200)
-    QTest.keyClicks(details.topics.edit, "not /a ")
+    QTest.keyClicks(details.topics_field.edit, "not /a ")
     assert details.part_label.text() == "No matching topics in this recording"
     window.toasts.clear()
-    details.export.click()
+    details.export_button.click()
     assert window.toasts == ["No matching topics in this recording"]
-    details.topics.show_patterns((), ())
-    details.topics.changed.emit()
-    details.pick.setChecked(True)  # the same with the list of topics
-    assert [details.list.model.key_of(topic) for topic in details.list._matching_topics()] == [
+    details.topics_field.show_patterns((), ())
+    details.topics_field.changed.emit()
+    details.list_button.setChecked(True)  # the same with the list of topics
+    assert [details.topic_list.model.key_of(topic) for topic in details.topic_list._matching_topics()] == [
         "/a",
         "/b",
         "/camera",
     ]
-    rows = [details.list.model.index(row, 4).data() for row in range(details.list.model.rowCount())]
+    model = details.topic_list.model
+    rows = [model.index(row, 4).data() for row in range(model.rowCount())]
     assert rows == [size_text(each) for each in (*sizes, whole)]
-    details.list.table.opened.emit("/a")
-    assert details.topics.patterns() == ((), ("/a",))
+    details.topic_list.table.opened.emit("/a")
+    assert details.topics_field.patterns() == ((), ("/a",))
     assert details.part_label.text().endswith("2 of 3 topics")
-    details.list.filter.setText("b")
-    details.list.none.click()
-    assert details.topics.patterns() == (("/camera",), ())
+    details.topic_list.filter.setText("b")
+    details.topic_list.none_button.click()
+    assert details.topics_field.patterns() == (("/camera",), ())
     assert details.part().topics == ["/camera"]
-    assert details.about.text() == "This value can't be converted to this type"
-    details.list.filter.clear()
-    details.list.none.click()
+    assert details.size_label.text() == "None of the selected topics can be exported in this format"
+    details.topic_list.filter.clear()
+    details.topic_list.none_button.click()
     assert (details.part(), details.part_label.text()) == (None, "No matching topics in this recording")
-    details.list.all.click()
+    details.topic_list.all_button.click()
     assert details.part().topics is None
-    details.topics.show_patterns(("/a",), ())
-    details.topics.changed.emit()  # typed patterns are checked in the list
-    assert details.list._names == {"/a"}
-    details.times.set_value("clock")
-    details.times.changed.emit("clock")
+    details.topics_field.show_patterns(("/a",), ())
+    details.topics_field.changed.emit()  # typed patterns are checked in the list
+    assert details.topic_list._checked_names == {"/a"}
+    details.time_mode.set_value("clock")
+    details.time_mode.changed.emit("clock")
     begin, end = (clock_text(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
     assert details.part_label.text() == f"{begin} to {end}, 1 of 3 topics"
     assert strip.begin.accessibleDescription() == begin

@@ -20,7 +20,7 @@ def painted(state: RobotState, area: QRectF = AREA, *, dark: bool = False) -> QI
     image = QImage(area.size().toSize(), QImage.Format.Format_RGB32)
     image.fill(QColor("magenta"))
     painter = QPainter(image)
-    RobotDrawing().paint(painter, area, state, dark=dark)
+    RobotDrawing().paint(painter, area, state, is_dark=dark)
     painter.end()
     return image
 

@@ -28,24 +28,24 @@ def panel(qtbot, window) -> RobotPanel:
 
 
 def test_mute_setting_is_saved(panel, window) -> None:
-    assert panel.sound.accessibleName() == "Mute the robots"
-    press(panel.sound)
+    assert panel.sound_button.accessibleName() == "Mute the robots"
+    press(panel.sound_button)
     heard = window.session.settings.get(SOUND_SETTING, True)
-    assert (heard, panel.sound.accessibleName()) == (False, "Unmute the robots")
-    press(panel.sound)
+    assert (heard, panel.sound_button.accessibleName()) == (False, "Unmute the robots")
+    press(panel.sound_button)
     assert window.session.settings.get(SOUND_SETTING, False)
 
 
 def test_mute_button_shows_the_reason_for_a_missing_voice(panel, window) -> None:
     speaker = window.session.voices.speaker = FakeSpeaker()
     panel.refresh()
-    assert "no voice" not in panel.sound.toolTip()
+    assert "no voice" not in panel.sound_button.toolTip()
     speaker.problem = "This computer has no voice for English."
     panel.refresh()
-    assert "This computer has no voice for English." in panel.sound.toolTip()
-    assert panel.sound.accessibleDescription() == "This computer has no voice for English."
-    press(panel.sound)  # while muted, the missing voice doesn't matter
-    assert "no voice" not in panel.sound.toolTip()
+    assert "This computer has no voice for English." in panel.sound_button.toolTip()
+    assert panel.sound_button.accessibleDescription() == "This computer has no voice for English."
+    press(panel.sound_button)  # while muted, the missing voice doesn't matter
+    assert "no voice" not in panel.sound_button.toolTip()
 
 
 def test_sound_is_shown_in_the_caption_as_a_note_with_its_name() -> None:

@@ -77,7 +77,7 @@ def test_robot_without_recent_state_is_grey_and_has_no_speech_bubble(panel, wind
     else:
         link.is_connected = False
     panel.refresh()
-    assert panel.view.stale
+    assert panel.view.is_stale
     assert panel.view.accessibleDescription() == ""
     grey = panel.view.grab().toImage()
     link.drawing = drawing()
@@ -136,8 +136,8 @@ def test_press_outside_all_objects_has_no_effect(panel, window) -> None:
 
 
 def test_reset_button_sends_a_reset_to_the_robot(panel, window) -> None:
-    panel.reset.show()
-    press(panel.reset)
+    panel.reset_button.show()
+    press(panel.reset_button)
     assert window.session.changes("Pepper") == [{"reset": True}]
 
 
@@ -158,7 +158,7 @@ def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) 
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, RobotPanel)
-    assert not panel.reset.isVisibleTo(panel)
+    assert not panel.reset_button.isVisibleTo(panel)
     press(button(panel, "Show actions"))
     assert window.commands == ["panel:robots"]
     panel.dispose()

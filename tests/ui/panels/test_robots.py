@@ -124,14 +124,14 @@ def test_search_shows_actions_of_a_category_and_reports_no_match(panel) -> None:
     QTest.keyClicks(panel.finder, "lights")  # the category of both actions
     assert [name for name, card in panel.cards.items() if card.isVisibleTo(panel)] == ["light", "emotion"]
     panel.finder.setText("fly")
-    assert panel.none.isVisible()
+    assert panel.no_match_label.isVisible()
 
 
 def test_later_cards_are_collapsed_and_summarise_their_values(panel) -> None:
     card = panel.cards["emotion"]
     assert not card.form.isVisibleTo(card)
     assert card.summary.text() == "happy, for 2 s"
-    press(card.fold)
+    press(card.collapse_button)
     assert card.form.isVisibleTo(card)
 
 
@@ -170,22 +170,22 @@ def test_panel_without_a_robot_offers_the_virtual_robot(qtbot, qapp) -> None:
 
 
 def remember(window, name: str, seen_s: float) -> None:
-    known = window.session.fleet.known.robots
+    known = window.session.fleet.known_robots.robots
     told = [{"name": one.name, "seen_s": one.seen_s} for one in known]
-    window.session.fleet.known._settings.set(SETTING_KEY, [*told, {"name": name, "seen_s": seen_s}])
+    window.session.fleet.known_robots._settings.set(SETTING_KEY, [*told, {"name": name, "seen_s": seen_s}])
 
 
 def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_removed(qtbot, window) -> None:
     remember(window, "NAO", time.time() - 86_400 * 400)
     panel = window.make(PANEL, (1032, 800))
     qtbot.addWidget(panel)
-    nao = panel.list.away["NAO"]
+    nao = panel.list.disconnected_items["NAO"]
     assert nao.chip.text == "not running"
     assert nao.location.startswith("seen ")
     menu = panel.list.menu_of(nao)
-    assert [action.text() for action in menu.actions()] == ["Find the cause", "Forget NAO"]
+    assert [action.text() for action in menu.actions()] == ["Find the cause", "Remove NAO from the list"]
     menu.actions()[1].trigger()
-    assert panel.list.away == {}
+    assert panel.list.disconnected_items == {}
     assert list(panel.items) == ["Pepper"]
 
 
@@ -195,13 +195,13 @@ def test_known_robots_are_listed_in_the_empty_state_if_none_is_connected(qtbot) 
     panel = window.make(PANEL, (1032, 800))
     qtbot.addWidget(panel)
     assert panel.pages.currentIndex() == 0
-    assert panel.list.away["NAO"].isVisible()
+    assert panel.list.disconnected_items["NAO"].isVisible()
 
 
 def test_disconnected_robot_shows_its_last_seen_time_and_can_be_removed(panel, window) -> None:
     fleet = window.session.fleet
     link = window.session.join(pepper("Rover"), virtual=False)
-    fleet.known.record([link.robot])
+    fleet.known_robots.record([link.robot])
     link.is_connected = False
     fleet.revision += 1
     panel.refresh()

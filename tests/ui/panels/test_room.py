@@ -142,7 +142,7 @@ def test_double_click_and_keyboard_press_the_bumper_and_a_drag_does_not(panel, w
     QTest.mouseRelease(panel.view, LEFT, pos=place)
     front = {"happen": "bump", "side": "front"}  # click from above
     assert window.session.changes("Turtle") == [front, front]
-    panel.view.chosen = "Turtle/body"
+    panel.view.selected_item = "Turtle/body"
     QTest.keyClick(panel.view, Qt.Key.Key_Space)
     assert window.session.changes("Turtle") == [front]
     drag(panel, "Turtle/body", QPoint(-50, 0))
@@ -167,14 +167,14 @@ def test_object_selected_with_tab_is_moved_and_removed_by_keyboard(panel, window
     seen = []
     for _turn in range(7):
         QTest.keyClick(panel.view, Qt.Key.Key_Tab)
-        seen.append(panel.view.chosen)
+        seen.append(panel.view.selected_item)
     assert seen == ["body", "Turtle/body", "ball", "Aiko", "marker 7", "table", "shelf"]
     QTest.keyClick(panel.view, Qt.Key.Key_Right)
     assert thing(window, "shelf")[1] == pytest.approx(Room().thing("shelf").y + 0.1)
     QTest.keyClick(panel.view, Qt.Key.Key_Delete)
     assert window.session.room.room.thing("shelf") is None
     panel.refresh()
-    panel.view.chosen = "Turtle/body"
+    panel.view.selected_item = "Turtle/body"
     QTest.keyClick(panel.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
     assert window.session.changes("Turtle") == [{"move": "robot", "x": 0.92, "y": -1.2}]
     QTest.keyClick(panel.view, Qt.Key.Key_Delete)  # robots can't be deleted
@@ -185,7 +185,7 @@ def test_tab_moves_focus_out_of_the_room_after_the_last_object(panel, window) ->
     panel.view.setFocus()
     for _turn in range(8):
         QTest.keyClick(panel.view, Qt.Key.Key_Tab)
-    assert panel.view.chosen is None
+    assert panel.view.selected_item is None
     assert not has_keys(panel.view)
 
 
@@ -200,7 +200,7 @@ def choose(panel: RobotPanel, words: str) -> None:
 
 
 def test_objects_are_added_and_removed_and_the_room_is_reset(panel, window) -> None:
-    press(panel.add)
+    press(panel.add_button)
     choose(panel, "Add a ball")
     panel.refresh()
     at = point(panel, "ball 2")
@@ -210,11 +210,11 @@ def test_objects_are_added_and_removed_and_the_room_is_reset(panel, window) -> N
     choose(panel, "Remove ball 2")
     assert window.session.room.room.thing("ball 2") is None
     for words, _icon in ADDABLE_THINGS.values():
-        press(panel.add)
+        press(panel.add_button)
         choose(panel, words)
     room = window.session.room.room
     assert {"ball 2", "Ben", "marker 8", "table 2", "shelf 2"} <= {thing.name for thing in room.things}
-    press(panel.add)
+    press(panel.add_button)
     choose(panel, "Reset room")
     assert window.session.room.room == Room()
     assert window.session.changes("Pepper") == window.session.changes("Turtle") == [{"reset": True}]
@@ -222,7 +222,7 @@ def test_objects_are_added_and_removed_and_the_room_is_reset(panel, window) -> N
 
 def test_adding_beyond_the_limit_of_a_kind_is_rejected_with_a_toast(panel, window) -> None:
     for _turn in range(9):
-        press(panel.add)
+        press(panel.add_button)
         choose(panel, "Add a ball")
     assert window.toasts == ["The room is full. Remove something first"] * 2
 

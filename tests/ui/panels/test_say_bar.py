@@ -37,7 +37,7 @@ def panel(qtbot, window) -> RobotPanel:
 
 def menu(panel: RobotPanel) -> QMenu:
     """Return the open menu."""
-    return next(each for each in panel.say.findChildren(QMenu) if each.isVisible())
+    return next(each for each in panel.say_bar.findChildren(QMenu) if each.isVisible())
 
 
 def choose(panel: RobotPanel, words: str) -> None:
@@ -48,16 +48,16 @@ def choose(panel: RobotPanel, words: str) -> None:
 
 
 def test_typed_words_are_sent_to_the_robot_with_return(panel, window) -> None:
-    assert panel.say.field.placeholderText() == "Say something to Pepper"
-    QTest.keyClicks(panel.say.field, " good morning ")
+    assert panel.say_bar.field.placeholderText() == "Say something to Pepper"
+    QTest.keyClicks(panel.say_bar.field, " good morning ")
     assert window.session.changes("Pepper") == []
-    QTest.keyClick(panel.say.field, Qt.Key.Key_Return)
+    QTest.keyClick(panel.say_bar.field, Qt.Key.Key_Return)
     assert window.session.changes("Pepper") == [{"say": "good morning"}]
-    assert panel.say.field.text() == ""
-    QTest.keyClick(panel.say.field, Qt.Key.Key_Return)
+    assert panel.say_bar.field.text() == ""
+    QTest.keyClick(panel.say_bar.field, Qt.Key.Key_Return)
     assert window.session.changes("Pepper") == []
-    QTest.keyClick(panel.say.field, Qt.Key.Key_Up)
-    assert panel.say.field.text() == "good morning"
+    QTest.keyClick(panel.say_bar.field, Qt.Key.Key_Up)
+    assert panel.say_bar.field.text() == "good morning"
 
 
 def test_room_shows_the_words_heard_by_the_robot(panel, window) -> None:
@@ -73,16 +73,16 @@ def test_room_shows_the_words_heard_by_the_robot(panel, window) -> None:
 def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None:
     hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
     window.session.document.workspace = {"blocks": {"blocks": [hat]}}
-    press(panel.say.suggestions_button)
+    press(panel.say_bar.suggestions_button)
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
     choose(panel, "quiz")
     assert window.session.changes("Pepper") == [{"say": "quiz"}]
-    QTest.keyClick(panel.say.field, Qt.Key.Key_Down)
+    QTest.keyClick(panel.say_bar.field, Qt.Key.Key_Down)
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
 
 
 def test_events_except_heard_words_are_simulated_from_a_menu(panel, window) -> None:
-    press(panel.say.events)
+    press(panel.say_bar.events_button)
     entries = [action.text() for action in menu(panel).actions()]
     assert {"Sees a face", "Bumps into something with its front", "Left hand is touched"} <= set(entries)
     assert not any("hears" in entry for entry in entries)
@@ -96,4 +96,4 @@ def test_say_bar_is_unavailable_for_a_real_robot(qtbot) -> None:
     panel = window.make(PANEL, (384, 320))
     qtbot.addWidget(panel)
     assert isinstance(panel, RobotPanel)
-    assert not panel.say.isVisibleTo(panel)
+    assert not panel.say_bar.isVisibleTo(panel)

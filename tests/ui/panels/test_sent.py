@@ -55,10 +55,10 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert heard.listen(timeout_s=20.0)[0]
     ticks(window, panel)
     assert rows(panel) == [
-        ["/words", "Word, received by 1", "", "Publish"],
+        ["/words", "Word, 1 subscriber", "", "Publish"],
         ["Studio", "armed for 5 min", "", "Studio"],
     ]
-    assert panel.total.text().startswith("1 since ")
+    assert panel.total.text().startswith("1 sent since ")
     assert unsaid(panel) == []
     key = panel.model.key_of(panel.model.row_at(panel.model.index(0, 0)))
     assert not panel.repeat_button.isEnabled()
@@ -68,12 +68,12 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     press(panel.repeat_button)
     assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
     ticks(window, panel)
-    assert rows(panel)[0] == ["/words", "Word, received by 1", "\u00d7 2", "Publish"]
-    assert panel.selected() is not None, "what is chosen stays chosen"
+    assert rows(panel)[0] == ["/words", "Word, 1 subscriber", "\u00d7 2", "Publish"]
+    assert panel.selected_record() is not None, "what is chosen stays chosen"
 
     panel.copy()
     line = QGuiApplication.clipboard().text()
-    assert line.endswith("[Publish] /words 2 \u00d7 Word, received by 1")
+    assert line.endswith("[Publish] /words 2 \u00d7 Word, 1 subscriber")
     menu = panel.menu_of(key)
     assert menu is not None
     entries = {action.text(): action for action in menu.actions()}
@@ -100,12 +100,12 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     press(button(panel, "Clear the filter"))
     panel.clear()
     assert rows(panel) == []
-    assert panel.total.text().startswith("2 since ")
+    assert panel.total.text().startswith("2 sent since ")
 
 
 def put_all(session: Session) -> None:
     """Add one record of each kind and arm the session."""
-    sent = session.acting.sent
+    sent = session.acting.sent_log
     for number, (asker, name) in enumerate(
         (("publish", "/words"), ("service", "remember_face"), ("replay", "/scan"), ("image", "/cam/point"))
     ):
@@ -133,7 +133,7 @@ def test_menus_of_sent_calls_and_replayed_messages_differ_from_published_message
         ["Call again", "Copy the line", "Copy the request", "Open the service"],
         ["Send again (not armed)", "Copy the line", "Copy the message", "Show messages"],
     ]
-    called = next(each for each in acting.sent.records if each.origin == "service")
+    called = next(each for each in acting.sent_log.records if each.origin == "service")
     panel.table.opened.emit(str(called.number))
     assert window.commands[-1] == "service.call:remember_face"
     panel.table.opened.emit("12345")

@@ -75,7 +75,7 @@ def test_services_are_listed_with_their_nodes_and_without_parameter_services(pan
         "remember_face, camera_driver",
         "set_language, pepper_driver",
     ]
-    assert panel.count.text() == "3 services of 2 nodes"
+    assert panel.count_label.text() == "3 services of 2 nodes"
     panel.filter.setText("pepper")
     assert panel.list.model().rowCount() == 1
 
@@ -107,16 +107,16 @@ def test_invalid_field_is_reported_and_disables_the_call(panel) -> None:
     assert isinstance(field, QLineEdit)
     field.selectAll()
     QTest.keyClicks(field, "many")
-    assert panel.sentence.text() == "pictures needs a whole number."
+    assert panel.problem_label.text() == "pictures needs a whole number."
     assert not panel.call_button.isEnabled()
     field.selectAll()
     QTest.keyClicks(field, "3")
-    assert panel.sentence.text() == ""
+    assert panel.problem_label.text() == ""
     assert panel.call_button.isEnabled()
     panel._set_mode("json")
     panel.edit.set_text("{'name': 1}")
-    assert panel.sentence.text().startswith("Line 1, column 2: ")
-    press(panel.fix)
+    assert panel.problem_label.text().startswith("Line 1, column 2: ")
+    press(panel.fix_button)
     assert panel.edit.text() == '{"name": 1}'
     panel.edit.set_text("[1]")
     panel._set_mode("form")
@@ -145,7 +145,7 @@ def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
     panel.reply_view.format_switch.set_value("json")
     panel.reply_view._set_mode("json")
     assert '"quality": 0.93' in panel.reply_view.text.text()
-    press(panel.reply_view.copy)
+    press(panel.reply_view.copy_button)
     assert '"ok": true' in QGuiApplication.clipboard().text()
     assert panel.call_button.text() == "Call"
     assert panel.calls_model.cell_at(0, 1).text.startswith("name Aiko, pictures 12")
@@ -165,16 +165,16 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
     session.source.node.new_server("remember_face", serve, threads=3)
     press(panel.call_button)
     answered(window, panel, qtbot)
-    assert panel.reply_view.sentence.text() == "rejected: no face in sight"
+    assert panel.reply_view.message_label.text() == "rejected: no face in sight"
     mode[0] = "wait"
-    panel.seconds.setText("0.2")
-    QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
+    panel.timeout_field.setText("0.2")
+    QTest.keyClick(panel.timeout_field, Qt.Key.Key_Return)
     press(panel.call_button)
     assert not panel.call_button.isEnabled()
     answered(window, panel, qtbot)
     assert panel.reply_view.chip.text == "no reply within 0.2 s"
-    panel.seconds.setText("60")
-    QTest.keyClick(panel.seconds, Qt.Key.Key_Return)
+    panel.timeout_field.setText("60")
+    QTest.keyClick(panel.timeout_field, Qt.Key.Key_Return)
     press(panel.call_button)
     ticks(window, panel)
     assert panel.call_button.text().startswith("Waiting ")
@@ -196,7 +196,7 @@ def test_closing_disarms_and_a_network_without_services_shows_the_empty_page(win
 def test_service_from_a_menu_command_is_selected(window, panel) -> None:
     panel.open_for("set_language")
     assert panel.service == "set_language"
-    assert panel.form.nothing.isVisible()
+    assert panel.form.hint_label.isVisible()
     assert panel.text == "{}"
     for action in service_actions(window.context(), "set_language"):
         action.run()
@@ -229,11 +229,11 @@ def test_reply_is_not_clipped_at_the_width_of_the_developer_layout(window, panel
     for widget in (
         panel.reply_view.table,
         panel.reply_view.format_switch,
-        panel.reply_view.copy,
-        panel.calls,
+        panel.reply_view.copy_button,
+        panel.calls_table,
         panel.format_switch,
     ):
         assert widget.isVisible()
         qtbot.waitUntil(lambda each=widget: each.mapToGlobal(each.rect().topRight()).x() <= right)
     panel.resize(720, 640)
-    qtbot.waitUntil(lambda: panel.reply_view.copy.y() < panel.reply_view.chip.geometry().bottom())
+    qtbot.waitUntil(lambda: panel.reply_view.copy_button.y() < panel.reply_view.chip.geometry().bottom())

@@ -58,9 +58,14 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     replay = session.open_recording(path)
     sending = replay.sending
     assert sending is not None
-    until(qtbot, window, panel, lambda: replay.opened is not None and panel.transport.armed.isVisible())
+    until(
+        qtbot,
+        window,
+        panel,
+        lambda: replay.opened_recording is not None and panel.transport.armed.isVisible(),
+    )
     panel.refresh()
-    assert panel.transport.nothing.text() == "Sending is off"
+    assert panel.transport.sending_off_label.text() == "Sending is off"
     assert not panel.strip.isVisible()
     heard = session.source.listen("/test/a", "json")
 
@@ -94,7 +99,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert has_keys(panel.strip.switch)
     assert panel.strip.isVisible()
     assert not panel.transport.armed.isVisible()
-    assert panel.strip.question.text().startswith("/base/cmd_vel commands robots.")
+    assert panel.strip.question_label.text().startswith("/base/cmd_vel commands robots.")
     QTest.mouseClick(panel.strip.allow_button, Qt.MouseButton.LeftButton)
     session.tick(), panel.refresh()
     assert [token.text() for token in panel.strip.tokens] == ["/a as /test/a", "/base/cmd_vel"]
@@ -106,8 +111,8 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert heard.listen(timeout_s=20.0)[0]
     session.tick(), panel.refresh()
     sent = sum(each.count for each in going)
-    assert panel.strip.counts.text().startswith(f"{sent} sent")
-    assert panel.strip.counts.text().endswith("received by 1")
+    assert panel.strip.summary_label.text().startswith(f"{sent} sent")
+    assert panel.strip.summary_label.text().endswith("1 subscriber")
     assert "Sending 2 topics of the recording" in StatusFormatter(session).arming()[1]
     assert unsaid(panel) == []
 

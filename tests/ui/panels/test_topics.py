@@ -55,7 +55,7 @@ def test_every_topic_is_listed_with_its_stats(panel) -> None:
     assert row(panel, "/robot/depth") == ["/robot/depth", "image", "1", "60.0", "5.1 MB/s", "21 ms", "0.4 %"]
     assert row(panel, "/speech/words")[:5] == ["/speech/words", "string", "2", "0.2", "14 B/s"]
     assert row(panel, "/lidar/scan") == ["/lidar/scan", "bytes", "0", "", "", "gone for 4 s", ""]
-    assert panel.count.text() == "13 topics, 7 nodes"
+    assert panel.count_label.text() == "13 topics, 7 nodes"
 
 
 def test_topics_panel_subscribes_to_no_topics(panel, window) -> None:
@@ -117,7 +117,7 @@ def test_slash_focuses_the_filter_which_finds_names_types_and_nodes(qtbot, panel
     QTest.keyClicks(panel.table, "/")
     panel.filter.setText("IMAGE depth")
     assert panel.model.rowCount() == 1
-    assert panel.count.text() == "1 of 13 topics, 7 nodes"
+    assert panel.count_label.text() == "1 of 13 topics, 7 nodes"
     panel.filter.setText("pepper_driver")
     assert panel.model.rowCount() == 7
     panel.filter.setText("nothing like this")
@@ -314,7 +314,7 @@ def shown(panel: TopicsPanel) -> list[str]:
 
 
 def as_tree(panel: TopicsPanel, window: Window) -> None:
-    press(panel.as_tree)
+    press(panel.tree_button)
     ticks(window, panel)
 
 
@@ -332,8 +332,8 @@ def test_tree_view_groups_topics_in_folders_with_summed_rates(panel, window) -> 
     session.topics["/arm/left/speed"].rate_hz = 50.0
     ticks(window, panel, 6)
     assert row(panel, "/arm/*", ("rate",)) == ["52.5"]
-    assert panel.count.text() == "2 of 15 topics, 7 nodes"
-    press(panel.as_tree)
+    assert panel.count_label.text() == "2 of 15 topics, 7 nodes"
+    press(panel.tree_button)
     assert shown(panel) == ["/arm/left/speed", "/arm/right/speed"]
 
 
@@ -385,7 +385,7 @@ def test_tree_view_and_collapsed_folders_are_restored_with_the_layout(qtbot, pan
     again.restore_state(panel.save_state())
     assert shown(again) == shown(panel)
     again.restore_state({"tree": "yes", "closed": [7, None]})
-    assert not again.as_tree.isChecked()
+    assert not again.tree_button.isChecked()
 
 
 def test_folder_menu_expands_and_collapses_all_and_copies_its_pattern(panel, window) -> None:

@@ -58,7 +58,7 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
 
 def test_every_variable_of_the_behaviour_is_listed_before_the_run(panel, window) -> None:
     assert shown(panel) == [("score", ""), ("names", ""), ("later", "")]
-    assert panel.when.text() == ""
+    assert panel.status_label.text() == ""
 
 
 def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, window) -> None:
@@ -67,7 +67,7 @@ def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, w
     window.session.runs.run()
     tells(window, panel, score=3, names=["Ada", "Grace"], later=0)
     assert shown(panel) == [("score", "3"), ("names", "2 items: Ada, Grace"), ("later", "0")]
-    assert panel.when.text() == "Live"
+    assert panel.status_label.text() == "Live"
     now[0] += 1
     ticks(window, panel, 1)
     assert panel.model.cell_at(0, 1).tint == ""
@@ -76,7 +76,7 @@ def test_values_are_updated_and_marked_during_a_run_and_kept_afterwards(panel, w
     window.session.runs.stop()
     ticks(window, panel, 2)
     assert shown(panel)[0] == ("score", "4")
-    assert panel.when.text() == "Final values"
+    assert panel.status_label.text() == "Final values"
     window.session.runs.run()  # the last values stay until the robots have replied
     now[0] += 1
     ticks(window, panel, 2)

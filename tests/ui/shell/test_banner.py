@@ -143,7 +143,7 @@ def test_banner_is_not_replaced_while_under_the_mouse(window: MainWindow, mouse:
     QApplication.sendEvent(window.banner.banner, QEnterEvent(at, at, at))
     say(window, "worse")
     assert window.banner.identity == "mild"
-    assert window.banner.banner.more.accessibleName() == "and 1 more"
+    assert window.banner.banner.more_button.accessibleName() == "and 1 more"
     QApplication.sendEvent(window.banner.banner, QEvent(QEvent.Type.Leave))
     mouse.over(window.tool_bar)
     assert window.banner.identity == "worse"

@@ -7,7 +7,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.docking.sizes import shares
+from app.ui.shell.docking.sizes import distribute
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -26,7 +26,7 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 def test_extra_space_is_distributed_to_panels_without_fixed_size(
     wanted: list[int], room: int, keep: list[bool], sizes: list[int]
 ) -> None:
-    assert shares(wanted, room, fixed=keep) == sizes
+    assert distribute(wanted, room, fixed_flags=keep) == sizes
 
 
 def widths(window: MainWindow, *names: str) -> list[int]:

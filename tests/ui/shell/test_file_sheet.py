@@ -157,7 +157,7 @@ def test_folders_can_be_created_opened_and_left(sheet: FileSheet, folder: Path, 
     assert sheet.selected_entry.path.name == "Class 4", "where one came from"
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
-    QTest.mouseClick(sheet.make_folder, LEFT)
+    QTest.mouseClick(sheet.create_button, LEFT)
     assert sheet.hint.text() == "“Class 4” already exists."
     assert taken == []
 
@@ -276,16 +276,16 @@ def test_image_chooser_lists_only_images(sheet: FileSheet, folder: Path, taken: 
 def test_folder_is_selected_or_created(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_folder(folder, taken.append)
     assert rows(sheet) == ["class 3"]
-    assert sheet.hint.text() == "Images will be saved in “work”.", "no row is chosen by itself"
+    assert sheet.hint.text() == "Files will be saved in “work”.", "no row is chosen by itself"
     sheet.list.setCurrentItem(sheet.list.topLevelItem(0))
-    assert sheet.hint.text() == "Images will be saved in “class 3”."
+    assert sheet.hint.text() == "Files will be saved in “class 3”."
     sheet.done.click()
     sheet.ask_folder(folder, taken.append)
     sheet.new_folder.click()
     sheet.folder_name.setText("album")
-    sheet.make_folder.click()
+    sheet.create_button.click()
     assert sheet.list.hasFocus()
-    assert sheet.hint.text() == "Images will be saved in “album”."
+    assert sheet.hint.text() == "Files will be saved in “album”."
     sheet.done.click()
     assert taken == [folder / "class 3", folder / "album"]
 

@@ -86,11 +86,11 @@ def test_offer_stays_until_answered_and_later_alerts_are_queued(place: QWidget, 
     )
     banner.show_alerts([Said("a", title="Alert.")])
     assert "Put it back?" in banner.banner.accessibleName()
-    QTest.mouseClick(banner.banner.second, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(banner.banner.second_button, Qt.MouseButton.LeftButton)
     assert done == ["no"]
     assert banner.isVisible()
     assert banner.banner.accessibleName() == "Alert."
-    assert not banner.banner.second.isVisible()
+    assert not banner.banner.second_button.isVisible()
 
 
 def test_closing_an_offer_or_alert_shows_the_next_alert(place: QWidget, theme: Theme) -> None:

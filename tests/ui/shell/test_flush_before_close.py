@@ -28,16 +28,16 @@ class Late:
 
 def test_window_closes_immediately_without_an_editor(qapp) -> None:
     closed: list[bool] = []
-    assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).ready()
+    assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).can_close()
     assert closed == []
 
 
 def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch) -> None:
     monkeypatch.setattr(documents, "MAX_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
-    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.ready()))
-    assert not waits.ready()
-    assert not waits.ready()
+    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.can_close()))
+    assert not waits.can_close()
+    assert not waits.can_close()
     assert len(editor.done) == 1
     editor.done[0]()
     qtbot.waitUntil(lambda: closed == [True], timeout=documents.MAX_FLUSH_MS - 100)
@@ -48,9 +48,9 @@ def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch
 def test_hanging_editor_does_not_block_closing(qtbot, qapp) -> None:
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(True))
-    assert not waits.ready()
+    assert not waits.can_close()
     qtbot.waitUntil(lambda: closed == [True], timeout=60_000)
-    assert waits.ready()
+    assert waits.can_close()
 
 
 def test_window_closes_after_the_editor_has_flushed_the_latest_edit(
@@ -86,7 +86,7 @@ def test_work_that_cannot_be_saved_is_reported_before_closing(
     assert "Studio stays open" in window.banner.banner.accessibleName()
     assert window.toast.isVisible()
     (home / "journal").unlink()
-    session._next_check = 0.0
+    session._next_check_s = 0.0
     window.tick()
     assert not session.alerts.has("leaving"), "there is room again"
     assert window.close()

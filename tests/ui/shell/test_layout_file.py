@@ -62,8 +62,8 @@ def test_layout_name_is_reduced_to_a_short_single_line(name, shown):
         (changed(version=2), "it was saved by a newer version of Studio; update Studio to open it"),
         (changed(version=0), "the file is damaged"),
         (changed(version="1"), "the file is damaged"),
-        (changed(base="start"), "it belongs to a layout that this version of Studio doesn't have"),
-        (changed(base=["developer"]), "it belongs to a layout that this version of Studio doesn't have"),
+        (changed(base="start"), "it is based on a layout that this version of Studio doesn't have"),
+        (changed(base=["developer"]), "it is based on a layout that this version of Studio doesn't have"),
         (changed(arrangement=[]), "the file is damaged"),
         (changed(arrangement={"open": 3, "docks": ""}), "the file is damaged"),
         (changed(arrangement={"open": [], "docks": 3}), "the file is damaged"),
@@ -115,4 +115,4 @@ def test_layout_is_exported_imported_and_import_can_be_undone(
     answers.path = tmp_path / "a file" / "x.nep-layout"
     answers.path.parent.write_bytes(b"in its place")
     commands.run("layout.export")
-    assert window.toast.text.startswith("can't write x.nep-layout: ")
+    assert window.toast.text.startswith("Can't write x.nep-layout: ")

@@ -68,7 +68,7 @@ def layouts(qtbot) -> Layouts:
 
 def rest_of(bench: Workbench) -> list[str]:
     """Return the names of the failed docks of a workbench."""
-    return [name for name, dock in bench.docks.items() if dock.failed]
+    return [name for name, dock in bench.docks.items() if dock.has_failed]
 
 
 @pytest.mark.parametrize("order", [*permutations(layout.name for layout in LAYOUTS)])
@@ -107,4 +107,4 @@ def test_robot_cards_survive_switching_tabs_and_layouts(layouts: Layouts) -> Non
         layouts.switch("developer")
     dock.resize(dock.width() - 1, dock.height())
     assert dock.panel.cards["turn"].form.isVisibleTo(dock)
-    assert not dock.failed
+    assert not dock.has_failed

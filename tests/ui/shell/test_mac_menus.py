@@ -73,4 +73,4 @@ def test_menu_entry_named_like_a_system_command_stays_in_its_menu(qtbot, theme: 
 def test_native_menu_bar_is_used_on_macos_only(qtbot, theme: Theme, platform: str, native: bool) -> None:
     bar = AppBar(theme, LAYOUTS, platform)
     qtbot.addWidget(bar)
-    assert bar.native == native
+    assert bar.is_menu_bar_native == native

@@ -55,7 +55,7 @@ def test_window_opens_with_the_start_page(qtbot, window: MainWindow, commands: C
     assert not window.bar.switch.isVisible()
     assert window.bar.stop.isVisible()
     window.tick()
-    assert not window.bar.stop.filled
+    assert not window.bar.stop.is_filled
 
 
 def test_home_button_opens_the_start_page_and_back_button_returns(
@@ -64,7 +64,7 @@ def test_home_button_opens_the_start_page_and_back_button_returns(
     show(qtbot, window)
     assert not window.bar.home.isVisible()
     assert not window.bar.back.isVisible(), "a first start leads back to nothing"
-    assert commands.actions.disabled_reason("start_page.leave") == "Nothing open"
+    assert commands.actions.disabled_reason("start_page.leave") == "Nothing is open"
     commands.run("layout.developer")
     QTest.mouseClick(window.bar.home, Qt.MouseButton.LeftButton)
     assert window.start.isVisible()
@@ -100,19 +100,19 @@ def test_stop_button_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
     fleet = window.session.fleet
     fleet.connect(parse(thing_description(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
     window.tick()
-    assert not window.bar.stop.filled
+    assert not window.bar.stop.is_filled
     link = fleet.link("Pepper")
     assert link is not None
     link.stop_problem = "Pepper may still move: the brake does not answer"
     window.tick()
-    assert window.bar.stop.filled
+    assert window.bar.stop.is_filled
     link.stop_problem = ""
     link.unended_actions = "Pepper may still move: wave is still running"
     window.tick()
-    assert window.bar.stop.filled
+    assert window.bar.stop.is_filled
     link.unended_actions = ""
     window.tick()
-    assert not window.bar.stop.filled
+    assert not window.bar.stop.is_filled
 
 
 def test_both_layouts_show_their_panels(qtbot, window: MainWindow, commands: Commands) -> None:
@@ -186,7 +186,7 @@ def test_failed_panel_shows_an_error_and_the_window_keeps_running(
     topics.explode = True
     window.tick()
     dock = window.benches["developer"].docks["topics"]
-    assert dock.failed
+    assert dock.has_failed
     assert not topics.isVisible()
     assert window.session.console.records[-1].text == "ValueError: no such luck"
     count = len(window.session.console.records)
@@ -240,7 +240,7 @@ def test_tab_key_never_focuses_a_panel_behind_another_panel(
     commands.run("layout.developer")
     bench = window.benches["developer"]
     qtbot.waitUntil(bench.docks["console"].is_displayed)
-    behind = [dock for dock in bench.docks.values() if not dock.front]
+    behind = [dock for dock in bench.docks.values() if not dock.is_front]
     assert any(list(tab_stops(dock, dock)) for dock in behind), "Qt would go there"
     bench.focus_panel(bench.docks["console"])
     seen = []
@@ -475,7 +475,7 @@ def test_alert_is_shown_in_the_banner_until_resolved_or_dismissed(
     banner = window.banner.banner
     assert window.banner.isVisible()
     assert "The camera is silent." in banner.accessibleName()
-    assert banner.more.accessibleName() == "and 1 more"
+    assert banner.more_button.accessibleName() == "and 1 more"
     QTest.mouseClick(banner.button, Qt.MouseButton.LeftButton)
     assert panel(window, "developer", "inspector").topics == ["/camera"]
     alerts.resolve("two")
@@ -770,7 +770,7 @@ def test_startup_shows_the_last_open_layout(
     for step in steps:
         step()
     assert window.current_layout == "developer"
-    assert [step.__name__ for step in show_first_page(window, Options(new_window=True))] == ["<lambda>"]
+    assert [step.__name__ for step in show_first_page(window, Options(opens_new_window=True))] == ["<lambda>"]
 
 
 def test_first_start_offers_the_first_steps_and_the_second_start_does_not(
@@ -808,10 +808,10 @@ def test_demo_option_starts_the_demo_except_in_self_drive_mode(
     begun: list[str] = []
     monkeypatch.setattr(window, "start_session", lambda: None)
     monkeypatch.setattr(commands.behaviours, "start_demo", lambda: begun.append("demo"))
-    for step in show_first_page(window, Options(demo=True, self_drive=tmp_path)):
+    for step in show_first_page(window, Options(starts_demo=True, self_drive=tmp_path)):
         step()
     assert begun == []
-    for step in show_first_page(window, Options(demo=True)):
+    for step in show_first_page(window, Options(starts_demo=True)):
         step()
     assert begun == ["demo"]
 

@@ -48,13 +48,13 @@ def test_network_access_sheet_warns_shows_the_address_and_allows_connections(mak
     sheet.open()
     assert sheet.heading.text() == "Let other computers connect?"
     assert "no password" in sheet.warning.text()
-    assert sheet.initial_focus() is sheet.no, "the careful answer has the keyboard"
+    assert sheet.initial_focus() is sheet.cancel_button, "the careful answer has the keyboard"
     assert sheet.setting_label.text() == "NEP_MASTER=192.168.1.20:7780"
     sheet.choice.set_value("10.8.0.2")
     assert sheet.setting_label.text() == "NEP_MASTER=10.8.0.2:7780"
     sheet.copy.click()
     assert QApplication.clipboard().text() == "NEP_MASTER=10.8.0.2:7780"
-    sheet.yes.click()
+    sheet.allow_button.click()
     reach.close()
     assert asked == [("10.8.0.2",)]
     assert not sheet.isVisible()
@@ -63,7 +63,7 @@ def test_network_access_sheet_warns_shows_the_address_and_allows_connections(mak
 def test_not_now_closes_the_sheet_without_allowing_access(make):
     sheet, _reach, asked = make()
     sheet.open()
-    sheet.no.click()
+    sheet.cancel_button.click()
     assert not asked
     assert not sheet.isVisible()
 
@@ -74,8 +74,8 @@ def test_access_is_revoked_in_the_same_sheet(make):
     assert access_status(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
     sheet.open()
     assert sheet.heading.text() == "Other computers can connect at 192.168.1.20"
-    assert not sheet.yes.isVisible()
-    sheet.end.click()
+    assert not sheet.allow_button.isVisible()
+    sheet.revoke_button.click()
     reach.close()
     assert asked == [()]
 
@@ -84,7 +84,7 @@ def test_network_access_sheet_reports_a_missing_network_connection(make):
     sheet, reach, _asked = make(here=())
     sheet.open()
     assert sheet.heading.text() == "This computer isn't connected to a network"
-    assert not sheet.yes.isVisible()
+    assert not sheet.allow_button.isVisible()
     assert access_status(reach)[1] == "This computer only"
 
 
@@ -92,6 +92,6 @@ def test_access_to_a_remote_master_cannot_be_changed_on_this_computer(make):
     sheet, reach, _asked = make(address="192.168.1.9:7780")
     sheet.open()
     assert "192.168.1.9" in sheet.heading.text()
-    assert not sheet.yes.isVisible()
-    assert not sheet.end.isVisible()
+    assert not sheet.allow_button.isVisible()
+    assert not sheet.revoke_button.isVisible()
     assert access_status(reach) == ("network", "Master on 192.168.1.9", None)

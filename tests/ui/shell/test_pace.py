@@ -22,7 +22,7 @@ class Runner:
 
 
 def test_run_bar_offers_the_same_speeds_as_the_menu(window: MainWindow, commands: Commands) -> None:
-    offered = [action.text() for action in window.run_bar._paces.actions()]
+    offered = [action.text() for action in window.run_bar._speed_menu.actions()]
     assert offered == ["Full speed", "Slow motion: 0.5 s per block", "Very slow: 1.5 s per block"]
     assert commands.actions["run.full_speed"].isChecked()
     assert window.run_bar.pace.accessibleName() == "Speed"

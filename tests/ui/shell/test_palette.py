@@ -139,11 +139,11 @@ def palette(qtbot, window: MainWindow, commands: Commands) -> CommandPalette:
 
 
 def words(palette: CommandPalette) -> list[str]:
-    return [line.entry.text for line in palette.rows.lines.lines if isinstance(line, Match)]
+    return [line.entry.text for line in palette.rows.line_model.lines if isinstance(line, Match)]
 
 
 def headings(palette: CommandPalette) -> list[str]:
-    return [line.text for line in palette.rows.lines.lines if isinstance(line, Heading)]
+    return [line.text for line in palette.rows.line_model.lines if isinstance(line, Heading)]
 
 
 def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(
@@ -162,7 +162,7 @@ def test_palette_opens_in_120_ms_and_immediately_with_reduced_motion(
     palette.dismiss()
     window.theme.set_motion("off")
     palette.open()
-    assert palette._opening.duration() == 120
+    assert palette._open_animation.duration() == 120
     qtbot.waitUntil(lambda: palette.graphicsEffect() is None)
 
 
@@ -219,7 +219,7 @@ def test_command_is_found_and_run(palette: CommandPalette, window: MainWindow) -
     assert words(palette)[0] == "Dark"
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert not palette.isVisible()
-    assert window.theme.dark
+    assert window.theme.is_dark
     palette.open()
     assert headings(palette)[0] == "Recently used"
     assert words(palette)[0] == "Dark"
@@ -294,7 +294,7 @@ def test_panels_topics_and_files_are_found(
     palette.open()
     QTest.keyClicks(palette.field, "faces")
     assert {"Topics", "Recent files"} <= set(headings(palette))
-    lines = {line.entry.text: line.entry for line in palette.rows.lines.lines if isinstance(line, Match)}
+    lines = {line.entry.text: line.entry for line in palette.rows.line_model.lines if isinstance(line, Match)}
     assert lines["old faces"].reason == "No longer in gone"
     assert lines["faces"].reason == ""
     palette.field.setText("/faces")
@@ -317,7 +317,7 @@ def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWind
     palette.dismiss()
     palette.open()
     QTest.keyClicks(palette.field, "tour g")
-    rows = [each.entry.text for each in palette.rows.lines.lines if isinstance(each, Match)]
+    rows = [each.entry.text for each in palette.rows.line_model.lines if isinstance(each, Match)]
     assert (rows, headings(palette)) == (["Tour guide"], ["Examples"])
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert window.session.document.name == "Tour"
@@ -351,9 +351,9 @@ def test_result_list_is_bounded_with_ten_thousand_topics(palette: CommandPalette
         window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
     window.session.topics.revision += 1
     palette.open()
-    assert len(palette.rows.lines.lines) < 120
+    assert len(palette.rows.line_model.lines) < 120
     QTest.keyClicks(palette.field, "t9")
-    assert len(palette.rows.lines.lines) < 120
+    assert len(palette.rows.line_model.lines) < 120
     assert palette.foot.result_text.endswith(f" of {len(palette._finder.entries)}")
     assert palette.height() < 600
 

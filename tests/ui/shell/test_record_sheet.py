@@ -78,8 +78,8 @@ def shown(window: MainWindow) -> str:
 
 
 def test_shortcut_starts_and_stops_recording_and_the_bars_show_the_recording(window, recorder):
-    assert window.commands.shortcuts.first("recording.toggle") == "Ctrl+R"
-    assert window.commands.shortcuts.first("recording.keep") == "F9"
+    assert window.commands.shortcuts.first_shortcut("recording.toggle") == "Ctrl+R"
+    assert window.commands.shortcuts.first_shortcut("recording.keep") == "F9"
     assert shown(window) == "Record"
     wide = window.tools.record.width()
     window.commands.run("recording.toggle")
@@ -162,7 +162,7 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
     field = sheet.patterns
 
     def tokens() -> list[tuple[str, bool]]:
-        return [(each.entry, each.is_left_out) for each in field.tokens]
+        return [(each.entry, each.is_excluded) for each in field.tokens]
 
     QTest.keyClicks(field.edit, "/arm/* *camera*,not /arm/raw")
     assert tokens() == [("/arm/*", False), ("*camera*", False)]
@@ -184,19 +184,19 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
 def test_recording_stops_at_the_selected_limit_and_its_size_is_estimated(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    assert sheet.ends_words.text() == "no limit"
+    assert sheet.limits_hint.text() == "no limit"
     for field, text in ((sheet.limit_minutes, "30"), (sheet.limit_gb, "8")):
         field.setText(text)
         field.editingFinished.emit()
-    assert sheet.ends_words.text() == "whichever comes first"
+    assert sheet.limits_hint.text() == "whichever comes first"
     choice = recorder.session.recordings.choice
     assert (choice.max_minutes, choice.max_gb) == (30.0, 8.0)
     sheet.limit_minutes.setText("-1")
     sheet.limit_minutes.editingFinished.emit()
-    assert sheet.ends_words.text() == "The minimum is 0.1 min."
+    assert sheet.limits_hint.text() == "The minimum is 0.1 min."
     sheet.limit_minutes.setText("30")
     sheet.limit_minutes.editingFinished.emit()
-    assert not sheet.at_end.isVisible()
+    assert not sheet.expected_size.isVisible()
     sheet.record.click()
     assert (recorder.line.orders[0]["seconds"], recorder.line.orders[0]["size_bytes"]) == (1800.0, 8 * 10**9)
     recorder.say("recording")
@@ -204,11 +204,11 @@ def test_recording_stops_at_the_selected_limit_and_its_size_is_estimated(window,
         recorder.say("figures", recording=status(size_bytes=size), ring=None, free_bytes=10**12)
         sheet.show_state()
         recorder.session.clock.now += 1.0
-    assert sheet.at_end.isVisible() == (sheet._speed is not None)
+    assert sheet.expected_size.isVisible() == (sheet._write_bandwidth_Bps is not None)
     recorder.session.clock.now += 1.0
     recorder.say("figures", recording=status(size_bytes=12_000_000), ring=None, free_bytes=10**12)
     sheet.show_state()
-    assert sheet.at_end.note.text() == "at 30:00"
+    assert sheet.expected_size.note.text() == "at 30:00"
     recorder.say("ended", status=status(duration_s=1800.0), limit="time")
     assert "at the time limit" in window.toast.text
     sheet.limit_minutes.clear()
@@ -230,7 +230,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     assert sheet.ring.isChecked()
-    assert sheet.ring_words.text() == "41 s buffered, 1.0 GB of 2.0 GB"
+    assert sheet.ring_text.text() == "41 s buffered, 1.0 GB of 2.0 GB"
     sheet.seconds.setText("30")
     sheet.seconds.editingFinished.emit()
     assert recorder.session.recordings.ring_settings == RingSettings(is_on=True, seconds=30)
@@ -243,7 +243,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     sheet.ring_topics.show_patterns(("/b\x01",), ())
     sheet.ring_topics.editing_finished.emit()
     assert recorder.session.recordings.ring_settings.patterns == ("/arm/*",)
-    assert "isn't a valid topic name" in sheet.ring_words.text()
+    assert "isn't a valid topic name" in sheet.ring_text.text()
     sheet.ring.click()
     assert recorder.ops()[-1] == "end_ring"
 

@@ -17,7 +17,7 @@ def test_starting_a_second_behaviour_reports_the_stopped_behaviour(
 ) -> None:
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
-    runs._make_runner, runs._clock = Runner, lambda: next(seconds)
+    runs._create_runner, runs._clock = Runner, lambda: next(seconds)
     for name in ("Greeting", "Quiz"):
         if session.document.has_blocks:
             commands.run("file.new")
@@ -33,7 +33,7 @@ def test_restarting_the_same_behaviour_reports_no_stopped_behaviour(
 ) -> None:
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
-    runs._make_runner, runs._clock = Runner, lambda: next(seconds)
+    runs._create_runner, runs._clock = Runner, lambda: next(seconds)
     session.document.apply_edit(workspace(started(write(number(1)))))
     for _ in range(2):
         commands.run("run.run")

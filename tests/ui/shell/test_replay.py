@@ -71,7 +71,7 @@ def opened(qtbot, window: MainWindow, path: Path) -> Replay:
     window.commands.run(f"recording.open:{path}")
     replay = window.session.replay
     assert replay is not None
-    until(qtbot, window, lambda: replay.opened is not None)
+    until(qtbot, window, lambda: replay.opened_recording is not None)
     window.tick()
     return replay
 
@@ -176,7 +176,7 @@ def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_recording(
     other.write_bytes(path.read_bytes())
     window.commands.files.open_all([other])
     assert session.replay.path == other
-    until(qtbot, window, lambda: session.replay.opened is not None)
+    until(qtbot, window, lambda: session.replay.opened_recording is not None)
     assert [topic.name for topic in session.topics] == ["/a", "/camera"]
     until(qtbot, window, lambda: first.has_ended)
 

@@ -235,7 +235,7 @@ def test_panels_show_identical_bytes_live_and_in_replay(studio: Studio, tmp_path
     studio.window.commands.run(f"recording.open:{path}")
     replay = studio.session.replay
     assert replay is not None
-    studio.until(lambda: replay.opened is not None)
+    studio.until(lambda: replay.opened_recording is not None)
 
     def compare(place: int) -> None:
         held = studio.holds(sent[: place + 1])

@@ -108,7 +108,7 @@ def test_typed_text_is_written_and_the_file_can_be_shown(
     assert found["what-happened.txt"] == b"It stopped"
     assert b"Qt: 6" in found["versions.txt"]
     assert not [name for name in found if name.startswith("work/")]
-    assert sheet.state.text().startswith("The report is in ")
+    assert sheet.state.text().startswith("Report saved to ")
     assert sheet.description.text() == ""
     assert sheet.show_file.hasFocus()
     sheet.show_file.click()
@@ -169,7 +169,7 @@ def test_report_finished_after_the_sheet_is_closed_is_announced_by_a_toast(
     answers.path = tmp_path / "report.zip"
     sheet.write.click()
     sheet.dismiss()
-    qtbot.waitUntil(lambda: window.toast._label.text().startswith("The report is in"))
+    qtbot.waitUntil(lambda: window.toast._label.text().startswith("Report saved to"))
 
 
 def test_banner_offers_a_crash_report_that_contains_the_crash(

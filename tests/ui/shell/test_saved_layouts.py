@@ -44,13 +44,13 @@ def keep_as(window: MainWindow, commands: Commands, name: str) -> NameSheet:
 
 def menu(window: MainWindow, commands: Commands) -> dict[str, bool]:
     commands.menus._refresh("View")
-    entries = commands.menus._layouts.actions()
+    entries = commands.menus._layout_submenu.actions()
     return {entry.text(): entry.isChecked() for entry in entries if entry.isCheckable()}
 
 
 def use(window: MainWindow, commands: Commands, name: str) -> None:
     menu(window, commands)
-    next(e for e in commands.menus._layouts.actions() if e.text() == name).trigger()
+    next(e for e in commands.menus._layout_submenu.actions() if e.text() == name).trigger()
 
 
 def test_layout_is_saved_under_a_name_and_the_built_in_layout_is_unchanged(
@@ -192,14 +192,15 @@ def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands:
     alert = next(each for each in shown.session.alerts.active if each.id == "settings")
     assert alert.title == "Settings you change now are lost when Studio closes."
     commands.run("layout.delete")
-    assert shown.toast.text == "Can't save this change: “Two” will reappear when Studio restarts"
+    assert shown.toast.text == "This change couldn't be saved. “Two” will reappear when Studio restarts."
     commands.behaviours.clear_recent()
-    assert shown.toast.text == "Can't save this change: the recent files will reappear when Studio restarts"
+    message = "This change couldn't be saved. The recent files will reappear when Studio restarts."
+    assert shown.toast.text == message
     commands.run("robots.ask")
     assert shown.toast.text == "Until you close Studio, it will ask again before a real robot moves"
     path.rmdir()
     keep_as(shown, commands, "Three")
     assert shown.toast.text == "Saved layout “Three”"
-    shown.session._next_check = 0.0
+    shown.session._next_check_s = 0.0
     shown.session.tick()
     assert not shown.session.alerts.has("settings")

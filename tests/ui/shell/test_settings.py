@@ -46,12 +46,12 @@ def test_appearance_settings_apply_immediately_and_are_saved(
     press(sheet.contrast, "on")
     press(sheet.motion, "off")
     theme = window.theme
-    assert (theme.dark, theme.text_percent) == (True, 150)
-    assert (theme.high_contrast, theme.reduced_motion) == (True, False)
+    assert (theme.is_dark, theme.text_percent) == (True, 150)
+    assert (theme.is_high_contrast, theme.is_motion_reduced) == (True, False)
     again = Theme("light")
     WindowState(Settings(home), lambda _sentence: None).apply_theme(again)
     assert (again.mode, again.text_percent, again.contrast, again.motion) == ("dark", 150, "on", "off")
-    assert again.high_contrast
+    assert again.is_high_contrast
     again.deleteLater()
 
 
@@ -91,7 +91,7 @@ def test_legacy_reduced_motion_setting_is_migrated(home: Path, theme: Theme) -> 
     settings = Settings(home)
     settings.set("less_motion", True)
     WindowState(settings, lambda _sentence: None).apply_theme(theme)
-    assert theme.reduced_motion
+    assert theme.is_motion_reduced
     settings.set("less_motion", "nonsense")
     WindowState(settings, lambda _sentence: None).apply_theme(theme)
     assert theme.motion == "system"
@@ -109,7 +109,7 @@ def test_missing_recent_files_are_disabled_and_the_list_can_be_cleared(
     settings.set_recent([RecentFile(there, "there", 0.0), RecentFile(tmp_path / "gone.nepb", "gone", 0.0)])
     lists = commands.menus
     lists._list_recent()
-    entries = {entry.text(): entry.isEnabled() for entry in lists._recent.actions() if entry.text()}
+    entries = {entry.text(): entry.isEnabled() for entry in lists._recent_menu.actions() if entry.text()}
     assert entries == {
         "there": True,
         "gone (missing)": False,

@@ -221,7 +221,7 @@ def test_menu_and_palette_list_the_additional_panels(bench, window) -> None:
     bench.open_another("inspector")
     menus = window.commands.menus
     menus._refresh("View")
-    entries = {entry.text(): entry for entry in menus._panels.actions()}
+    entries = {entry.text(): entry for entry in menus._panel_menu.actions()}
     assert entries["Inspector 2"].isChecked()
     entries["Inspector 2"].trigger()
     assert "inspector#2" not in bench.docks
@@ -236,7 +236,7 @@ def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, 
     window.commands.run("palette.open")
     palette = window.findChild(CommandPalette)
     assert palette is not None
-    lines = palette.rows.lines.lines
+    lines = palette.rows.line_model.lines
     assert "Another panel" in [line.text for line in lines if isinstance(line, Heading)]
     palette.field.setText("Another panel: Inspector")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)

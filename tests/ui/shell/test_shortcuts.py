@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
 from app.ui.panels.console.list import LogFindField
-from app.ui.panels.robots.controls.number import OpenNumberEdit
+from app.ui.panels.robots.controls.number import UnboundedNumberEdit
 from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.commands.commands import Commands
@@ -80,7 +80,7 @@ def test_macos_menu_bar_is_native_and_uses_application_menu_roles(
     for platform, native in (("darwin", True), ("linux", False), ("win32", False)):
         bar = AppBar(theme, LAYOUTS, platform)
         qtbot.addWidget(bar)
-        assert bar.native == native
+        assert bar.is_menu_bar_native == native
     roles = {name: commands.actions[name].menuRole() for name in ("settings.open", "file.quit", "help.about")}
     assert set(roles.values()) == {
         QAction.MenuRole.PreferencesRole, QAction.MenuRole.QuitRole, QAction.MenuRole.AboutRole,
@@ -99,7 +99,7 @@ def test_text_navigation_keys_are_handled_by_the_text_field(
     words = LogFindField(theme)
     qtbot.addWidget(words)
     words.exited.connect(lambda: left.append("console"))
-    number = OpenNumberEdit(theme, Parameter("n", "n", "number", default=5))
+    number = UnboundedNumberEdit(theme, Parameter("n", "n", "number", default=5))
     qtbot.addWidget(number)
     number.setText("5")
     for each in (field, words, number):
@@ -225,12 +225,12 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
 
 
 def test_shortcut_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet) -> None:
-    shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Match)]
+    shown = [line.entry.id for line in sheet.rows.line_model.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
     assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
         f"fixed:{number}" for number in range(len(FIXED_KEYS))
     }
-    headings = [line.text for line in sheet.rows.lines.lines if isinstance(line, Heading)]
+    headings = [line.text for line in sheet.rows.line_model.lines if isinstance(line, Heading)]
     assert len(headings) == len(set(headings))
     assert {"File", "View", "Run", "Blocks"} <= set(headings)
 

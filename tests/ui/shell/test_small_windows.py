@@ -104,7 +104,7 @@ def overlaps(window: MainWindow) -> Iterator[str]:
             yield from _pairs([child for child in bar.children() if isinstance(child, QWidget)])
     if window.bench is not None:
         docks = window.bench.docks.values()
-        yield from _pairs([dock for dock in docks if dock.front and not dock.isFloating()])
+        yield from _pairs([dock for dock in docks if dock.is_front and not dock.isFloating()])
 
 
 def _pairs(widgets: list[QWidget]) -> Iterator[str]:
@@ -182,7 +182,7 @@ def test_panels_are_tabified_stepwise_in_small_windows_and_separated_in_large_wi
         qtbot.waitUntil(lambda of_robot=of_robot: tabs_of(bench, "robot") == of_robot)
         qtbot.waitUntil(lambda of_sensors=of_sensors: tabs_of(bench, "sensors") == of_sensors)
         settle(qtbot, window)
-        assert docks["robot"].front
+        assert docks["robot"].is_front
         assert (
             "problems" not in of_robot or bench.docks["robot"].title.tabs[0] == docks["robot"].panel.title()
         )

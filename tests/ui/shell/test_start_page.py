@@ -130,7 +130,7 @@ def test_open_work_is_listed_first_and_opens_its_tab(page: StartPage) -> None:
     )
     assert "Open now" in words(page)
     assert [row.accessibleName() for row in page.open_work.rows] == [
-        "Continue with Greeting, not saved yet",
+        "Continue with Greeting, unsaved changes",
         "Continue with Quiz, running",
     ]
     told: list[str] = []
@@ -232,7 +232,7 @@ def test_card_art_is_hidden_with_large_text_in_a_low_window(qtbot, page: StartPa
     qtbot.waitUntil(first.art.isVisible)
 
 
-def test_shipped_examples_are_loaded_with_their_blocks() -> None:
+def test_first_three_examples_have_a_description_and_preview_rows_that_start_with_an_event() -> None:
     found = read_examples(resources.folder() / "examples")
     assert len(found) >= 3
     for example in found[:3]:

@@ -65,7 +65,7 @@ def test_health_item_shows_no_robot_when_none_is_connected() -> None:
 
 def test_save_state_shows_the_time_of_saving_or_that_work_is_backed_up(session: fakes.Session) -> None:
     assert facts(session).save_status()[1] == ""
-    session.document.saved_at = 8 * 3600 + 41 * 60
+    session.document.saved_s = 8 * 3600 + 41 * 60
     assert facts(session).save_status()[1] == "Saved 8:41"
     session.document.dirty = True
     assert facts(session).save_status()[1] == "Not saved · backed up"

@@ -42,7 +42,7 @@ def opened(qtbot, commands: Commands, window: MainWindow) -> VersionHistorySheet
 
 def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
     told = []
-    for line in sheet.rows.lines.lines:
+    for line in sheet.rows.line_model.lines:
         if isinstance(line, Match):
             told.append((line.entry.text.partition(",")[0], line.entry.note or line.entry.reason))
         else:
@@ -73,7 +73,7 @@ def test_enter_opens_the_selected_version_as_a_copy(qtbot, commands, shown, tmp_
         commands.run("file.save")
     before = path.read_bytes()
     sheet = opened(qtbot, commands, shown)
-    oldest = Path(sheet.rows.lines.lines[1].entry.name)
+    oldest = Path(sheet.rows.line_model.lines[1].entry.name)
     QTest.keyClick(sheet.rows, Qt.Key.Key_Down)
     QTest.keyClick(sheet.rows, Qt.Key.Key_Return)
     assert not sheet.isVisible()
@@ -156,7 +156,7 @@ def test_version_time_is_formatted_in_plain_words() -> None:
 def test_version_differences_are_described_in_plain_words() -> None:
     assert difference_text(Difference(14)) == "14 blocks, unchanged since"
     assert difference_text(Difference(1, is_rearranged=True)) == "1 block, reordered"
-    found = Difference(14, added=3, removed=1, changed=2)
+    found = Difference(14, added_count=3, removed_count=1, changed_count=2)
     assert difference_text(found) == "14 blocks, 3 added, 1 removed, 2 changed since"
 
 

@@ -72,7 +72,7 @@ RUNS = (
     RunState(
         "proven", "Greeting", report=StopReport((ANSWERED,), 41.4), elapsed_s=3.0, has_stopped_blocks=True
     ),
-    RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), finished=True),
+    RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), is_finished=True),
     RunState("unanswered", "Greeting", report=StopReport((ANSWERED, SILENT), 41.4)),
 )
 OF_QT = ("#qt_dockwidget_", "#ScrollLeftButton", "#ScrollRightButton")
@@ -92,7 +92,7 @@ def views() -> Iterator[RunView]:
     """Return every state of Run and Stop, also for a behaviour in a background tab."""
     for run in RUNS:
         for elsewhere in (False, True):
-            yield view_of(run, ["Rover", "Turtle"], 3.0, elsewhere=elsewhere)
+            yield view_of(run, ["Rover", "Turtle"], 3.0, is_elsewhere=elsewhere)
 
 
 def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
@@ -103,7 +103,7 @@ def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
     for item in root.findChildren(StatusItem):
         yield "StatusItem", item.text
     for rows in root.findChildren(EntryList):
-        for line in rows.lines.lines:
+        for line in rows.line_model.lines:
             if isinstance(line, Heading):
                 yield "heading", line.text
             else:
@@ -250,7 +250,7 @@ def test_tools_hidden_for_lack_of_room_reappear_when_there_is_room(qtbot, whole:
     assert keep.isVisible()
 
 
-def test_all_menus_are_translated(qtbot, whole: MainWindow) -> None:
+def test_menus_of_the_window_and_docks_are_translated(qtbot, whole: MainWindow) -> None:
     found: list[str] = []
     for layout in ("start", "behaviour", "developer"):
         if layout != "start":
@@ -319,7 +319,7 @@ def test_version_history_is_translated(qtbot, whole: MainWindow, tmp_path: Path)
     whole.commands.run("file.earlier")
     (sheet,) = whole.findChildren(VersionHistorySheet)
     qtbot.waitUntil(lambda: sheet.has_read_all)
-    assert len(sheet.rows.lines.lines) == 2
+    assert len(sheet.rows.line_model.lines) == 2
     assert forgotten(sheet) == []
     assert untranslated(whole.toast.text, "Mine") == []
 

@@ -34,9 +34,9 @@ def test_deferred_steps_do_not_run_before_the_first_paint(qtbot: QtBot) -> None:
     soon = DeferredSteps(window, [lambda: done.append("panels"), lambda: done.append("editor")])
     soon.prepend([lambda: done.append("begin"), lambda: done.append("meeting")])
     qtbot.wait(50)
-    assert (done, soon.began) == ([], False)
+    assert (done, soon.has_started) == ([], False)
     window.show()
-    qtbot.waitUntil(lambda: soon.done)
+    qtbot.waitUntil(lambda: soon.is_done)
     assert done == ["begin", "meeting", "panels", "editor"]
 
 
@@ -64,7 +64,7 @@ def test_click_is_handled_between_two_deferred_steps(qtbot: QtBot) -> None:
 
     soon = DeferredSteps(window, [one, lambda: seen.append("two")])
     window.show()
-    qtbot.waitUntil(lambda: soon.done)
+    qtbot.waitUntil(lambda: soon.is_done)
     assert seen == ["one", "click", "two"]
 
 
@@ -73,7 +73,7 @@ def test_deferred_steps_run_after_a_timeout_if_the_window_is_not_painted(qtbot: 
     qtbot.addWidget(window)
     done: list[int] = []
     soon = DeferredSteps(window, [lambda: done.append(1)])
-    qtbot.waitUntil(lambda: soon.done)
+    qtbot.waitUntil(lambda: soon.is_done)
     assert done == [1]
 
 
@@ -90,7 +90,7 @@ def test_failing_deferred_step_does_not_prevent_later_steps(
     soon = DeferredSteps(window, [fail, lambda: done.append(1)])
     with caplog.at_level(logging.ERROR):
         window.show()
-        qtbot.waitUntil(lambda: soon.done)
+        qtbot.waitUntil(lambda: soon.is_done)
     assert done == [1]
     assert "no such file" in caplog.text
 
@@ -113,7 +113,8 @@ def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_
         "from app.ui import application\n"
         "from app.core.session import Session\n"
         "application.make_application()\n"
-        "application.make_window(Session(start_processes=False), application.Options(new_window=True))\n"
+        "options = application.Options(opens_new_window=True)\n"
+        "application.make_window(Session(start_processes=False), options)\n"
         f"print([name for name in {late} if name in sys.modules])\n"
         "from app.ui.panels.registry import PanelRegistry\n"
         "assert 'plot' in list(PanelRegistry())\n"

@@ -295,7 +295,7 @@ def test_closing_the_window_during_a_later_start_raises_no_error(
     line = QLocalSocket()
     line.connectToServer(name)
     assert line.waitForConnected(WAIT_MS)
-    qtbot.waitUntil(lambda: bool(meeting._received), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: bool(meeting._buffers), timeout=WAIT_MS)
     with qtbot.waitSignal(window.destroyed, timeout=WAIT_MS):
         window.deleteLater()
     qtbot.waitUntil(lambda: line.state() == QLocalSocket.LocalSocketState.UnconnectedState, timeout=WAIT_MS)

@@ -106,7 +106,7 @@ def test_every_icon_svg_paints_visible_pixels(qapp) -> None:
 def test_problem_row_is_painted_for_every_block_type(qtbot, theme: Theme, caplog) -> None:
     for block in Catalogue([robot()]).blocks.values():
         problem = Problem("error", "a", block.style, "it", "Something is wrong with it.", icon=block.icon)
-        row = ProblemRow(theme, ProblemLine(problem, ()), large=True)
+        row = ProblemRow(theme, ProblemLine(problem, ()), is_large=True)
         qtbot.addWidget(row)
         row.resize(400, 60)
         assert not row.grab().isNull(), block.type
@@ -117,7 +117,7 @@ def test_icon_is_painted_into_its_rectangle(qapp: object) -> None:
     image = QImage(40, 40, QImage.Format.Format_ARGB32)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
-    icons.paint_icon(painter, QRectF(20, 20, 16, 16), "square", QColor("#ff0000"), filled=True)
+    icons.paint_icon(painter, QRectF(20, 20, 16, 16), "square", QColor("#ff0000"), is_filled=True)
     painter.end()
     assert image.pixelColor(28, 28).name() == "#ff0000"
     assert image.pixelColor(10, 10).alpha() == 0

@@ -115,7 +115,7 @@ def test_action_card_can_be_used_without_horizontal_scrolling_at_every_text_size
     dock.resize(width, 600)
     with qtbot.waitExposed(dock):  # hidden panels aren't updated
         dock.show()
-    dock.front = True
+    dock.is_front = True
     qtbot.waitUntil(dock.is_displayed)
     session.tick()
     dock.refresh()

@@ -40,7 +40,7 @@ def test_colour_roles_depend_on_the_theme_mode(theme: Theme) -> None:
     assert theme.colour("accent").name() == "#2f4fd0"
     theme.set_mode("dark")
     assert theme.colour("accent").name() == "#4c66e6"
-    assert theme.dark
+    assert theme.is_dark
 
 
 def test_unknown_colour_role_raises(theme: Theme) -> None:
@@ -67,14 +67,14 @@ def test_system_colour_scheme_is_followed_only_in_system_mode(qapp: QApplication
     hints = Hints()
     theme = Theme("system", hints=hints)  # type: ignore[arg-type]
     told: list[bool] = []
-    theme.changed.connect(lambda: told.append(theme.dark))
-    assert not theme.dark
+    theme.changed.connect(lambda: told.append(theme.is_dark))
+    assert not theme.is_dark
     hints.become(Qt.ColorScheme.Dark)
-    assert theme.dark
+    assert theme.is_dark
     assert told == [True]
     theme.set_mode("light")
     hints.become(Qt.ColorScheme.Dark)
-    assert not theme.dark
+    assert not theme.is_dark
 
 
 def test_mode_change_repaints_a_label_immediately(qtbot, theme: Theme) -> None:
@@ -130,13 +130,13 @@ def test_digits_have_equal_width(qapp: QApplication, theme: Theme) -> None:
 
 def test_reduced_motion_sets_animations_to_zero_and_keeps_toast_durations(theme: Theme) -> None:
     assert theme.duration("changedFade") == 800
-    theme.reduced_motion = True
+    theme.is_motion_reduced = True
     assert theme.duration("changedFade") == 0
     assert theme.duration("toastShown") == 6000
 
 
 def test_high_contrast_has_strong_edges_and_no_tints(theme: Theme) -> None:
-    theme.high_contrast = True
+    theme.is_high_contrast = True
     assert theme.colour("border") == theme.colour("controlBorder")
     assert theme.colour("okTint") == theme.colour("panel")
 
@@ -203,10 +203,10 @@ def test_contrast_and_motion_follow_the_system_only_in_system_mode() -> None:
     hints = WithContrast()
     theme = Theme("light", hints=hints)  # type: ignore[arg-type]
     theme.set_contrast("system")
-    assert not theme.high_contrast
+    assert not theme.is_high_contrast
     hints.asked.wish = Qt.ContrastPreference.HighContrast
     hints.asked.contrastPreferenceChanged.emit()
-    assert theme.high_contrast
+    assert theme.is_high_contrast
     theme.set_contrast("off")
     hints.asked.contrastPreferenceChanged.emit()
-    assert not theme.high_contrast
+    assert not theme.is_high_contrast

@@ -20,8 +20,9 @@ def place_of(place: PicturePlacement, at: QPointF) -> tuple[float, float]:
 def test_image_is_fitted_and_centred_by_default_and_may_fill_the_view() -> None:
     place = PicturePlacement()
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
-    assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # filling would crop too much
-    assert place.area(VIEW, QSizeF(640, 420), fill=True).height() == 300
+    # filling would crop too much
+    assert place.area(VIEW, PICTURE, fills_view=True) == QRectF(0, 50, 400, 200)
+    assert place.area(VIEW, QSizeF(640, 420), fills_view=True).height() == 300
     place.rotate(90)
     assert place.area(VIEW, PICTURE) == QRectF(125, 0, 150, 300)
 
@@ -33,7 +34,7 @@ def test_zoom_keeps_the_point_under_the_mouse_in_every_orientation(turned, acros
     place.rotate(turned)
     for wanted, flip in ((across, True), (down, False)):
         if wanted:
-            place.flip(horizontally=flip)
+            place.flip(is_horizontal=flip)
     area = place.area(VIEW, PICTURE)
     at = QPointF(area.x() + area.width() * 0.3, area.y() + area.height() * 0.6)
     before = place_of(place, at)
@@ -74,7 +75,7 @@ def test_zoom_has_limits() -> None:
 @pytest.mark.parametrize("turns", range(1, 4))
 def test_flipped_image_rotates_in_the_same_direction(turns: int) -> None:
     upright, flipped = PicturePlacement(), PicturePlacement()
-    flipped.flip(horizontally=True)
+    flipped.flip(is_horizontal=True)
     corner = QPointF(0, 0)
     for place in (upright, flipped):
         place.rotate(90 * turns)
@@ -96,7 +97,7 @@ def test_four_quarter_turns_and_two_flips_are_the_identity() -> None:
     place.rotate(180)
     place.rotate(-180)
     for across in (True, False, True, False):
-        place.flip(horizontally=across)
+        place.flip(is_horizontal=across)
     after = place.to_json()
     assert after.pop("centre") == pytest.approx(before.pop("centre"))
     assert after == before
@@ -106,7 +107,7 @@ def test_placement_is_restored_with_the_layout_and_invalid_state_is_ignored() ->
     place = PicturePlacement()
     place.zoom_at(4.0, QPointF(10, 90), VIEW, PICTURE)
     place.rotate(270)
-    place.flip(horizontally=False)
+    place.flip(is_horizontal=False)
     again = PicturePlacement()
     again.restore(place.to_json())
     assert again == place

@@ -172,7 +172,7 @@ def test_cache_of_painted_cells_is_bounded(qapp, view, model) -> None:
         view.scrollTo(model.index(first, 0), QTableView.ScrollHint.PositionAtTop)
         view.viewport().repaint()
         view.refresh_visible()
-    assert len(view._cells._painted) <= MAX_CACHED_CELLS + 50
+    assert len(view._cells._painted_cells) <= MAX_CACHED_CELLS + 50
 
 
 def test_stretch_column_takes_the_remaining_width(view) -> None:

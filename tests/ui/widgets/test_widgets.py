@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QVBoxLayout, QWidget
@@ -179,7 +179,7 @@ def test_icon_button_names_its_action_and_shortcut(theme: Theme) -> None:
 
 
 def test_run_button_keeps_its_width_when_its_text_is_resume(theme: Theme) -> None:
-    button = RunButton(theme, "Run", "play", widest="Resume")
+    button = RunButton(theme, "Run", "play", longest_text="Resume")
     before = button.sizeHint()
     button.set_label("Resume")
     assert button.sizeHint() == before
@@ -194,7 +194,7 @@ def test_stop_keeps_its_size_and_red_colour_in_every_state(qtbot, theme: Theme, 
     before = stop.sizeHint()
     assert (before.width() - 8, before.height() - 8) >= least
     for word, ring in (("Stop", False), ("Stopping", True), ("Stop again", False)):
-        stop.show_state(word, ring=ring)
+        stop.show_state(word, has_ring=ring)
         assert stop.sizeHint() == before
         assert stop.isEnabled()
         assert theme.colour("stop").name() in colours(stop)
@@ -287,9 +287,15 @@ def test_search_field_shows_its_shortcut_only_while_empty(qtbot, theme: Theme) -
     field = SearchField(theme, "Filter", "/")
     field.resize(200, 28)
     shown(qtbot, field)
-    empty = field.grab().toImage()
+    key_cap = QRect(170, 0, 30, 28)
+    empty = field.grab(key_cap).toImage()
     field.setText("x")
-    assert field.grab().toImage() != empty
+    with_text = field.grab(key_cap).toImage()
+    assert with_text != empty
+    without_key = SearchField(theme, "Filter")
+    without_key.resize(200, 28)
+    shown(qtbot, without_key)
+    assert without_key.grab(key_cap).toImage() == with_text
     assert field.accessibleName() == "Filter"
 
 

@@ -72,8 +72,8 @@ export function isOverBackpack({x, y}: {x: number; y: number}): boolean {
 }
 
 /** Highlights the button while a drop would add the dragged blocks to the backpack. */
-export function highlightBackpack(aims: boolean): void {
-  button?.classList.toggle('nepOver', aims);
+export function highlightBackpack(isOver: boolean): void {
+  button?.classList.toggle('nepOver', isOver);
 }
 
 /** Returns true if this block is shown in the backpack's sheet. */
@@ -115,8 +115,8 @@ export function registerBackpack(postRequest: (json: string) => void, getBackpac
     },
   });
   registerBackpackMenu({
-    may: canAddToBackpack, pack: addBlockToBackpack,
-    isPacked: isInBackpack, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
+    canAdd: canAddToBackpack, add: addBlockToBackpack,
+    isInBackpack, remove: (block) => sheetOf(block)?.remove(block.getRootBlock()),
     count: () => contents.length, open: () => getBackpack().toggle(true), empty: () => sendRequest({do: 'empty'}),
   });
 }
@@ -129,7 +129,7 @@ class TolerantBlockInflater extends Blockly.BlockFlyoutInflater {
     try {
       return make(wrapUnknown(state as unknown as BlockState));
     } catch (error) {
-      console.warn(`kept whole: ${String(error)}`);
+      console.warn(`The stack can't be created and is kept unchanged: ${String(error)}`);
       for (const block of workspace.getTopBlocks(false)) if (!before.has(block)) block.dispose(false);
       return make(wrapWholeStack(state as unknown as BlockState));
     }
@@ -206,7 +206,7 @@ class BackpackSheet extends Sheet {
     return type.toLowerCase() === 'block' ? this.inflater : super.getInflaterForType(type);
   }
 
-  protected override get closes(): string {
+  protected override get closeLabel(): string {
     return t('Close the backpack');
   }
 
@@ -258,8 +258,8 @@ export class Backpack {
     disposeSheet(this.sheet);
   }
 
-  /** Opens or closes the sheet; `byKey` moves the focus to the first stack. */
-  toggle(byKey: boolean): void {
+  /** Opens or closes the sheet; `byKeyboard` moves the focus to the first stack. */
+  toggle(byKeyboard: boolean): void {
     const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
       sheet.hide();
@@ -267,7 +267,7 @@ export class Backpack {
     }
     this.workspace.hideChaff();
     sheet.renderContents();
-    if (byKey) sheet.focusFirst();
+    if (byKeyboard) sheet.focusFirst();
     sendRequest({do: 'look'});
   }
 

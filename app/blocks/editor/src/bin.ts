@@ -42,7 +42,7 @@ class BinSheet extends Sheet {
     this.onPick(block.id);
   }
 
-  protected override get closes(): string {
+  protected override get closeLabel(): string {
     return t('Close the bin');
   }
 }
@@ -115,8 +115,8 @@ export class Bin {
     binButton().classList.toggle('nepOver', onButton);
   }
 
-  /** Opens or closes the sheet; `byKey` moves the focus to the latest deletion. */
-  toggle(byKey: boolean): void {
+  /** Opens or closes the sheet; `byKeyboard` moves the focus to the latest deletion. */
+  toggle(byKeyboard: boolean): void {
     const sheet = this.sheet ??= this.createSheet();
     if (sheet.isVisible()) {
       sheet.hide();
@@ -124,7 +124,7 @@ export class Bin {
     }
     this.workspace.hideChaff();
     this.renderContents(sheet);
-    if (byKey) sheet.focusFirst();
+    if (byKeyboard) sheet.focusFirst();
   }
 
   /** Restores the last deletion in place; returns true if the undo stack can do it instead. */

@@ -70,9 +70,9 @@ export class Bubbles {
   /** Positions a bubble to the right of its block, or below or above the block if there is no space. */
   private positionBubble(bubble: Bubble, block: Blockly.BlockSvg): void {
     const scale = this.workspace.getAbsoluteScale();
-    const grown = Math.max(1, MIN_SCALE / scale);
-    const width = bubble.width * grown;
-    const height = bubble.height * grown;
+    const scaleFactor = Math.max(1, MIN_SCALE / scale);
+    const width = bubble.width * scaleFactor;
+    const height = bubble.height * scaleFactor;
     const view = this.visibleRect();
     const position = block.getRelativeToSurfaceXY();
     const row = Math.min(block.height, FIRST_ROW_HEIGHT);
@@ -90,7 +90,7 @@ export class Bubbles {
     const tip: TipSide = fitsRight ? 'left' : roomBelow ? 'top' : 'bottom';
     if (bubble.tip !== tip) bubble.frame.setAttribute('d', bubblePath(bubble.width, bubble.height, bubble.tip = tip));
     const top = clamp(y, view.top + VIEW_MARGIN, view.bottom - height - VIEW_MARGIN);
-    bubble.group.setAttribute('transform', `translate(${x}, ${top}) scale(${grown})`);
+    bubble.group.setAttribute('transform', `translate(${x}, ${top}) scale(${scaleFactor})`);
   }
 
   /** Returns the visible part of the workspace, without the area under the toolbox and flyout. */
@@ -122,17 +122,17 @@ export class Bubbles {
     room.append(textElement);
     group.append(frame, icon, room);
     this.workspace.getBubbleCanvas().append(group);
-    const put = (attribute: string, value: number) => room.setAttribute(attribute, String(value));
-    put('x', 40);
-    put('y', 10);
-    put('width', BUBBLE_WIDTH - 52);
-    put('height', 400);
+    const setAttribute = (attribute: string, value: number) => room.setAttribute(attribute, String(value));
+    setAttribute('x', 40);
+    setAttribute('y', 10);
+    setAttribute('width', BUBBLE_WIDTH - 52);
+    setAttribute('height', 400);
     const scale = this.workspace.getAbsoluteScale();
     const box = textElement.getBoundingClientRect();
     const width = Math.ceil(box.width / scale) + 56;
     const height = Math.max(20, Math.ceil(box.height / scale)) + 20;
-    put('height', height - 18);
-    put('width', width - 50);
+    setAttribute('height', height - 18);
+    setAttribute('width', width - 50);
     return {group, frame, width, height, tip: ''};
   }
 }

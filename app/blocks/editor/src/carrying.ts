@@ -28,8 +28,8 @@ export interface OutgoingDrag {
 }
 
 export interface CrossTabDragListener {
-  /** Called when items of the behaviour `home` are dragged outside the page; `out` is false when that ends. */
-  carried(x: number, y: number, out: boolean, home: string): void;
+  /** Called when items of the behaviour `home` are dragged outside the page; `isOutside` is false when that ends. */
+  carried(x: number, y: number, isOutside: boolean, home: string): void;
   /** Called with the drag image, a `data:` URL of a PNG with `ratio` image pixels per pixel of the page. */
   pictured(data: string, ratio: number): void;
   /** Called when the items are dropped outside the page. */
@@ -48,14 +48,14 @@ interface UndoStep {
 /** Drag that continues after a switch to another behaviour while the mouse button is pressed. */
 interface HeldDrag {
   from: Tab;
-  what: OutgoingDrag;
+  drag: OutgoingDrag;
   /** Copy that is dragged in the shown behaviour, or null while the mouse is outside the page. */
   visit: VisitingCopy | null;
 }
 
 interface VisitingCopy {
   tab: Tab;
-  made: Item[];
+  items: Item[];
   group: string;
   /** Ids of the variables that existed before. */
   variables: ReadonlySet<string>;
@@ -70,7 +70,7 @@ export function isOutsideViewport({x, y}: Point): boolean {
 }
 
 /** Returns the drag of an item out of the page, or null if the item can't leave the page. */
-export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: boolean, mouse: Point): OutgoingDrag | null {
+export function createOutgoingDrag(item: unknown, isFromToolbox: boolean, isCopy: boolean, mouse: Point): OutgoingDrag | null {
   const isOne = item instanceof Blockly.BlockSvg || item instanceof Blockly.comments.RenderedWorkspaceComment;
   const copied = isOne ? stateOf(item, true) : null;
   if (!isOne || !copied) return null;
@@ -78,7 +78,7 @@ export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: 
   const isAlone = !block?.getNextBlock();
   return {
     copied,
-    how: fromToolbox ? 'added' : copies || !item.isDeletable() ? 'copied' : 'moved',
+    how: isFromToolbox ? 'added' : isCopy || !item.isDeletable() ? 'copied' : 'moved',
     heads: block ? [block] : [],
     place: item.getRelativeToSurfaceXY(),
     grip: Blockly.utils.Coordinate.difference(mouse, item.getRelativeToSurfaceXY()),
@@ -88,14 +88,14 @@ export function createOutgoingDrag(item: unknown, fromToolbox: boolean, copies: 
 }
 
 /** Returns the drag of selected blocks and notes out of the page. */
-export function createOutgoingGroupDrag(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], copies: boolean, mouse: Point): OutgoingDrag | null {
+export function createOutgoingGroupDrag(runs: readonly Blockly.BlockSvg[][], notes: readonly Note[], isCopy: boolean, mouse: Point): OutgoingDrag | null {
   const heads = runs.flatMap(([head]) => head ?? []);
   const first = heads[0] ?? notes[0];
   if (!first) return null;
   const all = [...runs.flat(), ...notes];
   return {
     copied: copyOfAll(runs, notes),
-    how: copies || !all.every((item) => item.isDeletable()) ? 'copied' : 'moved',
+    how: isCopy || !all.every((item) => item.isDeletable()) ? 'copied' : 'moved',
     heads,
     place: first.getRelativeToSurfaceXY(),
     grip: Blockly.utils.Coordinate.difference(mouse, first.getRelativeToSurfaceXY()),
@@ -108,13 +108,13 @@ export class CrossTabDrag {
   private mouse: Point | null = null;
   private frame = 0;
   private isReported = false;
-  private pendingDrop: {tab: Tab; what: OutgoingDrag} | null = null;
+  private pendingDrop: {tab: Tab; drag: OutgoingDrag} | null = null;
   /** Undo steps of the last drop, the target behaviour first. */
   private steps: UndoStep[] = [];
 
   private hand: HeldDrag | null = null;
   /** True while the tab is switched or a visiting copy is removed: drags that end then were not ended by the user. */
-  private turning = false;
+  private isSwitching = false;
   /** Number of the latest requested drag image. */
   private picture = 0;
 
@@ -122,7 +122,7 @@ export class CrossTabDrag {
 
   /** Tracks the mouse outside the page and notifies the window at most once per frame; null when it is back inside. */
   trackOutside(mouse: Point | null, items: readonly Item[] = []): void {
-    if (this.turning) return;
+    if (this.isSwitching) return;
     if (mouse && this.hand?.visit) window.setTimeout(() => this.endVisit());  // only after the current drag event has been handled
     if (mouse && !this.mouse && items.length) void this.updateDragImage(items);
     this.mouse = mouse;
@@ -131,13 +131,13 @@ export class CrossTabDrag {
   }
 
   dropOutside(tab: Tab, drag: OutgoingDrag, mouse: Point): void {
-    if (this.turning) {
-      this.hand ??= this.startHolding({from: tab, what: drag, visit: null});
+    if (this.isSwitching) {
+      this.hand ??= this.startHolding({from: tab, drag, visit: null});
       return;
     }
     const {hand} = this;
     if (hand) this.stopHolding();
-    this.pendingDrop = hand ? {tab: hand.from, what: hand.what} : {tab, what: drag};
+    this.pendingDrop = hand ? {tab: hand.from, drag: hand.drag} : {tab, drag};
     this.window.dropped(Math.round(mouse.x), Math.round(mouse.y));
   }
 
@@ -148,22 +148,22 @@ export class CrossTabDrag {
   }
 
   /** Handles the end of a drag on the page; completes the transfer if a visiting copy was dropped. */
-  dragEnded(isPlaced: boolean, copies: boolean): void {
+  dragEnded(isPlaced: boolean, isCopy: boolean): void {
     const {hand} = this;
-    if (this.turning || !hand?.visit) return;
+    if (this.isSwitching || !hand?.visit) return;
     if (!isPlaced) return this.stopHolding();
-    const {from, what, visit: {tab, made, group}} = hand;
+    const {from, drag, visit: {tab, items, group}} = hand;
     hand.visit = null;
     this.stopHolding();
-    const how = copies && what.how === 'moved' ? 'copied' : what.how;
-    const removes = how === 'moved' && !what.isGone();
+    const how = isCopy && drag.how === 'moved' ? 'copied' : drag.how;
+    const shouldRemove = how === 'moved' && !drag.isGone();
     if (tab === from) {  // back in the original behaviour
-      if (removes) withEventGroup(group, what.remove);
+      if (shouldRemove) withEventGroup(group, drag.remove);
       return;
     }
-    this.steps = [createUndoStep(tab, group, made)];
-    if (removes) this.removeOriginals(what, from);
-    this.window.brought(countCopiedBlocks(what.copied), how, from.key);
+    this.steps = [createUndoStep(tab, group, items)];
+    if (shouldRemove) this.removeOriginals(drag, from);
+    this.window.brought(countCopiedBlocks(drag.copied), how, from.key);
   }
 
   /** Inserts the dropped items into the visible part of `to`, selected; deletes the originals of a move. */
@@ -171,11 +171,11 @@ export class CrossTabDrag {
     const {pendingDrop: held} = this;
     this.pendingDrop = null;
     if (!held || held.tab === to) return;
-    const {tab: from, what} = held;
+    const {tab: from, drag} = held;
     this.steps = [];
-    if (!this.insertCopy(what.copied, to)) return;
-    if (what.how === 'moved' && !what.isGone()) this.removeOriginals(what, from);
-    this.window.brought(countCopiedBlocks(what.copied), what.how, from.key);
+    if (!this.insertCopy(drag.copied, to)) return;
+    if (drag.how === 'moved' && !drag.isGone()) this.removeOriginals(drag, from);
+    this.window.brought(countCopiedBlocks(drag.copied), drag.how, from.key);
   }
 
   /** Undoes the last drop in both behaviours, once this frame's edits have been added to the undo stacks. */
@@ -223,7 +223,7 @@ export class CrossTabDrag {
     const {hand} = this;
     if (!hand || hand.visit) return;  // Blockly ends the drag on the page
     const mouse = new Blockly.utils.Coordinate(event.clientX, event.clientY);
-    if (isOutsideViewport(mouse)) this.dropOutside(hand.from, hand.what, mouse);
+    if (isOutsideViewport(mouse)) this.dropOutside(hand.from, hand.drag, mouse);
     else this.stopHolding();
   };
 
@@ -238,19 +238,19 @@ export class CrossTabDrag {
     const {workspace} = tab;
     const {scrollX, scrollY} = workspace;
     const {svgMath, Coordinate} = Blockly.utils;
-    const dragPosition = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.what.grip);
+    const dragPosition = Coordinate.difference(svgMath.screenToWsCoordinates(workspace, mouse), hand.drag.grip);
     // Never start left of the visible area (under the toolbox): Blockly would scroll the canvas to the focused item.
     const {left, top} = visibleArea(workspace);
     const position = new Coordinate(Math.max(dragPosition.x, left), Math.max(dragPosition.y, top));
     const variables = new Set(workspace.getVariableMap().getAllVariables().map((variable) => variable.getId()));
     this.trackOutside(null);
     Blockly.Events.setGroup(true);  // until the drop, so that the drag is one undo step
-    const addedItems = pasteItems(hand.what.copied, workspace, position);
+    const addedItems = pasteItems(hand.drag.copied, workspace, position);
     const [first] = addedItems;
     if (!first) return this.stopHolding();
     workspace.scroll(scrollX, scrollY);  // revert the scroll to the focused item; the mouse determines its position
-    hand.visit = {tab, made: addedItems, group: Blockly.Events.getGroup(), variables};
-    const grip = Coordinate.sum(first.getRelativeToSurfaceXY(), hand.what.grip);
+    hand.visit = {tab, items: addedItems, group: Blockly.Events.getGroup(), variables};
+    const grip = Coordinate.sum(first.getRelativeToSurfaceXY(), hand.drag.grip);
     startDragAt(first, svgMath.wsToScreenCoordinates(workspace, grip), event);
   }
 
@@ -259,10 +259,10 @@ export class CrossTabDrag {
     const visit = this.hand?.visit;
     if (!visit) return;
     this.hand!.visit = null;
-    const {tab, made, group, variables} = visit;
+    const {tab, items, group, variables} = visit;
     this.runWhileSwitching(() => tab.cancelInteraction());
     withEventGroup(group, () => {
-      for (const item of made) if (!item.isDeadOrDying()) {
+      for (const item of items) if (!item.isDeadOrDying()) {
         tab.bin.markAsMoved(item.id);
         item.dispose();
       }
@@ -275,12 +275,12 @@ export class CrossTabDrag {
   }
 
   private runWhileSwitching(act: () => void): void {
-    const before = this.turning;
-    this.turning = true;
+    const before = this.isSwitching;
+    this.isSwitching = true;
     try {
       act();
     } finally {
-      this.turning = before;
+      this.isSwitching = before;
     }
   }
 
@@ -308,12 +308,12 @@ export class CrossTabDrag {
     const {workspace} = tab;
     const {left, right, top, bottom} = visibleArea(workspace);
     const position = new Blockly.utils.Coordinate(left + (right - left) / 4, top + (bottom - top) / 4);
-    const [made, group] = withUndoGroup(() => [pasteItems(copied, workspace, position), Blockly.Events.getGroup()] as const);
-    const [first] = made;
+    const [items, group] = withUndoGroup(() => [pasteItems(copied, workspace, position), Blockly.Events.getGroup()] as const);
+    const [first] = items;
     if (!first) return false;
     const box = (first as Blockly.IBoundedElement).getBoundingRectangle();
     if (first instanceof Blockly.BlockSvg && !visibleArea(workspace).contains(box.left, box.top)) tab.reveal(first.id);
-    this.steps.push(createUndoStep(tab, group, made));
+    this.steps.push(createUndoStep(tab, group, items));
     return true;
   }
 

@@ -90,9 +90,9 @@ export function focusedItem(): Item | null {
   return node instanceof Blockly.comments.RenderedWorkspaceComment ? node : focusedBlock();
 }
 
-/** Returns the state of an item; `stack` includes the blocks below it. */
-export function stateOf(item: Item, stack = false): CopiedItem | null {
-  const data = item.toCopyData(stack) as {blockState?: unknown; commentState?: unknown} | null;
+/** Returns the state of an item; `includeBelow`: with the blocks below it. */
+export function stateOf(item: Item, includeBelow = false): CopiedItem | null {
+  const data = item.toCopyData(includeBelow) as {blockState?: unknown; commentState?: unknown} | null;
   if (data?.blockState) return {nepStudio: 'block', state: unwrapUnknown(data.blockState as BlockState)};
   return data?.commentState ? {nepStudio: 'note', state: data.commentState as BlockState} : null;
 }
@@ -186,7 +186,7 @@ export function pasteItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly
     try {
       return moveToFreePosition(createItems(copied, workspace, position), position);
     } catch (error) {
-      console.warn(`not pasted: ${String(error)}`);
+      console.warn(`The clipboard can't be pasted: ${String(error)}`);
       for (const item of [...workspace.getTopBlocks(false), ...workspace.getTopComments()]) {
         if (!existing.has(item)) item.dispose();
       }
@@ -233,10 +233,10 @@ function createItems(copied: CopiedItem | CopiedBlocks, workspace: Blockly.Works
 function createItem({nepStudio, state}: CopiedItem, workspace: Blockly.WorkspaceSvg, {x, y}: Point): Item {
   const {id, ...rest} = {...state, x, y};
   void id;
-  const how = {recordUndo: true};
+  const options = {recordUndo: true};
   if (nepStudio === 'note') {
-    return Blockly.serialization.workspaceComments.append(rest, workspace, how) as unknown as Item;
+    return Blockly.serialization.workspaceComments.append(rest, workspace, options) as unknown as Item;
   }
   const blockState = wrapUnknown(rest as BlockState) as Blockly.serialization.blocks.State;
-  return withoutTypeChecks(() => Blockly.serialization.blocks.append(blockState, workspace, how) as Blockly.BlockSvg);
+  return withoutTypeChecks(() => Blockly.serialization.blocks.append(blockState, workspace, options) as Blockly.BlockSvg);
 }

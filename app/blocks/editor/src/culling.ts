@@ -51,13 +51,13 @@ export class Culling {
     }
   }
 
-  private setDrawn(block: Blockly.BlockSvg, drawn: boolean): void {
+  private setDrawn(block: Blockly.BlockSvg, isDrawn: boolean): void {
     const root = block.getSvgRoot();
     const wrapping = this.hidden.get(block);
-    const hidden = wrapping !== undefined && root.parentNode === wrapping;
-    if (hidden !== drawn) return;
+    const isHidden = wrapping !== undefined && root.parentNode === wrapping;
+    if (isHidden !== isDrawn) return;
     if (wrapping) this.unwrap(block, wrapping);
-    if (drawn) return;
+    if (isDrawn) return;
     const wrapper = document.createElementNS(SVG_NS, 'svg');
     wrapper.setAttribute('class', CULLED_CLASS);
     root.replaceWith(wrapper);

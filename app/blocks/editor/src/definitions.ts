@@ -54,14 +54,14 @@ export function fieldNames(definition: BlockDefinition): Set<string> {
 }
 
 /** Registers all definitions; returns the new or changed types, and whether the options of any source changed. */
-export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<string>; sources: boolean} {
+export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<string>; haveSourcesChanged: boolean} {
   const changed = new Set<string>();
-  let sources = false;
+  let haveSourcesChanged = false;
   for (const definition of definitions) {
     for (const arg of argsOf(definition)) {
       const source = sourceOf(arg);
       if (source && Array.isArray(arg.options)) {
-        sources = setSource(source, arg.options.filter(isOption)) || sources;
+        haveSourcesChanged = setSource(source, arg.options.filter(isOption)) || haveSourcesChanged;
       }
     }
     const key = keyOf(definition);
@@ -71,7 +71,7 @@ export function defineBlocks(definitions: BlockDefinition[]): {changed: Set<stri
     if (argsOf(definition).some((arg) => arg.type === 'field_live')) liveTypes.add(definition.type);
     register(withQuotes(definition));
   }
-  return {changed, sources};
+  return {changed, haveSourcesChanged};
 }
 
 /** Updates options alone, such as `{"topics": [["/faces", "/faces"], …]}`; returns true if any changed. */

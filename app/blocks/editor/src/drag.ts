@@ -15,15 +15,15 @@ export interface DragListener {
   /** Called with the mouse position while a drop would delete the dragged block, otherwise with null. */
   overDelete(mouse: Blockly.utils.Coordinate | null): void;
   /** Called when a block was dropped on the canvas without connecting; `mouse` is relative to the page. */
-  letGo(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
+  dropped(block: Blockly.BlockSvg, mouse: Blockly.utils.Coordinate): void;
   /** Called when a block was placed by keyboard without connecting; `insertionTarget` had the focus before. */
-  putDown(block: Blockly.BlockSvg, insertionTarget: Blockly.IFocusableNode): void;
+  placedByKeyboard(block: Blockly.BlockSvg, insertionTarget: Blockly.IFocusableNode): void;
   /** Called with the mouse position while items are dragged outside the page, otherwise with null. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** Called when items were dropped outside the page and have returned to their place. */
-  letGoOutside(drag: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
-  /** Called when the drag has ended; `isPlaced` is false if it was reverted, `copies` is true if Ctrl was pressed. */
-  ended(isPlaced: boolean, copies: boolean): void;
+  droppedOutside(drag: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
+  /** Called when the drag has ended; `isPlaced` is false if it was reverted, `isCopy` is true if Ctrl was pressed. */
+  ended(isPlaced: boolean, isCopy: boolean): void;
 }
 
 /** Items dragged here from another behaviour; dropped on the toolbox, they return there. */
@@ -40,9 +40,9 @@ const DRAG_DISTANCE = 60;
 
 /** Starts dragging an item with the pointer that is already down, as if pressed at `position` on the page. */
 export function startDragAt(item: Item, position: Blockly.utils.Coordinate, {pointerId, pointerType}: PointerEvent): void {
-  const like = (type: string, x: number) => new PointerEvent(type,
+  const createEvent = (type: string, x: number) => new PointerEvent(type,
     {clientX: x, clientY: position.y, pointerId, pointerType, isPrimary: true, button: 0, buttons: 1, cancelable: true});
-  const downEvent = like('pointerdown', position.x);
+  const downEvent = createEvent('pointerdown', position.x);
   visitingItems.add(item);
   Blockly.Touch.clearTouchIdentifier();
   Blockly.Touch.checkTouchIdentifier(downEvent);  // make Blockly follow this pointer
@@ -50,7 +50,7 @@ export function startDragAt(item: Item, position: Blockly.utils.Coordinate, {poi
   if (item instanceof Blockly.BlockSvg) gesture?.handleBlockStart(downEvent, item);
   else gesture?.handleCommentStart(downEvent, item);
   gesture?.handleWsStart(downEvent, item.workspace);
-  gesture?.handleMove(like('pointermove', position.x + DRAG_DISTANCE));
+  gesture?.handleMove(createEvent('pointermove', position.x + DRAG_DISTANCE));
 }
 
 /** Blockly doesn't export the connection candidate of a drag. */
@@ -64,7 +64,7 @@ class Dragger extends Blockly.dragging.Dragger {
     this.draggable.workspace.scale : 0;
   /** Sheet that the block came from; it closes so that the whole canvas is free for the drop. */
   private readonly sheet = this.draggable instanceof Blockly.BlockSvg ? sheetOf(this.draggable) : null;
-  private readonly wasPacked = this.draggable instanceof Blockly.BlockSvg && isInBackpack(this.draggable);
+  private readonly isFromBackpack = this.draggable instanceof Blockly.BlockSvg && isInBackpack(this.draggable);
   private readonly isVisitor = visitingItems.has(this.draggable);
   private isGripAdjusted = false;
   private hasEnded = false;
@@ -131,38 +131,38 @@ class Dragger extends Blockly.dragging.Dragger {
     const {draggable} = this;
     const mouse = event instanceof PointerEvent ? mousePosition(event) : null;
     const {listener} = this;
-    const leaves = mouse && this.isDroppedElsewhere(mouse) ? this.createOutgoing(event as PointerEvent) : null;
-    const joins = Boolean((draggable as unknown as HasDragStrategy).dragStrategy?.connectionCandidate);
-    const loose = mouse && !joins && !this.wouldDelete(event as PointerEvent) && !this.isVisitorOverDeleteArea(mouse);
+    const outgoing = mouse && this.isDroppedElsewhere(mouse) ? this.createOutgoing(event as PointerEvent) : null;
+    const isConnecting = Boolean((draggable as unknown as HasDragStrategy).dragStrategy?.connectionCandidate);
+    const isUnconnected = mouse && !isConnecting && !this.wouldDelete(event as PointerEvent) && !this.isVisitorOverDeleteArea(mouse);
     const group = Blockly.Events.getGroup();
-    const {carried, offset: way, insertionTarget: meant} = this;
-    const free = leaves ? suspendGridSnap(draggable) : null;
+    const {carried, offset, insertionTarget} = this;
+    const restoreGridSnap = outgoing ? suspendGridSnap(draggable) : null;
     super.onDragEnd(event);
     this.resetDragFeedback();
-    free?.();
-    if (carried && leaves) {
+    restoreGridSnap?.();
+    if (carried && outgoing) {
       Blockly.Events.setGroup(group || true);
       carried.revert();
       discardUndoGroup(draggable.workspace, Blockly.Events.getGroup());
       Blockly.Events.setGroup(false);
     }
-    if (leaves && mouse && isOutsideViewport(mouse)) listener?.letGoOutside(leaves, mouse);
-    else if (leaves && !this.wasPacked) addToBackpack(leaves.copied);
-    if (leaves) return;
+    if (outgoing && mouse && isOutsideViewport(mouse)) listener?.droppedOutside(outgoing, mouse);
+    else if (outgoing && !this.isFromBackpack) addToBackpack(outgoing.copied);
+    if (outgoing) return;
     if (carried) {
       Blockly.Events.setGroup(group);
       if (draggable.workspace && (draggable as Blockly.BlockSvg).isDeadOrDying()) carried.remove();
-      else carried.end(joins ? way : this.offset);
+      else carried.end(isConnecting ? offset : this.offset);
       Blockly.Events.setGroup(false);
       return;
     }
-    if (!mouse && meant && !joins && draggable instanceof Blockly.BlockSvg && !draggable.isDeadOrDying()) {
-      listener?.putDown(draggable, meant);
+    if (!mouse && insertionTarget && !isConnecting && draggable instanceof Blockly.BlockSvg && !draggable.isDeadOrDying()) {
+      listener?.placedByKeyboard(draggable, insertionTarget);
     }
-    if (!loose || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
+    if (!isUnconnected || !(draggable instanceof Blockly.BlockSvg) || draggable.isDeadOrDying()) return;
     const before = Blockly.Events.getGroup();
     Blockly.Events.setGroup(group);  // edits caused by the drop belong to its undo step
-    listener?.letGo(draggable, mouse);
+    listener?.dropped(draggable, mouse);
     Blockly.Events.setGroup(before);
   }
 
@@ -219,11 +219,11 @@ class Dragger extends Blockly.dragging.Dragger {
   }
 
   private createOutgoing(event: PointerEvent): OutgoingDrag | null {
-    const copies = event.ctrlKey || event.metaKey;
+    const isCopy = event.ctrlKey || event.metaKey;
     const {workspace} = this.draggable;
     const mouse = Blockly.utils.svgMath.screenToWsCoordinates(workspace, mousePosition(event));
-    return this.carried ? createOutgoingGroupDrag(this.carried.runs, this.carried.notes, copies, mouse) :
-      createOutgoingDrag(this.draggable, this.flyoutScale > 0, copies, mouse);
+    return this.carried ? createOutgoingGroupDrag(this.carried.runs, this.carried.notes, isCopy, mouse) :
+      createOutgoingDrag(this.draggable, this.flyoutScale > 0, isCopy, mouse);
   }
 
   private get listener(): DragListener | undefined {

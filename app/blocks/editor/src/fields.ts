@@ -81,8 +81,8 @@ export class FieldLive extends Blockly.FieldLabel {
   override SERIALIZABLE = false;
 
   /** Shows the text without firing an event; free if the text is the same, cheap if its width is. */
-  show(text: string, old = false): void {
-    this.fieldGroup_?.classList.toggle('nepOld', old);
+  show(text: string, isOutdated = false): void {
+    this.fieldGroup_?.classList.toggle('nepOld', isOutdated);
     if (text === this.value_) return;
     const normalizeDigits = (value: string) => value.replace(/\d/g, '0');
     const hasSameWidth = normalizeDigits(text) === normalizeDigits(String(this.value_ ?? ''));  // all digits have the same width
@@ -203,7 +203,7 @@ export class FieldColourChip extends Blockly.Field {
     other.value = this.value_ ?? '';
     other.spellcheck = false;
     other.maxLength = 7;
-    other.setAttribute('aria-label', t('another colour: # and six hexadecimal digits'));
+    other.setAttribute('aria-label', t('Another colour: # and six hexadecimal digits'));
     other.oninput = () => other.classList.toggle('wrong', this.doClassValidation_(other.value) === null);
     other.onkeydown = (event) => {
       if (event.key === 'Enter' && this.doClassValidation_(other.value) !== null) this.choose(other.value);

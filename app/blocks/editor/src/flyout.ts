@@ -21,7 +21,7 @@ const SCROLLBAR_MARGIN = 2.5;
 export class Flyout extends Blockly.VerticalFlyout {
   override readonly CORNER_RADIUS: number = 0;
   /** Called when the user pins or unpins the flyout. */
-  onPin: (keeps: boolean) => void = () => undefined;
+  onPin: (isPinned: boolean) => void = () => undefined;
   protected readonly header = document.createElement('div');
   private readonly title = document.createElement('span');
   private readonly button = this.createHeaderButton();
@@ -60,11 +60,11 @@ export class Flyout extends Blockly.VerticalFlyout {
     return !this.autoClose;
   }
 
-  setPinned(keeps: boolean): void {
-    this.button.setAttribute('aria-pressed', String(keeps));
-    if (keeps !== this.isPinned) {
+  setPinned(isPinned: boolean): void {
+    this.button.setAttribute('aria-pressed', String(isPinned));
+    if (isPinned !== this.isPinned) {
       this.stickyWidth = 0;
-      this.setAutoClose(!keeps);
+      this.setAutoClose(!isPinned);
     }
     this.updateOverlayOffset();
   }

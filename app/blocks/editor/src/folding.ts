@@ -8,10 +8,10 @@ export function canCollapse(block: Blockly.BlockSvg): boolean {
     block.inputList.some((input) => input.type === Blockly.inputs.inputTypes.STATEMENT);
 }
 
-export function setCollapsed(block: Blockly.BlockSvg, folded: boolean): void {
+export function setCollapsed(block: Blockly.BlockSvg, isCollapsed: boolean): void {
   const group = Blockly.Events.getGroup();
   if (!group) Blockly.Events.setGroup(true);
-  block.setCollapsed(folded);
+  block.setCollapsed(isCollapsed);
   Blockly.Events.setGroup(group);
 }
 

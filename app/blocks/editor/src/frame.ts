@@ -30,9 +30,9 @@ function isArmed(): boolean {
   return button?.getAttribute('aria-pressed') === 'true';
 }
 
-function setArmed(armed: boolean): void {
-  button?.setAttribute('aria-pressed', `${armed}`);
-  document.documentElement.classList.toggle('nepFraming', armed);
+function setArmed(isArmed: boolean): void {
+  button?.setAttribute('aria-pressed', `${isArmed}`);
+  document.documentElement.classList.toggle('nepFraming', isArmed);
 }
 
 interface MarqueeDrag {

@@ -1,4 +1,5 @@
-// Search for a free visible position for new blocks and notes, near the requested one.
+// Search for free positions for new blocks and notes, and separation of scripts that overlap because their
+// translated texts are longer.
 import * as Blockly from 'blockly/core';
 
 const {Rect, Coordinate} = Blockly.utils;
@@ -7,13 +8,15 @@ type Point = Blockly.utils.Coordinate;
 
 /** Gap to existing items; larger than Blockly's snap radius, so that nothing looks connected. */
 const GAP = 34;
+/** Minimum gap between scripts that `separateColumns` moves. */
+const COLUMN_GAP = 20;
 const STEP = 28;
 const MAX_RINGS = 60;
 
-/** Returns the bounds of all stacks and notes except `but`, in workspace units. */
-export function obstacles(workspace: Blockly.WorkspaceSvg, but: ReadonlySet<unknown>): Box[] {
+/** Returns the bounds of all stacks and notes except `excluded`, in workspace units. */
+export function obstacles(workspace: Blockly.WorkspaceSvg, excluded: ReadonlySet<unknown>): Box[] {
   return [...workspace.getTopBlocks(false), ...workspace.getTopComments()]
-    .filter((item) => !but.has(item))
+    .filter((item) => !excluded.has(item))
     .map((item) => (item as Blockly.IBoundedElement).getBoundingRectangle());
 }
 
@@ -65,4 +68,43 @@ export function findFreePosition(target: Point, size: {width: number; height: nu
     hidden ??= position;
   }
   return hidden ?? target;
+}
+
+/**
+ * Moves columns of scripts and notes to the right, and the items of a column down, until no two items overlap.
+ *
+ * The items with the same left edge form a column; they still have a common left edge afterwards, and the order of
+ * the columns and of their items doesn't change. Items that are moved get a gap of at least `COLUMN_GAP`.
+ */
+export function separateColumns(workspace: Blockly.WorkspaceSvg): void {
+  Blockly.renderManagement.triggerQueuedRenders(workspace);
+  const items = [...workspace.getTopBlocks(false), ...workspace.getTopComments()] as Blockly.IBoundedElement[];
+  const columns = new Map<number, {item: Blockly.IBoundedElement; box: Box}[]>();
+  for (const item of items) {
+    const box = item.getBoundingRectangle();
+    const left = Math.round((item as Blockly.BlockSvg).getRelativeToSurfaceXY().x);
+    columns.set(left, [...columns.get(left) ?? [], {item, box}]);
+  }
+  const placedBoxes: Box[] = [];
+  let shiftX = 0;
+  for (const left of [...columns.keys()].sort((a, b) => a - b)) {
+    const column = columns.get(left)!.sort((a, b) => a.box.top - b.box.top);
+    let bottom = -Infinity;
+    for (const entry of column) {
+      const shiftY = Math.max(0, bottom - entry.box.top);
+      entry.item.moveBy(0, shiftY);
+      entry.box = rectAt(new Coordinate(entry.box.left, entry.box.top + shiftY), entry.box.getWidth(), entry.box.getHeight());
+      bottom = entry.box.bottom + COLUMN_GAP;
+    }
+    for (const {box} of column) {
+      for (const other of placedBoxes) {
+        const isBeside = box.top < other.bottom && other.top < box.bottom;
+        if (isBeside) shiftX = Math.max(shiftX, other.right + COLUMN_GAP - box.left);
+      }
+    }
+    for (const {item, box} of column) {
+      item.moveBy(shiftX, 0);
+      placedBoxes.push(rectAt(new Coordinate(box.left + shiftX, box.top), box.getWidth(), box.getHeight()));
+    }
+  }
 }

@@ -54,7 +54,7 @@ export class EmptyCanvas {
     this.robot.classList.add('primary');
     this.addButton(buttons, 'lightbulb', t('Show me'), (event) => this.showFirstBlock(event.detail === 0));
     this.addButton(buttons, 'blocks', t('Open an example'), () => sendCommand('examples'));
-    this.byKeys.textContent = t('With the keyboard: press {toolbox}, choose it with the arrow keys, press Enter to pick it up and Enter again to place it.',
+    this.byKeys.textContent = t('With the keyboard: press {toolbox}, choose the block with the arrow keys, press Enter to pick it up and Enter again to place it.',
       {toolbox: formatShortcut(Blockly.ShortcutItems.names.FOCUS_TOOLBOX)});
     this.box.append(this.dropTarget, this.categoryHint, this.byKeys, buttons);
     this.box.hidden = true;
@@ -101,9 +101,9 @@ export class EmptyCanvas {
     this.categoryHint.textContent = events ? t('You\'ll find it under {category}, on the left.', {category: events.getName()}) : '';
   }
 
-  private showFirstBlock(byKey: boolean): void {
+  private showFirstBlock(isKeyboardClick: boolean): void {
     this.pointer.show({block: FIRST_BLOCK_TYPE, name: this.begin?.first ?? '', then: t('Drag it onto the page')});
-    if (byKey) this.pointer.focusCategory();
+    if (isKeyboardClick) this.pointer.focusCategory();
   }
 
   private addButton(container: HTMLElement, icon: string, label: string, action: (event: MouseEvent) => void): HTMLButtonElement {

@@ -42,14 +42,14 @@ export function focusedBlock(): Blockly.BlockSvg | null {
 
 export class HelpCard {
   private card: HTMLElement | null = null;
-  private back: Blockly.IFocusableNode | null = null;
+  private previousFocus: Blockly.IFocusableNode | null = null;
 
   /** Shows the help of this block; returns false if there is none. */
   show(block: Blockly.BlockSvg | null): boolean {
     const help = block ? isUnknown(block) ? unknownBlockHelp(block) : helpFor(block.type) : null;
     if (!block || !help) return false;
     this.close();
-    this.back = Blockly.getFocusManager().getFocusedNode();
+    this.previousFocus = Blockly.getFocusManager().getFocusedNode();
     this.card = this.createCard(help, block);
     document.body.append(this.card);
     this.card.querySelector<HTMLElement>('button')?.focus();
@@ -61,8 +61,8 @@ export class HelpCard {
     const hadFocus = this.card.contains(document.activeElement);
     this.card.remove();
     this.card = null;
-    if (hadFocus && this.back?.canBeFocused()) Blockly.getFocusManager().focusNode(this.back);
-    this.back = null;
+    if (hadFocus && this.previousFocus?.canBeFocused()) Blockly.getFocusManager().focusNode(this.previousFocus);
+    this.previousFocus = null;
   }
 
   private createCard(help: BlockHelp, block: Blockly.BlockSvg): HTMLElement {

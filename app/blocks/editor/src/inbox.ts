@@ -27,18 +27,18 @@ export class Inbox {
     this.cover.textContent = t('Opening…');
     document.body.append(this.cover);
     let isDone = false;
-    const go = () => {
+    const dispatchQueued = () => {
       if (isDone) return;
       isDone = true;
       const queued = this.waiting ?? [];
       this.waiting = null;
       try {
-        for (const [each, its] of queued) this.receive(each, its);
+        for (const [queuedName, queuedPayload] of queued) this.receive(queuedName, queuedPayload);
       } finally {
         this.cover.remove();
       }
     };
-    window.requestAnimationFrame(() => window.setTimeout(go));
-    window.setTimeout(go, HIDDEN_PAGE_TIMEOUT_MS);
+    window.requestAnimationFrame(() => window.setTimeout(dispatchQueued));
+    window.setTimeout(dispatchQueued, HIDDEN_PAGE_TIMEOUT_MS);
   }
 }

@@ -23,7 +23,7 @@ interface MarkKind {
 }
 
 const MARK_KINDS: readonly MarkKind[] = [
-  {name: 'pause', icon: 'pause', is: hasBreakpoint, words: () => t('The program pauses inside this block. Click to see where')},
+  {name: 'pause', icon: 'pause', is: hasBreakpoint, words: () => t('The program pauses inside this block. Click to see where.')},
   {name: 'note', icon: 'sticky-note', is: hasNote,
     words: (blocks) => t('Contains a note: {text}', {text: blocks.map(getNoteText).filter(Boolean).join(' · ')})},
 ];

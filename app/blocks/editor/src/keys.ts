@@ -119,7 +119,7 @@ export function applyShortcutKeys(): void {
   for (const [key, commands] of Object.entries(registry.getKeyMap())) {
     if (!isTypingKey(key)) continue;
     for (const name of commands) {
-      console.warn(`${name} would be done by typing: it has no key`);
+      console.warn(`Removed the key of ${name}, because it is used for typing`);
       registry.removeKeyMapping(key, name);
     }
   }

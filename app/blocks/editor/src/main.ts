@@ -51,7 +51,7 @@ interface Bridge {
   watch_variables(variables: string): void;
   press_canvas_button(button: string): void;
   try_stack(stack: string): void;
-  pin(keeps: boolean): void;
+  pin(isPinned: boolean): void;
   deleted(count: number): void;
   drag_outside(x: number, y: number, isOutside: boolean, tab: string): void;
   drag_picture(data: string, ratio: number): void;
@@ -83,7 +83,7 @@ class Editor {
       dropped: (x, y) => bridge.dropped(x, y),
       brought: (count, mode, sourceTab) => bridge.transferred(count, mode, sourceTab),
     }, () => this.activeTab);
-    const ofShown = (tab: Tab, notify: () => void) => {
+    const ifActive = (tab: Tab, notify: () => void) => {
       if (tab === this.tabs?.activeTab) notify();
     };
     this.tabs = new Tabs(document.getElementById('workspace')!, {
@@ -91,20 +91,20 @@ class Editor {
         bridge.changed(tab.key, tab.generation, json);
         this.find.refresh();
       },
-      history: (tab, canUndo, canRedo) => ofShown(tab, () => bridge.history(canUndo, canRedo)),
-      selected: (tab, id) => ofShown(tab, () => bridge.selected(id)),
-      offered: (tab) => ofShown(tab, () => this.notifyOfferedSensors()),
-      watched: (tab) => ofShown(tab, () => this.notifyWatched()),
+      history: (tab, canUndo, canRedo) => ifActive(tab, () => bridge.history(canUndo, canRedo)),
+      selected: (tab, id) => ifActive(tab, () => bridge.selected(id)),
+      offered: (tab) => ifActive(tab, () => this.notifyOfferedSensors()),
+      watched: (tab) => ifActive(tab, () => this.notifyWatched()),
       made: (tab) => this.empty.watch(tab.workspace),
-      pinned: (keeps) => {
-        bridge.pin(keeps);
-        this.tabs.setPinned(keeps);
+      pinned: (isPinned) => {
+        bridge.pin(isPinned);
+        this.tabs.setPinned(isPinned);
       },
-      deleted: (tab, count) => ofShown(tab, () => bridge.deleted(count)),
-      binned: (tab) => ofShown(tab, () => this.updateBinButton()),
+      deleted: (tab, count) => ifActive(tab, () => bridge.deleted(count)),
+      binned: (tab) => ifActive(tab, () => this.updateBinButton()),
       outside: (mouse, items) => this.carrying.trackOutside(mouse, items),
-      dragEnded: (isPlaced, copies) => this.carrying.dragEnded(isPlaced, copies),
-      letGoOutside: (tab, drag, mouse) => this.carrying.dropOutside(tab, drag, mouse),
+      dragEnded: (isPlaced, isCopy) => this.carrying.dragEnded(isPlaced, isCopy),
+      droppedOutside: (tab, drag, mouse) => this.carrying.dropOutside(tab, drag, mouse),
     });
     this.tabs.setPinned(pinned);
     // Don't resize for printing, which changes the size of the page temporarily.
@@ -336,7 +336,7 @@ async function loadLocale(requested: string): Promise<string> {
     Blockly.setLocale(await response.json() as Record<string, string>);
     return language;
   }
-  throw new Error('no words for the block editor');
+  throw new Error('no message catalogue of Blockly');
 }
 
 async function start(bridge: Bridge): Promise<void> {

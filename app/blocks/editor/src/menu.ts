@@ -102,7 +102,7 @@ export function registerMenu(clipboard: Clipboard): void {
   block({id: 'nepCut', weight: 12, icon: 'scissors', words: t('Cut'), shortcut: names.CUT,
     when: (scope) => isEditable(scope) && scope.block!.isDeletable(), run: (scope) => clipboard.cut(scope.block)});
   block({id: 'nepPaste', weight: 13, icon: 'clipboard-paste', words: t('Paste'), shortcut: names.PASTE,
-    when: isEditable, run: (_it, location) => clipboard.paste(location)});
+    when: isEditable, run: (_scope, location) => clipboard.paste(location)});
   addSeparator(ScopeType.BLOCK, 50);
   block({id: 'nepCollapse', weight: 51, icon: 'fold-vertical', words: t('Collapse'),
     when: (scope) => isEditable(scope) && targetBlocks(scope.block!).some((target) => !target.isCollapsed() && canCollapse(target)),
@@ -149,7 +149,7 @@ export function registerMenu(clipboard: Clipboard): void {
     when: ({workspace}) => (workspace ? workspace.getTopBlocks(false).length + workspace.getTopComments().length : 0) > 0,
     run: ({workspace}) => workspace && selectAll(workspace)});
   addMenuEntry(ScopeType.WORKSPACE, {id: 'nepPasteHere', weight: 10, icon: 'clipboard-paste', words: t('Paste'),
-    shortcut: names.PASTE, when: () => true, run: (_it, location) => clipboard.paste(location)});
+    shortcut: names.PASTE, when: () => true, run: (_scope, location) => clipboard.paste(location)});
   addSeparator(ScopeType.WORKSPACE, 15);
   addSeparator(ScopeType.WORKSPACE, 35);
   addMenuEntry(ScopeType.WORKSPACE, {id: 'nepNoteHere', weight: 50, icon: 'sticky-note', words: t('Add a note here'),
@@ -171,9 +171,9 @@ export const ADD_TO_BACKPACK = 'nepPack';
 
 /** Backpack operations that the menus use. */
 interface BackpackActions {
-  may(block: Blockly.BlockSvg | undefined): boolean;
-  pack(block: Blockly.BlockSvg): void;
-  isPacked(block: Blockly.BlockSvg): boolean;
+  canAdd(block: Blockly.BlockSvg | undefined): boolean;
+  add(block: Blockly.BlockSvg): void;
+  isInBackpack(block: Blockly.BlockSvg): boolean;
   remove(block: Blockly.BlockSvg): void;
   count(): number;
   open(): void;
@@ -182,9 +182,9 @@ interface BackpackActions {
 
 export function registerBackpackMenu(backpack: BackpackActions): void {
   addMenuEntry(ScopeType.BLOCK, {id: 'nepPack', weight: 14, icon: 'backpack', words: t('Add to backpack'), shortcut: ADD_TO_BACKPACK,
-    when: ({block}) => backpack.may(block), run: ({block}) => block && backpack.pack(block)});
+    when: ({block}) => backpack.canAdd(block), run: ({block}) => block && backpack.add(block)});
   addMenuEntry(ScopeType.BLOCK, {id: 'nepUnpack', weight: 99, icon: 'trash-2', words: t('Remove from backpack'),
-    shortcut: names.DELETE, when: ({block}) => block !== undefined && backpack.isPacked(block),
+    shortcut: names.DELETE, when: ({block}) => block !== undefined && backpack.isInBackpack(block),
     run: ({block}) => block && backpack.remove(block)});
   addMenuEntry(ScopeType.WORKSPACE, {id: 'nepOpenBackpack', weight: 13, icon: 'backpack',
     words: () => t('Open the backpack ({count})', {count: backpack.count()}),
@@ -205,14 +205,14 @@ export function registerPictureMenu(command: (name: string) => void): void {
 // ---- state of a block
 
 /** Disables or enables a block, so that the program skips it; an event block includes its whole script. */
-export function setDisabled(block: Blockly.BlockSvg, off: boolean): void {
+export function setDisabled(block: Blockly.BlockSvg, isDisabled: boolean): void {
   const selected = getSelectedBlocksWith(block);
   withUndoGroup(() => {
-    for (const selectedBlock of selected) selectedBlock.setDisabledReason(off, DISABLED_REASON);
+    for (const selectedBlock of selected) selectedBlock.setDisabledReason(isDisabled, DISABLED_REASON);
     if (selected.length) return;
     const starts = !block.previousConnection && !block.outputConnection;
     for (let current: Blockly.BlockSvg | null = block; current; current = starts ? current.getNextBlock() : null) {
-      current.setDisabledReason(off, DISABLED_REASON);
+      current.setDisabledReason(isDisabled, DISABLED_REASON);
     }
   });
 }

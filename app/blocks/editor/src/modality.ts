@@ -4,9 +4,9 @@ import * as Blockly from 'blockly/core';
 const NAVIGATION_KEYS = /^(Tab|Arrow(Up|Down|Left|Right)|Home|End|PageUp|PageDown|F6)$/;
 
 /** Records whether the last navigation was by keyboard. */
-export function setKeyboardLed(led: boolean): void {
-  document.documentElement.classList.toggle('nepKeys', led);
-  Blockly.keyboardNavigationController.setIsActive(led);
+export function setKeyboardLed(isLed: boolean): void {
+  document.documentElement.classList.toggle('nepKeys', isLed);
+  Blockly.keyboardNavigationController.setIsActive(isLed);
 }
 
 export function isKeyboardLed(): boolean {
@@ -18,7 +18,7 @@ export function trackInputModality(): void {
   document.addEventListener('pointerdown', () => setKeyboardLed(false), true);
   document.addEventListener('keydown', (event) => {
     // In a text field, arrow keys move the cursor.
-    const types = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement;
-    if (NAVIGATION_KEYS.test(event.key) && (!types || event.key === 'Tab')) document.documentElement.classList.add('nepKeys');
+    const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement;
+    if (NAVIGATION_KEYS.test(event.key) && (!isTyping || event.key === 'Tab')) document.documentElement.classList.add('nepKeys');
   }, true);
 }

@@ -67,11 +67,11 @@ const ITEMS = {
 function initItems(this: ItemsBlock): void {
   this.items = 0;
   const row = this.appendDummyInput('BUTTONS');
-  appendButtons(this, row, t('remove the last slot'), t('add a slot'), (by) => this.showItems(this.items + by));
-  const recording = Blockly.Events.isEnabled();
-  if (recording) Blockly.Events.disable();
+  appendButtons(this, row, t('Remove the last slot'), t('Add a slot'), (by) => this.showItems(this.items + by));
+  const wasEnabled = Blockly.Events.isEnabled();
+  if (wasEnabled) Blockly.Events.disable();
   this.showItems(3);
-  if (recording) Blockly.Events.enable();
+  if (wasEnabled) Blockly.Events.enable();
 }
 
 // ---- branches of an "if"
@@ -81,7 +81,7 @@ const MAX_ELSE_IFS = 20;
 interface BranchesBlock extends Blockly.Block {
   elseIfs: number;
   hasElse: boolean;
-  /** Whether the block has an "else" by default; the file stores nothing for the default shape. */
+  /** True if the block has an "else" by default; the file stores nothing for the default shape. */
   beginsWithElse: boolean;
   showBranches(elseIfs: number, hasElse: boolean): void;
 }
@@ -120,13 +120,13 @@ const BRANCHES = {
 };
 
 function createRemoveButton(block: BranchesBlock, number: number): FieldButton {
-  return new FieldButton('minus', t('remove this branch'), () => removeBranch(block, number));
+  return new FieldButton('minus', t('Remove this branch'), () => removeBranch(block, number));
 }
 
 function initBranches(this: BranchesBlock): void {
   this.elseIfs = 0;
   this.hasElse = this.beginsWithElse = this.getInput('ELSE') !== null;
-  this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('add a branch'), () => addBranch(this)));
+  this.appendDummyInput('MORE').appendField(new FieldButton('plus', t('Add a branch'), () => addBranch(this)));
   this.moveInputBefore('MORE', 'BODY');
   const row = this.inputList[this.inputList.findIndex((input) => input.name === 'ELSE') - 1];
   if (!this.hasElse || !row) return;
@@ -228,7 +228,7 @@ const FUNCTION = {
     this.own = inputs.map((input) => ({...input}));
     if (inputs.length) row.appendField(t('with'), 'WITH');
     this.own.forEach((input, number) => row.appendField(nameField(this, input), `INPUT${number}`));
-    appendButtons(this, row, t('remove the last input'), t('add an input'), (by) => shapeInputs(this, by, this.own.length - 1));
+    appendButtons(this, row, t('Remove the last input'), t('Add an input'), (by) => shapeInputs(this, by, this.own.length - 1));
   },
 };
 
@@ -240,7 +240,7 @@ function nameField(block: DefinitionBlock, input: FunctionInput): Blockly.Field 
     if (ownInput) ownInput.name = name;
     return name;
   });
-  field.setTooltip(t('input name'));
+  field.setTooltip(t('Input name'));
   return field;
 }
 
@@ -323,8 +323,8 @@ function initCall(this: CallBlock): void {
 /** Updates a call with the name and inputs of its function. */
 export function updateCall(call: CallBlock, definition: DefinitionBlock): void {
   const name = functionName(definition);
-  const same = call.target === definition.id && call.called === name && JSON.stringify(call.own) === JSON.stringify(definition.own);
-  if (!same) reshape(call, () => call.showCall(definition.id, name, definition.own));
+  const isUpToDate = call.target === definition.id && call.called === name && JSON.stringify(call.own) === JSON.stringify(definition.own);
+  if (!isUpToDate) reshape(call, () => call.showCall(definition.id, name, definition.own));
 }
 
 // ---- input inside a function

@@ -1,5 +1,5 @@
 // Number field that accepts comma and point as decimal separators (Blockly's removes commas: 0,2 becomes 2) and
-// rejects invalid text with a message; the field then keeps its value.
+// rejects invalid text with a message; the field then keptValueText its value.
 import * as Blockly from 'blockly/core';
 import {Hint} from './hint';
 import {parseNumber, type Rejection} from './typed_number';
@@ -20,8 +20,8 @@ class NumberField extends Blockly.FieldNumber {
     return typeof number === 'number' && Number.isFinite(number) ? super.doClassValidation_(number) : null;
   }
 
-  protected override doValueInvalid_(value: unknown, fires = true): void {
-    super.doValueInvalid_(value, fires);
+  protected override doValueInvalid_(value: unknown, fireChangeEvent = true): void {
+    super.doValueInvalid_(value, fireChangeEvent);
     if (!this.isBeingEdited_) return;
     const typed = String(value);
     const problem = parseNumber(typed);
@@ -38,8 +38,8 @@ class NumberField extends Blockly.FieldNumber {
 
   override onFinishEditing_(value: unknown): void {
     super.onFinishEditing_(value);
-    const keeps = t('The value stays {number}.', {number: String(value)});
-    if (this.problem) this.showHint(`${t(REJECTION_MESSAGES[this.problem])} ${keeps}`);
+    const keptValueText = t('The value stays {number}.', {number: String(value)});
+    if (this.problem) this.showHint(`${t(REJECTION_MESSAGES[this.problem])} ${keptValueText}`);
     this.problem = null;
   }
 

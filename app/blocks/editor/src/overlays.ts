@@ -13,7 +13,7 @@ const FRAME_INTERVAL_MS = 66;
 export class Overlays {
   private running = new Set<string>();
   private next: string[] = [];
-  private resting = 0;
+  private throttleTimer = 0;
   private stopped = new Set<string>();
   private errors = new Map<string, string>();
   private warnings = new Map<string, string>();
@@ -31,11 +31,11 @@ export class Overlays {
   /** Highlights the running blocks: at once, then throttled, because each update repaints the whole page. */
   highlight(ids: string[]): void {
     this.next = ids;
-    if (this.resting) return;
+    if (this.throttleTimer) return;
     this.running = new Set(ids);
     this.updateOutlines();
-    this.resting = window.setTimeout(() => {
-      this.resting = 0;
+    this.throttleTimer = window.setTimeout(() => {
+      this.throttleTimer = 0;
       const {next} = this;
       if (next.length !== this.running.size || next.some((id) => !this.running.has(id))) this.highlight(next);
     }, FRAME_INTERVAL_MS);
@@ -73,8 +73,8 @@ export class Overlays {
 
   /** Clears all states after another program was loaded. */
   reset(): void {
-    window.clearTimeout(this.resting);
-    this.resting = 0;
+    window.clearTimeout(this.throttleTimer);
+    this.throttleTimer = 0;
     this.next = [];
     this.running = new Set();
     this.stopped = new Set();

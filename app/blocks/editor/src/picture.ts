@@ -62,7 +62,7 @@ export function renderItems(workspace: Blockly.WorkspaceSvg, patterns: Map<strin
  * Returns the picture, or null if the canvas is empty. Uses the current theme: call with the light theme, except
  * for a drag image (`only`).
  */
-export async function createPicture(workspace: Blockly.WorkspaceSvg, white: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
+export async function createPicture(workspace: Blockly.WorkspaceSvg, hasWhiteBackground: boolean, only?: ReadonlySet<unknown>): Promise<Picture | null> {
   const patterns = new Map<string, SVGElement>();
   const renderedItems = renderItems(workspace, patterns, only);
   if (!renderedItems.length) return null;
@@ -80,7 +80,7 @@ export async function createPicture(workspace: Blockly.WorkspaceSvg, white: bool
   const defs = document.createElementNS(SVG_NS, 'defs');
   defs.append(...patterns.values());
   root.append(style, defs);
-  if (white) {
+  if (hasWhiteBackground) {
     const ground = document.createElementNS(SVG_NS, 'rect');
     for (const [name, value] of Object.entries({x: left, y: top, width, height, fill: '#ffffff'})) ground.setAttribute(name, `${value}`);
     root.append(ground);

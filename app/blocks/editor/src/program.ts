@@ -2,7 +2,7 @@
 import * as Blockly from 'blockly/core';
 import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
-import {findFreePosition, visibleArea, obstacles} from './free_place';
+import {findFreePosition, separateColumns, visibleArea, obstacles} from './free_place';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
 import {NamelessVariables} from './nameless_variables';
 import {flushTypedText} from './notes';
@@ -17,6 +17,11 @@ export interface Listener {
 }
 
 const DEBOUNCE_MS = 150;
+/**
+ * Top-level key of the example files, whose scripts can overlap because translated texts are longer: after loading,
+ * the editor moves these scripts apart. The key isn't saved with the new positions.
+ */
+const SEPARATE_SCRIPTS_KEY = 'separateScripts';
 
 export class Program {
   /** Top-level keys of the file without a Blockly serializer; saved unchanged. */
@@ -24,7 +29,7 @@ export class Program {
   private lastNotifiedJson = '';
   private timer = 0;
   private lastNotifiedHistory = 'false false';
-  private loading = false;
+  private isLoading = false;
   private readonly nameless: NamelessVariables;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly culling: Culling,
@@ -83,7 +88,7 @@ export class Program {
   /** Stops all notifications. */
   dispose(): void {
     window.clearTimeout(this.timer);
-    this.loading = true;
+    this.isLoading = true;
   }
 
   /** Recreates the blocks after their definitions changed; keeps the undo history, scroll position and selection. */
@@ -145,18 +150,18 @@ export class Program {
   }
 
   private replace(state: Json): void {
-    this.loading = true;
+    this.isLoading = true;
     Blockly.Events.disable();
     try {
       this.loadBlocks(state);
     } finally {
       Blockly.Events.enable();
-      this.loading = false;
+      this.isLoading = false;
     }
   }
 
-  private loadBlocks(state: Json, how: {recordUndo?: boolean} = {}): void {
-    const {blocks, ...others} = state;
+  private loadBlocks(state: Json, options: {recordUndo?: boolean} = {}): void {
+    const {blocks, [SEPARATE_SCRIPTS_KEY]: separateScripts, ...others} = state;
     const tops = (blocks as {blocks?: unknown} | undefined)?.blocks;
     this.rest = Object.fromEntries(Object.entries(others).filter(([name]) =>
       !Blockly.registry.hasItem(Blockly.registry.Type.SERIALIZER, name)));
@@ -164,38 +169,39 @@ export class Program {
     this.workspace.setResizesEnabled(false);
     Blockly.utils.dom.startTextWidthCache();
     try {
-      this.loadOthers(others, how);
+      this.loadOthers(others, options);
       this.nameless.create(Array.isArray(tops) ? tops as BlockState[] : []);
       this.workspace.setResizesEnabled(false);
       withoutTypeChecks(() => withDeferredAria(() => {
-        for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);
+        for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, options);
       }));
     } finally {
       Blockly.utils.dom.stopTextWidthCache();
       this.workspace.setResizesEnabled(true);
       this.culling.scheduleUpdate();
     }
+    if (separateScripts === true) separateColumns(this.workspace);
   }
 
   /** Clears the workspace and loads the state other than blocks (variables); saves an unreadable state unchanged. */
-  private loadOthers(others: Json, how: {recordUndo?: boolean}): void {
+  private loadOthers(others: Json, options: {recordUndo?: boolean}): void {
     try {
-      Blockly.serialization.workspaces.load(others, this.workspace, how);
+      Blockly.serialization.workspaces.load(others, this.workspace, options);
     } catch (error) {
-      console.warn(`kept unread: ${String(error)}`);
+      console.warn(`The state can't be loaded and is saved unchanged: ${String(error)}`);
       this.workspace.clear();
       this.rest = others;
     }
   }
 
-  private append(state: BlockState, how: {recordUndo?: boolean}): void {
+  private append(state: BlockState, options: {recordUndo?: boolean}): void {
     const before = this.workspace.getTopBlocks(false).length;
     try {
-      Blockly.serialization.blocks.append(wrapUnknown(state) as Blockly.serialization.blocks.State, this.workspace, how);
+      Blockly.serialization.blocks.append(wrapUnknown(state) as Blockly.serialization.blocks.State, this.workspace, options);
     } catch (error) {
-      console.warn(`kept whole: ${String(error)}`);
+      console.warn(`The stack can't be created and is saved unchanged: ${String(error)}`);
       for (const block of this.workspace.getTopBlocks(false).slice(before)) block.dispose(false);
-      Blockly.serialization.blocks.append(wrapWholeStack(state) as Blockly.serialization.blocks.State, this.workspace, how);
+      Blockly.serialization.blocks.append(wrapWholeStack(state) as Blockly.serialization.blocks.State, this.workspace, options);
     }
     this.culling.hide(this.workspace.getTopBlocks(false).slice(before));
   }
@@ -204,7 +210,7 @@ export class Program {
     if (event.type === Blockly.Events.SELECTED) {
       this.listener.selected((event as Blockly.Events.Selected).newElementId ?? '');
     }
-    if (event.isUiEvent || this.loading || event.type === Blockly.Events.FINISHED_LOADING) return;
+    if (event.isUiEvent || this.isLoading || event.type === Blockly.Events.FINISHED_LOADING) return;
     if (event.type === Blockly.Events.BLOCK_DELETE) this.dropEmptyUndoGroup(event.group);
     this.notifyHistory();
     window.clearTimeout(this.timer);

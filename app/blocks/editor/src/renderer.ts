@@ -6,18 +6,16 @@ export type BlockState = 'running' | 'stopped' | 'error';
 type Shape = [path: string, offset: Blockly.utils.Coordinate, rtl: boolean];
 
 const SVG_NS = 'http://www.w3.org/2000/svg';
-/**
- * Delay before a running block glows: 30 glows per second of short blocks cost half a CPU core.
- * GLOW_WIDTHS: widths of the stacked strokes; cheaper to repaint than a blur.
- */
-const GLOW_AFTER_MS = 150;
+/** Delay before a running block glows: 30 glows per second of short blocks cost half a CPU core. */
+const GLOW_DELAY_MS = 150;
+/** Widths of the stacked strokes of a glow, which is cheaper to repaint than a blur. */
 const GLOW_WIDTHS = [19, 15, 11, 7];
 
 /** Path object that can draw an outline above all children of the block. */
 export class StatePath extends Blockly.zelos.PathObject {
   private state: BlockState | null = null;
   private marks: SVGGElement[] = [];
-  private glowing = 0;
+  private glowTimer = 0;
   /** Connection highlights that aren't drawn yet; drawn on demand because they are a fifth of all SVG elements. */
   private readonly undrawn = new Map<Blockly.RenderedConnection, Shape>();
 
@@ -48,34 +46,34 @@ export class StatePath extends Blockly.zelos.PathObject {
   }
 
   /** Style name of the surrounding block, '' if there is none. Blocks of one stack share it. */
-  private around = '';
+  private surroundingStyle = '';
   private selection: SVGGElement | null = null;
-  private selected = false;
+  private isSelected = false;
   private isMultiSelected = false;
 
   override applyColour(block: Blockly.BlockSvg): void {
     super.applyColour(block);
     const parent = block.getParent();
     const above = parent && pathOf(parent);
-    const around = !parent ? '' : parent.getNextBlock() === block ? above?.around ?? '' : parent.getStyleName();
+    const surroundingStyle = !parent ? '' : parent.getNextBlock() === block ? above?.surroundingStyle ?? '' : parent.getStyleName();
     // Only the parent of the first block in a stack changes; the blocks below move with it.
     let next: Blockly.BlockSvg | null = block;
     for (let path: StatePath | null = this; next && path; next = next.getNextBlock(), path = next && pathOf(next)) {
-      if (next !== block && path.around === around) break;
-      path.setSurroundingStyle(around, next);
+      if (next !== block && path.surroundingStyle === surroundingStyle) break;
+      path.setSurroundingStyle(surroundingStyle, next);
     }
   }
 
   /** Sets the surrounding style; a block inside one of the same style gets a light edge. */
-  private setSurroundingStyle(around: string, block: Blockly.BlockSvg): void {
-    this.around = around;
-    this.setClass_('nepInside', around !== '' && !block.isShadow() && around === block.getStyleName());
+  private setSurroundingStyle(surroundingStyle: string, block: Blockly.BlockSvg): void {
+    this.surroundingStyle = surroundingStyle;
+    this.setClass_('nepInside', surroundingStyle !== '' && !block.isShadow() && surroundingStyle === block.getStyleName());
   }
 
   /** Draws the selection outline in two tones: one contrasts with every block, the other with every canvas. */
   override updateSelected(enable: boolean): void {
     this.setClass_('blocklySelected', enable);
-    this.selected = enable;
+    this.isSelected = enable;
     this.updateOutline();
   }
 
@@ -87,10 +85,10 @@ export class StatePath extends Blockly.zelos.PathObject {
   }
 
   private updateOutline(): void {
-    const outlined = this.selected || this.isMultiSelected;
-    if (outlined === (this.selection !== null)) return;
+    const isOutlined = this.isSelected || this.isMultiSelected;
+    if (isOutlined === (this.selection !== null)) return;
     this.selection?.remove();
-    this.selection = outlined ? this.createGroup('nepSelection', 'nepSelected', [7, 3]) : null;
+    this.selection = isOutlined ? this.createGroup('nepSelection', 'nepSelected', [7, 3]) : null;
     if (this.selection) this.svgRoot.append(this.selection);
   }
 
@@ -104,14 +102,14 @@ export class StatePath extends Blockly.zelos.PathObject {
   setState(state: BlockState | null): void {
     if (state === this.state) return;
     this.state = state;
-    window.clearTimeout(this.glowing);
+    window.clearTimeout(this.glowTimer);
     for (const mark of this.marks) mark.remove();
     this.marks = [];
     if (!state) return;
     // The outline is drawn above the children of the block, the glow behind the block.
     const outline = this.addMark(`nepState nepState-${state}`, 'nepOutline', [state === 'running' ? 4 : 3]);
     this.svgRoot.append(outline);
-    if (state === 'running') this.glowing = window.setTimeout(() => this.addGlow(), GLOW_AFTER_MS);
+    if (state === 'running') this.glowTimer = window.setTimeout(() => this.addGlow(), GLOW_DELAY_MS);
   }
 
   private addGlow(): void {

@@ -40,8 +40,8 @@ interface IndexedEntry {
   choices: string[];
   /** Words for which this entry ranks above entries with the word in their title. */
   leads: Set<string>;
-  lists: [text: string, worth: number, ofBeginning: number, first: number][];
-  told: string;
+  lists: [text: string, wordScore: number, prefixScore: number, firstWordScore: number][];
+  descriptionText: string;
 }
 
 /** Score of a leading word; above the highest title score. */
@@ -66,7 +66,7 @@ function indexEntry(entry: Entry): IndexedEntry {
     leads: new Set(leads),
     lists: [[title, 7, 6.5, 9], [choices.join(' '), 7, 5, 7], [list(help?.words ?? ''), 6, 5.5, 8],
       [list(help?.english ?? ''), 4, 3.5, 5]],
-    told: normalize(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
+    descriptionText: normalize(`${help?.does ?? ''} ${help?.more ?? ''} ${help?.gaps.map(([, words]) => words).join(' ') ?? ''}`),
   };
 }
 
@@ -76,18 +76,18 @@ function indexEntry(entry: Entry): IndexedEntry {
  * A whole word scores higher than a prefix, and the first word of a list higher than the others: it is the first
  * word on the block or its most common synonym.
  */
-function scoreOf({title, leads, lists, told}: IndexedEntry, word: string): number {
+function scoreOf({title, leads, lists, descriptionText}: IndexedEntry, word: string): number {
   if (leads.has(word)) return LEAD_SCORE;
-  const scores = lists.map(([text, worth, ofBeginning, first]) => `${text} `.startsWith(`${word} `) ? first :
-    ` ${text} `.includes(` ${word} `) ? worth : ` ${text}`.includes(` ${word}`) ? ofBeginning : 0);
+  const scores = lists.map(([text, wordScore, prefixScore, firstWordScore]) => `${text} `.startsWith(`${word} `) ? firstWordScore :
+    ` ${text} `.includes(` ${word} `) ? wordScore : ` ${text}`.includes(` ${word}`) ? prefixScore : 0);
   if (scores.some(Boolean)) return Math.max(...scores);
   if (word.length >= MIN_FUZZY_LENGTH - 1 && title.includes(word)) return MIN_TITLE_SCORE;
-  return ` ${told}`.includes(` ${word}`) ? 1 : 0;
+  return ` ${descriptionText}`.includes(` ${word}`) ? 1 : 0;
 }
 
 function fuzzyScoreOf({lists}: IndexedEntry, word: string): number {
-  const scores = lists.map(([text, worth, , first]) => !hasSimilarWord(text, word) ? 0 :
-    hasSimilarWord(text.split(' ', 1)[0] ?? '', word) ? first : worth);
+  const scores = lists.map(([text, wordScore, , firstWordScore]) => !hasSimilarWord(text, word) ? 0 :
+    hasSimilarWord(text.split(' ', 1)[0] ?? '', word) ? firstWordScore : wordScore);
   return scores.some(Boolean) ? MIN_TITLE_SCORE + Math.max(...scores) / 10 : 0;
 }
 
@@ -101,24 +101,24 @@ export function findEntries(entries: Entry[], query: string, limit = 40): Entry[
   const queryWords = [...new Set(normalize(query).split(/[\s,]+/).filter(Boolean))];
   if (!queryWords.length) return [];
   const indexedEntries = entries.map(indexEntry);
-  const worths = queryWords.map((word) => {
+  const scoresByWord = queryWords.map((word) => {
     const exact = indexedEntries.map((indexed) => scoreOf(indexed, word));
     return exact.some(Boolean) ? exact : indexedEntries.map((indexed) => fuzzyScoreOf(indexed, word));
   });
   const fullQuery = queryWords.join(' ');
   const results = entries.map((entry, index) => {
-    const scores = worths.map((wordScores) => wordScores[index] ?? 0);
+    const scores = scoresByWord.map((wordScores) => wordScores[index] ?? 0);
     const {title, choices} = indexedEntries[index] as IndexedEntry;
-    const begins = title.startsWith(fullQuery) || choices.some((choice) => `${choice} `.startsWith(`${fullQuery} `));
+    const isPrefix = title.startsWith(fullQuery) || choices.some((choice) => `${choice} `.startsWith(`${fullQuery} `));
     return {
       entry,
-      answered: scores.every(Boolean) ? queryWords.length : scores.filter((worth) => worth >= MIN_TITLE_SCORE).length,
-      worth: scores.reduce((sum, score) => sum + score, 0) / queryWords.length + (begins ? 5 : 0),
+      matchedWords: scores.every(Boolean) ? queryWords.length : scores.filter((score) => score >= MIN_TITLE_SCORE).length,
+      score: scores.reduce((sum, score) => sum + score, 0) / queryWords.length + (isPrefix ? 5 : 0),
     };
   });
-  const best = Math.max(...results.map(({answered}) => answered));
-  return results.filter(({answered}) => answered > 0 && answered === best)
-    .sort((result, other) => other.worth - result.worth)
+  const best = Math.max(...results.map(({matchedWords}) => matchedWords));
+  return results.filter(({matchedWords}) => matchedWords > 0 && matchedWords === best)
+    .sort((result, other) => other.score - result.score)
     .slice(0, limit).map(({entry}) => entry);
 }
 
@@ -202,13 +202,13 @@ export class FindBar {
     event.preventDefault();
   }
 
-  private search(moves = true): void {
+  private search(shouldSelectMatch = true): void {
     const query = normalize(this.input.value);
     const before = this.matches[this.currentIndex];
     const all = query ? this.workspace().getAllBlocks(true).filter((block) => !block.isInsertionMarker()) : [];
     this.setMatches(all.filter((block) => blockText(block).includes(query)));
     this.currentIndex = before ? this.matches.indexOf(before) : -1;
-    if (this.currentIndex < 0 && moves && this.matches.length) this.step(1);
+    if (this.currentIndex < 0 && shouldSelectMatch && this.matches.length) this.step(1);
     else this.render();
   }
 

@@ -24,7 +24,7 @@ const selections = new WeakMap<Blockly.Workspace, Selection>();
 export class Selection {
   private selectedItems = new Set<Item>();
   /** Pointer press on an item that may become a click. */
-  private pressed: {x: number; y: number; item: Item; toggles: boolean; before: Item | null} | null = null;
+  private pressed: {x: number; y: number; item: Item; isToggle: boolean; before: Item | null} | null = null;
 
   constructor(readonly workspace: Blockly.WorkspaceSvg) {
     selections.set(workspace, this);
@@ -78,7 +78,7 @@ export class Selection {
 
   /** Clears the selection when an item outside it gets the focus. */
   onFocus(item: Item): void {
-    if (this.selectedItems.size && !this.pressed?.toggles && !this.findSelectedAncestor(item)) this.clear();
+    if (this.selectedItems.size && !this.pressed?.isToggle && !this.findSelectedAncestor(item)) this.clear();
   }
 
   private onDown(event: PointerEvent): void {
@@ -90,7 +90,7 @@ export class Selection {
     const item = this.findSelectedAncestor(under) ?? (isNote(under) ? under : getNonShadowBlock(under));
     const before = Blockly.common.getSelected();
     this.pressed = {x: event.clientX, y: event.clientY, item,
-      toggles: event.shiftKey || event.ctrlKey || event.metaKey,
+      isToggle: event.shiftKey || event.ctrlKey || event.metaKey,
       before: isItem(before) && before.workspace === this.workspace ? before : null};
   }
 
@@ -99,7 +99,7 @@ export class Selection {
     if (!pressed) return;
     const isClick = Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < CLICK_TOLERANCE_PX;
     if (isClick && !this.workspace.isDragging()) {
-      if (pressed.toggles) {
+      if (pressed.isToggle) {
         this.workspace.getGesture(event)?.cancel();  // a click would open the field under the pointer
         this.toggle(pressed.item, pressed.before);
       } else if (event.button === 0) this.clear();

@@ -21,7 +21,7 @@ export abstract class Sheet extends Flyout {
   remove(_block: Blockly.BlockSvg): void {}
 
   /** Accessible label of the close button. */
-  protected abstract get closes(): string;
+  protected abstract get closeLabel(): string;
 
   override autoHide(onlyClosePopups: boolean): void {
     if (!onlyClosePopups) this.hide();
@@ -39,7 +39,7 @@ export abstract class Sheet extends Flyout {
     const close = document.createElement('button');
     close.type = 'button';
     close.title = t('Close (Esc)');
-    close.setAttribute('aria-label', this.closes);
+    close.setAttribute('aria-label', this.closeLabel);
     close.append(iconElement('x', 16));
     close.onclick = () => this.hide();
     return close;
@@ -87,6 +87,6 @@ export function activateClicked(block: Blockly.BlockSvg | null): boolean {
 
 /** A click on a field in a sheet picks the stack too: stored blocks can't be edited. */
 const baseIsClickableInFlyout = Blockly.Field.prototype.isClickableInFlyout;
-Blockly.Field.prototype.isClickableInFlyout = function (this: Blockly.Field, closes: boolean) {
-  return !sheetOf(this.getSourceBlock()) && baseIsClickableInFlyout.call(this, closes);
+Blockly.Field.prototype.isClickableInFlyout = function (this: Blockly.Field, isAutoClosing: boolean) {
+  return !sheetOf(this.getSourceBlock()) && baseIsClickableInFlyout.call(this, isAutoClosing);
 };

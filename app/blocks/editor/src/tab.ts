@@ -37,7 +37,7 @@ export interface TabListener {
   /** The sensors shown in the toolbox may have changed. */
   offered(tab: Tab): void;
   /** The user has pinned or unpinned the flyout. */
-  pinned(keeps: boolean): void;
+  pinned(isPinned: boolean): void;
   /** The user has deleted `count` blocks in one step. */
   deleted(tab: Tab, count: number): void;
   /** The number of deletions in the bin has changed. */
@@ -45,9 +45,9 @@ export interface TabListener {
   /** The dragged items are outside the page at this position; null: they are inside again. */
   outside(mouse: Blockly.utils.Coordinate | null, items?: readonly Item[]): void;
   /** The dragged items were dropped outside the page. */
-  letGoOutside(tab: Tab, leaving: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
+  droppedOutside(tab: Tab, drag: OutgoingDrag, mouse: Blockly.utils.Coordinate): void;
   /** A drag has ended; see `DragListener`. */
-  dragEnded(placed: boolean, copies: boolean): void;
+  dragEnded(isPlaced: boolean, isCopy: boolean): void;
 }
 
 export class Tab {
@@ -67,8 +67,8 @@ export class Tab {
   /** Block types whose definitions have changed since the last update of this tab. */
   private readonly outdated = new Set<string>();
   private toolboxDefinition: unknown = null;
-  private choicesOutdated = false;
-  private themeOutdated = false;
+  private areChoicesOutdated = false;
+  private isThemeOutdated = false;
 
   constructor(container: HTMLElement, listener: TabListener) {
     this.frame.className = 'nepTab';
@@ -102,11 +102,11 @@ export class Tab {
     this.rejectedDrops = new RejectedDrops(this.workspace);
     setDragListener(this.workspace, {
       overDelete: (mouse) => this.bin.showHint(mouse),
-      letGo: (block, mouse) => this.rejectedDrops.explainDrop(block, mouse),
-      putDown: (block, target) => this.rejectedDrops.explainKeyboardDrop(block, target),
+      dropped: (block, mouse) => this.rejectedDrops.explainDrop(block, mouse),
+      placedByKeyboard: (block, target) => this.rejectedDrops.explainKeyboardDrop(block, target),
       outside: (mouse, items) => listener.outside(mouse, items),
-      ended: (placed, copies) => listener.dragEnded(placed, copies),
-      letGoOutside: (leaving, mouse) => listener.letGoOutside(this, leaving, mouse),
+      ended: (isPlaced, isCopy) => listener.dragEnded(isPlaced, isCopy),
+      droppedOutside: (drag, mouse) => listener.droppedOutside(this, drag, mouse),
     });
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox) toolbox.onResultsShown = () => this.overlays.renderLiveValues();
@@ -120,7 +120,7 @@ export class Tab {
       },
     });
     listener.made(this);
-    if (flyout instanceof Flyout) flyout.onPin = (keeps) => listener.pinned(keeps);
+    if (flyout instanceof Flyout) flyout.onPin = (isPinned) => listener.pinned(isPinned);
   }
 
   /** Loads another program and clears the undo history. */
@@ -159,10 +159,10 @@ export class Tab {
     this.culling.scheduleUpdate();
   }
 
-  /** Pins or unpins the flyout of the open category; `closes`: unpinning also closes it. */
-  setPinned(keeps: boolean, closes = false): void {
+  /** Pins or unpins the flyout of the open category; `shouldClose`: unpinning also shouldClose it. */
+  setPinned(isPinned: boolean, shouldClose = false): void {
     const toolbox = this.workspace.getToolbox();
-    if (toolbox instanceof Toolbox) toolbox.setPinned(keeps, closes);
+    if (toolbox instanceof Toolbox) toolbox.setPinned(isPinned, shouldClose);
   }
 
   /** Flushes pending edits and hides the tab; later updates are applied in `show`. */
@@ -198,36 +198,36 @@ export class Tab {
   }
 
   themeChanged(): void {
-    this.themeOutdated = true;
+    this.isThemeOutdated = true;
     if (!this.frame.hidden) this.update();
   }
 
-  definitionsChanged(types: Iterable<string>, toolbox: unknown, choices: boolean): void {
+  definitionsChanged(types: Iterable<string>, toolbox: unknown, haveChoicesChanged: boolean): void {
     for (const type of types) this.outdated.add(type);
     this.toolboxDefinition = toolbox;
-    this.choicesOutdated ||= choices;
+    this.areChoicesOutdated ||= haveChoicesChanged;
     if (!this.frame.hidden) this.update();
   }
 
   /** Applies the changes of theme, definitions and toolbox that arrived while the tab was hidden. */
   private update(): void {
-    if (this.themeOutdated) this.workspace.setTheme(makeTheme());
-    const rebuilt = this.outdated.size > 0 && hasBlockOfTypes(this.workspace, this.outdated);
-    if (rebuilt) {
+    if (this.isThemeOutdated) this.workspace.setTheme(makeTheme());
+    const isRebuilt = this.outdated.size > 0 && hasBlockOfTypes(this.workspace, this.outdated);
+    if (isRebuilt) {
       this.program.flush();
       this.program.rebuild();
       this.functions.refresh();
-    this.variables.refresh();
+      this.variables.refresh();
     }
-    if (this.themeOutdated || rebuilt) this.overlays.restore();
+    if (this.isThemeOutdated || isRebuilt) this.overlays.restore();
     const toolbox = this.workspace.getToolbox();
     if (toolbox instanceof Toolbox && this.toolboxDefinition) {
       toolbox.update(this.toolboxDefinition, this.outdated.size > 0);
     }
-    if (this.choicesOutdated) this.refreshChoices();
+    if (this.areChoicesOutdated) this.refreshChoices();
     this.outdated.clear();
     this.toolboxDefinition = null;
-    this.choicesOutdated = this.themeOutdated = false;
+    this.areChoicesOutdated = this.isThemeOutdated = false;
   }
 
   private refreshChoices(): void {

@@ -30,8 +30,8 @@ export class Tabs {
   activeTab: Tab;
   private waiting: Definitions | null = null;
   private toolbox: unknown = {contents: []};
-  /** Whether the flyout is pinned; null: depends on the width of the page. */
-  private pinned: boolean | null = null;
+  /** True if the flyout is pinned, false if not; null: depends on the width of the page. */
+  private isPinned: boolean | null = null;
 
   constructor(private readonly container: HTMLElement, private readonly listener: TabListener) {
     this.activeTab = this.createTab();
@@ -55,20 +55,20 @@ export class Tabs {
   }
 
   /** Pins (true) or unpins (false) the flyout; null: pinned while the page is wide enough. */
-  setPinned(pinned: boolean | null): void {
-    this.pinned = pinned;
-    this.activeTab.setPinned(this.staysOpen, pinned === null);
+  setPinned(isPinned: boolean | null): void {
+    this.isPinned = isPinned;
+    this.activeTab.setPinned(this.staysOpen, isPinned === null);
   }
 
   /** Adapts the visible tab to the size of the page. */
   resize(): void {
     this.activeTab.resize();
-    if (this.pinned === null) this.activeTab.setPinned(this.staysOpen, true);
+    if (this.isPinned === null) this.activeTab.setPinned(this.staysOpen, true);
   }
 
   private get staysOpen(): boolean {
     const toolbox = this.activeTab.workspace.getMetricsManager().getToolboxMetrics().width;
-    return this.pinned ?? this.container.clientWidth - toolbox >= MIN_PINNED_WIDTH;
+    return this.isPinned ?? this.container.clientWidth - toolbox >= MIN_PINNED_WIDTH;
   }
 
   themeChanged(): void {
@@ -92,11 +92,11 @@ export class Tabs {
     return this.tabs.has(this.activeTab.key) ? null : this.activeTab;
   }
 
-  private activate(tab: Tab, keeps = true): void {
+  private activate(tab: Tab, isPreviousKept = true): void {
     const before = this.activeTab;
     if (tab === before) return;
     const hadFocus = before.hasFocus;
-    if (keeps) before.hide();
+    if (isPreviousKept) before.hide();
     this.activeTab = tab;
     tab.show();
     tab.setPinned(this.staysOpen, true);
@@ -120,10 +120,10 @@ export class Tabs {
     this.waiting = null;
     if (!definitions) return;
     setHelp(definitions.help ?? {});
-    const {changed, sources} = defineBlocks(definitions.blocks ?? []);
+    const {changed, haveSourcesChanged} = defineBlocks(definitions.blocks ?? []);
     const topics = (definitions.topics ?? []).map((topic): Option => [topic, topic]);
-    const more = defineSources({topics, ...definitions.sources});
+    const haveOptionsChanged = defineSources({topics, ...definitions.sources});
     this.toolbox = {contents: [], ...definitions.toolbox};
-    for (const tab of this.all()) tab.definitionsChanged(changed, this.toolbox, sources || more);
+    for (const tab of this.all()) tab.definitionsChanged(changed, this.toolbox, haveSourcesChanged || haveOptionsChanged);
   }
 }

@@ -48,10 +48,10 @@ export function makeTheme(): Blockly.Theme {
 }
 
 /** Sets a CSS variable `--nep-<role>` for each colour role and `--nep-block-<category>` for each block category. */
-export function setCssVariables(dark: boolean): void {
+export function setCssVariables(isDark: boolean): void {
   const style = document.documentElement.style;
   for (const [role, value] of roles()) style.setProperty(`--nep-${role}`, value);
   for (const [name, {primary}] of categories()) style.setProperty(`--nep-block-${name}`, primary);
   style.setProperty('--nep-families', FONT_FAMILY);
-  style.setProperty('color-scheme', dark ? 'dark' : 'light');
+  style.setProperty('color-scheme', isDark ? 'dark' : 'light');
 }

@@ -153,15 +153,15 @@ export class Toolbox extends Blockly.Toolbox {
     return flyout instanceof Flyout && flyout.isPinned;
   }
 
-  /** Pins or unpins the flyout; `closes`: unpinning also closes it. */
-  setPinned(keeps: boolean, closes: boolean): void {
+  /** Pins or unpins the flyout; `shouldClose`: unpinning also shouldClose it. */
+  setPinned(isPinned: boolean, shouldClose: boolean): void {
     const flyout = this.getFlyout();
     if (!(flyout instanceof Flyout)) return;
     const before = flyout.isPinned;
-    flyout.setPinned(keeps);
-    if (keeps) this.openLastCategory();
-    else if (before && closes) this.clearSelection();
-    if (before !== keeps) this.workspace_.resize();
+    flyout.setPinned(isPinned);
+    if (isPinned) this.openLastCategory();
+    else if (before && shouldClose) this.clearSelection();
+    if (before !== isPinned) this.workspace_.resize();
   }
 
   /** Opens the last or first category if the flyout is pinned and closed. */
@@ -262,29 +262,29 @@ export class Toolbox extends Blockly.Toolbox {
   }
 
   /** Replaces the contents; keeps the open category, search text and focus. Does nothing if nothing changed. */
-  update(def: unknown, blocksChanged: boolean): void {
+  update(def: unknown, haveBlocksChanged: boolean): void {
     const items = withIds(def as ToolboxContents);
     const key = JSON.stringify(items);
-    const sameItems = key === this.contentsJson;
-    if (sameItems && !blocksChanged) return;
+    const hasSameItems = key === this.contentsJson;
+    if (hasSameItems && !haveBlocksChanged) return;
     this.contentsJson = key;
     const restoreFocus = this.captureFocus();
-    const query = sameItems ? undefined : this.searchItem?.query;
+    const query = hasSameItems ? undefined : this.searchItem?.query;
     const {isShowingResults: showsFound} = this;
-    this.showContents(items, sameItems, blocksChanged);
+    this.showContents(items, hasSameItems, haveBlocksChanged);
     if (query) this.searchItem?.restore(query);
     if (showsFound) this.searchItem?.refresh();
     restoreFocus();
   }
 
-  private showContents(items: ToolboxContents, sameItems: boolean, blocksChanged: boolean): void {
+  private showContents(items: ToolboxContents, hasSameItems: boolean, haveBlocksChanged: boolean): void {
     const flyout = this.getFlyout();
     const open = this.selectedItem_;
     const before = this.contentsById;
     this.contentItems = items.contents;
     this.contentsById = new Map(items.contents.map((item) => [toText(item['toolboxitemid']), JSON.stringify(item['contents'])]));
     const scroll = flyout?.getWorkspace().scrollY ?? 0;
-    if (!sameItems) {
+    if (!hasSameItems) {
       this.selectedItem_ = null;
       this.render(items as unknown as Blockly.utils.toolbox.ToolboxInfo);
     }
@@ -300,8 +300,8 @@ export class Toolbox extends Blockly.Toolbox {
       return;
     }
     const item = newItem as Blockly.ISelectableToolboxItem;
-    if (!sameItems) this.selectItem_(null, item);
-    if (!blocksChanged && before.get(item.getId()) === this.contentsById.get(item.getId())) return;
+    if (!hasSameItems) this.selectItem_(null, item);
+    if (!haveBlocksChanged && before.get(item.getId()) === this.contentsById.get(item.getId())) return;
     flyout?.show(item.getContents());
     const workspace = flyout?.getWorkspace();
     workspace?.scrollbar?.setY(-scroll);

@@ -45,7 +45,7 @@ function tryBlock(block: Blockly.BlockSvg): void {
 }
 
 function actionLabel(block: Blockly.BlockSvg | null): string {
-  return block?.outputConnection ? t('Show its value') : t('Run from here');
+  return block?.outputConnection ? t('Show value') : t('Run from here');
 }
 
 /** Registers the menu entry, shortcut and toolbox click, once per page; `listener` is called with each request. */

@@ -19,7 +19,7 @@ interface Entry {
 }
 
 export class Variables {
-  private waiting = false;
+  private isRefreshScheduled = false;
   private newestList = '';
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
@@ -30,10 +30,10 @@ export class Variables {
 
   /** Schedules one refresh for all variable events of a load. */
   private scheduleRefresh(): void {
-    if (this.waiting) return;
-    this.waiting = true;
+    if (this.isRefreshScheduled) return;
+    this.isRefreshScheduled = true;
     queueMicrotask(() => {
-      this.waiting = false;
+      this.isRefreshScheduled = false;
       this.refresh();
     });
   }
@@ -58,9 +58,9 @@ export class Variables {
     const variables = this.workspace.getVariableMap();
     const newest = variables.getVariableById(this.newestList);
     if (newest) return newest;
-    const set = this.workspace.getAllBlocks(false).filter((block) => block.type === SETTER_TYPE &&
+    const setters = this.workspace.getAllBlocks(false).filter((block) => block.type === SETTER_TYPE &&
       block.getInputTargetBlock('VALUE')?.type.startsWith('lists_'));
-    return set[set.length - 1]?.getVarModels()[0] as Variable | undefined ?? null;
+    return setters[setters.length - 1]?.getVarModels()[0] as Variable | undefined ?? null;
   }
 
   /** Returns the list category: first the block that creates the list, then the blocks that use it. */
@@ -70,16 +70,16 @@ export class Variables {
     const list = this.getList();
     if (!list) return contents as Blockly.utils.toolbox.FlyoutItemInfoArray;
     const VAR = {id: list.getId()};
-    const makes = contents.find((entry) => entry.type === CREATE_LIST_TYPE);
-    const sets = {kind: 'block', type: SETTER_TYPE, fields: {VAR}, inputs: {VALUE: {block: {...makes, kind: undefined}}}};
-    const about = (entry: Entry): Entry => {
+    const createBlock = contents.find((entry) => entry.type === CREATE_LIST_TYPE);
+    const setBlock = {kind: 'block', type: SETTER_TYPE, fields: {VAR}, inputs: {VALUE: {block: {...createBlock, kind: undefined}}}};
+    const withVariable = (entry: Entry): Entry => {
       const filled = {...entry, ...(entry.fields?.['VAR'] !== undefined && {fields: {...entry.fields, VAR}})};
       const inputs = Object.entries(entry.inputs ?? {}).map(([name, {block, shadow}]) =>
-        [name, {...(block && {block: about(block)}), ...(shadow && {shadow: about(shadow)})}]);
+        [name, {...(block && {block: withVariable(block)}), ...(shadow && {shadow: withVariable(shadow)})}]);
       return entry.inputs ? {...filled, inputs: Object.fromEntries(inputs)} : filled;
     };
-    const above = contents.findIndex((entry) => entry.type);
-    return [...contents.slice(0, above), sets, ...contents.slice(above).map(about)] as unknown as
+    const firstBlockIndex = contents.findIndex((entry) => entry.type);
+    return [...contents.slice(0, firstBlockIndex), setBlock, ...contents.slice(firstBlockIndex).map(withVariable)] as unknown as
       Blockly.utils.toolbox.FlyoutItemInfoArray;
   }
 
@@ -90,12 +90,12 @@ export class Variables {
     const all = this.workspace.getVariableMap().getVariablesOfType('');
     const newest = all[all.length - 1];
     if (!newest) return contents as Blockly.utils.toolbox.FlyoutItemInfoArray;
-    const about = (entry: Entry, variable: Blockly.IVariableModel<Blockly.IVariableState>) =>
+    const withVariable = (entry: Entry, variable: Blockly.IVariableModel<Blockly.IVariableState>) =>
       ({...entry, fields: {...entry.fields, VAR: {id: variable.getId()}}});
     const sorted = [...all].sort((variable, other) => variable.getName().localeCompare(other.getName()));
     return contents.flatMap((entry) => {
-      if (entry.type === GETTER_TYPE) return sorted.map((variable) => about(entry, variable));
-      return entry.type ? [about(entry, newest)] : [entry];
+      if (entry.type === GETTER_TYPE) return sorted.map((variable) => withVariable(entry, variable));
+      return entry.type ? [withVariable(entry, newest)] : [entry];
     }) as unknown as Blockly.utils.toolbox.FlyoutItemInfoArray;
   }
 }

@@ -130,10 +130,10 @@ export class WatchedValues {
   }
 
   private positionCard(card: HTMLElement, {right, top}: Watched): void {
-    const moved = typeof right === 'number' && typeof top === 'number';
-    card.classList.toggle('moved', moved);
-    card.style.right = moved ? `max(${PAGE_MARGIN}px, min(${right}px, calc(100% - 80px)))` : '';
-    card.style.top = moved ? `max(${PAGE_MARGIN}px, min(${top}px, calc(100% - 40px)))` : '';
+    const hasPosition = typeof right === 'number' && typeof top === 'number';
+    card.classList.toggle('moved', hasPosition);
+    card.style.right = hasPosition ? `max(${PAGE_MARGIN}px, min(${right}px, calc(100% - 80px)))` : '';
+    card.style.top = hasPosition ? `max(${PAGE_MARGIN}px, min(${top}px, calc(100% - 40px)))` : '';
   }
 
   /** Moves the card with the pointer, within the page. */
@@ -143,11 +143,11 @@ export class WatchedValues {
     const page = this.column.getBoundingClientRect();
     const box = card.getBoundingClientRect();
     const from = {x: event.clientX, y: event.clientY, right: page.right - box.right, top: box.top - page.top};
-    let moved = false;
+    let isMoved = false;
     card.setPointerCapture(event.pointerId);
     card.onpointermove = (now) => {
-      moved ||= Math.hypot(now.clientX - from.x, now.clientY - from.y) > 3;
-      if (!moved) return;
+      isMoved ||= Math.hypot(now.clientX - from.x, now.clientY - from.y) > 3;
+      if (!isMoved) return;
       const max = {right: page.width - box.width - PAGE_MARGIN, top: page.height - box.height - PAGE_MARGIN};
       watched.right = Math.round(Math.max(PAGE_MARGIN, Math.min(max.right, from.right - (now.clientX - from.x))));
       watched.top = Math.round(Math.max(PAGE_MARGIN, Math.min(max.top, from.top + now.clientY - from.y)));
@@ -155,7 +155,7 @@ export class WatchedValues {
     };
     card.onpointerup = card.onpointercancel = () => {
       card.onpointermove = card.onpointerup = card.onpointercancel = null;
-      if (moved) this.listener.changed();
+      if (isMoved) this.listener.changed();
     };
   }
 }

@@ -8,9 +8,9 @@ export function setTranslations(catalog: Readonly<Record<string, string>>): void
 }
 
 /** Returns the translation of a whole sentence with its placeholders filled in; falls back to English. */
-export function t(english: string, holes: Readonly<Record<string, string | number>> = {}): string {
+export function t(english: string, values: Readonly<Record<string, string | number>> = {}): string {
   const text = Object.hasOwn(translations, english) ? translations[english] ?? english : english;
-  return text.replace(/\{(\w+)\}/g, (hole, name: string) => Object.hasOwn(holes, name) ? String(holes[name]) : hole);
+  return text.replace(/\{(\w+)\}/g, (placeholder, name: string) => Object.hasOwn(values, name) ? String(values[name]) : placeholder);
 }
 
 /** Marks a constant for translation; pass it to `t` where it is shown. */

@@ -102,8 +102,8 @@ def rounded_to(value: object, decimal_places: object) -> int | float:
     digits = max(-_MAX_DECIMAL_PLACES, min(_MAX_DECIMAL_PLACES, round(requested_digits)))
     if abs(operand) >= _MAX_EXACT_INTEGER:  # floats of this size have no fraction
         return operand
-    halves = ROUND_HALF_UP if operand > 0 else ROUND_HALF_DOWN
-    exact = Decimal(repr(operand)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
+    rounding_mode = ROUND_HALF_UP if operand > 0 else ROUND_HALF_DOWN
+    exact = Decimal(repr(operand)).scaleb(digits).to_integral_value(rounding_mode).scaleb(-digits)
     return int(exact) if exact == int(exact) else float(exact)
 
 
@@ -186,13 +186,13 @@ def counting(first: object, last: object, step: object) -> Iterator[int | float]
         raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(label)))
     step_size = abs(step_size) if end >= begin else -abs(step_size)
     # Tolerance for rounding errors: 0 to 0.3 by 0.1 has four numbers.
-    rounds = min(math.floor((end - begin) / step_size + 1e-9), _MAX_ITERATIONS)
+    step_count = min(math.floor((end - begin) / step_size + 1e-9), _MAX_ITERATIONS)
     is_integer = isinstance(begin, int) and isinstance(step_size, int)
     return (
         begin + index * step_size
         if is_integer
         else _rounded_result(begin + index * step_size, decimal_places=12)
-        for index in range(rounds + 1)
+        for index in range(step_count + 1)
     )
 
 
@@ -200,10 +200,10 @@ def _to_radians(degrees: object, label: str) -> float:
     return math.radians(math.fmod(number(degrees, label), 360))
 
 
-def _apply(work_out: Callable[[float], float], value: object, label: str) -> int | float:
+def _apply(function: Callable[[float], float], value: object, label: str) -> int | float:
     operand = number(value, label)
     try:
-        return _rounded_result(work_out(operand), decimal_places=None)
+        return _rounded_result(function(operand), decimal_places=None)
     except ValueError:
         raise _no_result_error(label, operand) from None
 

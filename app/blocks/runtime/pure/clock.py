@@ -51,25 +51,25 @@ def seconds_since(moment: object) -> float:
     return round((_now() - parse_moment(text(moment), _now())).total_seconds(), 3)
 
 
-def parse_moment(written: str, today: datetime) -> datetime:
+def parse_moment(moment_text: str, today: datetime) -> datetime:
     """Parse a text such as “14:30”, “2026-11-23” or “2026-11-23 14:30:05”.
 
     Args:
-        written: Text.
+        moment_text: Text.
         today: Date that is used if the text contains only a time.
 
     Raises:
         BehaviourError: The text is not a date or time.
     """
-    moment_text = written.strip()
-    if ":" in moment_text and "-" not in moment_text:
-        width = 5 if moment_text.count(":") == 1 else 8
-        moment_text = f"{today:%Y-%m-%d} {moment_text.zfill(width)}"
+    normalized = moment_text.strip()
+    if ":" in normalized and "-" not in normalized:
+        width = 5 if normalized.count(":") == 1 else 8
+        normalized = f"{today:%Y-%m-%d} {normalized.zfill(width)}"
     try:
-        return datetime.fromisoformat(moment_text).replace(tzinfo=None)
+        return datetime.fromisoformat(normalized).replace(tzinfo=None)
     except ValueError:
         message = _("“seconds since” needs a time such as 14:30 or a date such as 2026-11-23, not “{text}”.")
-        raise BehaviourError(message.format(text=written[:60])) from None
+        raise BehaviourError(message.format(text=moment_text[:60])) from None
 
 
 _FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M:%S"}

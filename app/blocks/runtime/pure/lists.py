@@ -102,21 +102,21 @@ def join_items(values: object, between: object) -> str:
     Raises:
         BehaviourError: The text is too long.
     """
-    joint, pieces, size = text(between), [], 0
+    separator_text, pieces, size = text(between), [], 0
     for value in _as_list(values):
         pieces.append(text(value))
-        size += len(pieces[-1]) + len(joint)
+        size += len(pieces[-1]) + len(separator_text)
         if size > MAX_TEXT_LENGTH:
             raise BehaviourError(
                 _("This text is too long. Use at most {most} characters.").format(most=MAX_TEXT_LENGTH)
             )
-    return joint.join(pieces)
+    return separator_text.join(pieces)
 
 
 def split_text(value: object, separator: object) -> list[object]:
     """Split a text at a separator; into single characters if the separator is empty."""
-    full_text, joint = text(value), text(separator)
-    pieces = full_text.split(joint) if joint else grapheme_clusters(full_text)
+    full_text, separator_text = text(value), text(separator)
+    pieces = full_text.split(separator_text) if separator_text else grapheme_clusters(full_text)
     if len(pieces) > MAX_ITEMS:
         raise _full_error()
     return [*pieces]
@@ -211,7 +211,7 @@ def _as_list(value: object) -> Sequence[object]:
     if isinstance(value, (list, tuple)):
         return value
     if value is None:
-        raise BehaviourError(_("This list has no value yet."), unknown=True)
+        raise BehaviourError(_("This list has no value yet."), is_value_unknown=True)
     message = _("This block needs a list, not {kind}.")
     if value == 0 and isinstance(value, int):
         message = _("This block needs a list, not {kind}. Set the variable to an empty list first.")
@@ -284,11 +284,11 @@ def _deep_copy(value: object) -> object:
 def _count_items(value: object, max_count: int) -> int:
     if not isinstance(value, (list, tuple)):
         return 0
-    item_count, waiting = 0, [value]
-    while waiting and item_count <= max_count:
-        current = waiting.pop()
+    item_count, pending = 0, [value]
+    while pending and item_count <= max_count:
+        current = pending.pop()
         item_count += len(current)
-        waiting += [each for each in current if isinstance(each, (list, tuple)) and each]
+        pending += [each for each in current if isinstance(each, (list, tuple)) and each]
     return item_count
 
 

@@ -36,26 +36,26 @@ def letter(value: object, selector: object) -> str:
     Raises:
         BehaviourError: The text is empty, or it has no character with this number.
     """
-    all_of_it = grapheme_clusters(text(value))
-    if not all_of_it:
+    characters = grapheme_clusters(text(value))
+    if not characters:
         raise BehaviourError(_("The text is empty."))
     if selector == "random":
-        return random.choice(all_of_it)  # noqa: S311 (a game, no secret)
-    number_by_name = {"first": 1, "last": len(all_of_it)}
+        return random.choice(characters)  # noqa: S311 (a game, no secret)
+    number_by_name = {"first": 1, "last": len(characters)}
     named_number = number_by_name.get(selector) if isinstance(selector, str) else None
     letter_number = number(selector, lazy("“letter number”")) if named_number is None else named_number
     if letter_number != int(letter_number):
         raise BehaviourError(
             _("“letter number” needs a whole number, not {place}.").format(place=text(letter_number))
         )
-    if not 1 <= letter_number <= len(all_of_it):
+    if not 1 <= letter_number <= len(characters):
         message = ngettext(
             "The text has only {count} letter; it has no letter {number}.",
             "The text has only {count} letters; it has no letter {number}.",
-            len(all_of_it),
+            len(characters),
         )
-        raise BehaviourError(message.format(count=len(all_of_it), number=text(letter_number)))
-    return all_of_it[int(letter_number) - 1]
+        raise BehaviourError(message.format(count=len(characters), number=text(letter_number)))
+    return characters[int(letter_number) - 1]
 
 
 def part_of_text(value: object, first: object, last: object) -> str:
@@ -65,7 +65,7 @@ def part_of_text(value: object, first: object, last: object) -> str:
 
 
 def position_in_text(value: object, piece: object) -> int:
-    """Return the number of the character at which `piece` first occurs in a text; 0 if missing or empty."""
+    """Return the number of the character at which `piece` first occurs; 0 if empty or not in the text."""
     full_text, substring = text(value), text(piece)
     index = full_text.find(substring) if substring else -1
     return 0 if index < 0 else len(grapheme_clusters(full_text[:index])) + 1
@@ -147,7 +147,7 @@ def number_in(value: object) -> int | float:
         return number(value, lazy("“number in”"))
     parsed = _parse_number(value)
     if parsed is None:
-        raise BehaviourError(_("“{text}” has no number in it.").format(text=text(value)[:60]))
+        raise BehaviourError(_("“{text}” doesn't contain a number.").format(text=text(value)[:60]))
     return parsed
 
 
@@ -156,12 +156,12 @@ def _parse_number(value: object) -> int | float | None:
     match = _NUMBER.search(text(value))
     if match is None or len(match[0]) > _MAX_DIGITS:
         return None
-    minus, digits = match[0][0] in "-−", match[0].lstrip("-−")  # noqa: RUF001 (the sign that people read)
+    is_negative, digits = match[0][0] in "-−", match[0].lstrip("-−")  # noqa: RUF001 (the sign that people read)
     if _GROUPED_NUMBER.fullmatch(digits):
         digits = digits.replace(",", "")
     pieces = re.split(r"[.,]", digits)
     parsed = int(pieces[0]) if len(pieces) == 1 else float(f"{pieces[0]}.{pieces[1]}")
-    return -parsed if minus else parsed
+    return -parsed if is_negative else parsed
 
 
 def _normalize(value: object) -> str:

@@ -135,23 +135,23 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
     earlier marks, so that the sum of all marks is the final number of lost messages.
     """
     marks_by_topic: dict[str, list[LossMark]] = {}
-    before: dict[str, int] = {}
+    last_counts: dict[str, int] = {}
     for at_ns, stats_by_topic in _changing_stats(recording):
         for topic, stats in stats_by_topic.items():
-            missing = _missing_count(stats)
-            grown = missing - before.get(topic, 0)
-            before[topic] = missing
+            missing_count = _missing_count(stats)
+            increase = missing_count - last_counts.get(topic, 0)
+            last_counts[topic] = missing_count
             marks = marks_by_topic.setdefault(topic, [])
-            if grown <= 0:
-                _subtract_late(marks, -grown)
+            if increase <= 0:
+                _subtract_late(marks, -increase)
             elif len(marks) < MAX_MARKS:
-                marks.append(LossMark(at_ns, grown))
+                marks.append(LossMark(at_ns, increase))
             else:
-                marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
+                marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + increase)
     if recording.is_complete:  # not all counts were read
-        before = {topic: _missing_count(stats) for topic, stats in recording.stats().items()}
+        last_counts = {topic: _missing_count(stats) for topic, stats in recording.stats().items()}
     for topic, marks in marks_by_topic.items():
-        _subtract_late(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
+        _subtract_late(marks, sum(mark.count for mark in marks) - last_counts.get(topic, 0))
     return {topic: tuple(marks) for topic, marks in marks_by_topic.items() if marks}
 
 
@@ -166,30 +166,32 @@ def _subtract_late(marks: list[LossMark], count: int) -> None:
 
 def _changing_stats(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicStats]]]:
     # Found by bisection. The counts only increase, except for late messages, and the final ones are in the
-    # file: nothing is read between two times with equal counts. So a long recording with few losses is read
-    # little; one that was not closed completely.
+    # file: nothing is read between two times with equal counts. A long recording with few losses therefore
+    # needs few reads. A recording that wasn't closed is read completely.
     if not recording.is_complete:
         yield from recording.stats_over_time()
         return
-    pieces = recording.stats_chunks()
+    chunks = recording.stats_chunks()
     stats_by_chunk: dict[int, list[tuple[int, dict[str, TopicStats]]]] = {}
-    final = {topic: _missing_count(each) for topic, each in recording.stats().items()}
-    spans: list[tuple[int, int, Mapping[str, int], Mapping[str, int]]] = [(-1, len(pieces), {}, final)]
-    while spans:
-        first, last, lower_counts, upper_counts = spans.pop()
+    final_counts = {topic: _missing_count(each) for topic, each in recording.stats().items()}
+    ranges: list[tuple[int, int, Mapping[str, int], Mapping[str, int]]] = [
+        (-1, len(chunks), {}, final_counts)
+    ]
+    while ranges:
+        first, last, lower_counts, upper_counts = ranges.pop()
         if last - first < 2 or all(
             lower_counts.get(topic, 0) >= count for topic, count in upper_counts.items()
         ):
             continue
         middle = (first + last) // 2
-        stats_by_chunk[middle] = list(recording.stats_over_time((pieces[middle],)))
+        stats_by_chunk[middle] = list(recording.stats_over_time((chunks[middle],)))
         counts = {
             topic: _missing_count(each)
             for _at_ns, stats in stats_by_chunk[middle]
             for topic, each in stats.items()
         }
-        spans.append((first, middle, lower_counts, {**upper_counts, **counts}))
-        spans.append((middle, last, {**lower_counts, **counts}, upper_counts))
+        ranges.append((first, middle, lower_counts, {**upper_counts, **counts}))
+        ranges.append((middle, last, {**lower_counts, **counts}, upper_counts))
     for number in sorted(stats_by_chunk):
         yield from stats_by_chunk[number]
 

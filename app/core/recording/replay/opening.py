@@ -50,7 +50,7 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
             template = _("the recording has {count} topics; at most {most} can be shown")
             raise RecordingError(str(path), template.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
-            raise RecordingError(str(path), _("no message can be decoded"))
+            raise RecordingError(str(path), _("the recording contains no readable messages"))
         return OpenedRecording(recording, Bookmarks(recording), recording.stats())
     except BaseException:
         recording.close()

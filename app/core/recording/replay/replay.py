@@ -63,7 +63,7 @@ class Replay:
         # `opener` opens the file, by default in this process; it is closed with the replay. Without `acting`
         # nothing can be sent.
         self.path = path
-        self.opened: OpenedRecording | None = None
+        self.opened_recording: OpenedRecording | None = None
         self._watches = Watches(self._start_watch, self._stop_watch)
         self.topics, self.nodes = Topics(("", 0)), Nodes()
         self.networks = Networks(settings, (), lambda _event: None, alerts)
@@ -78,8 +78,8 @@ class Replay:
         self.sending = ReplaySending(acting) if acting is not None else None
         if self.sending is not None:
             self.sending.on_change = self._update_forwarding
-        self._logs: list[Watch] = []
-        self._alerts, self._has_failed, self._damaged = alerts, False, 0
+        self._log_watches: list[Watch] = []
+        self._alerts, self._has_failed, self._known_damage_count = alerts, False, 0
         for id in (FAILED, NOT_CLOSED, DAMAGED):
             alerts.resolve(id)
 
@@ -131,22 +131,22 @@ class Replay:
     @property
     def start_ns(self) -> int:
         """Time of the first message in ns since 1970; 0 while unknown."""
-        return self.opened.recording.start_ns if self.opened is not None else 0
+        return self.opened_recording.recording.start_ns if self.opened_recording is not None else 0
 
     @property
     def end_ns(self) -> int:
         """Time of the last message in ns since 1970; 0 while unknown."""
-        return self.opened.recording.end_ns if self.opened is not None else 0
+        return self.opened_recording.recording.end_ns if self.opened_recording is not None else 0
 
     @property
     def recorded_topics(self) -> Mapping[str, RecordedTopic]:
         """Topics in the file."""
-        return self.opened.recording.topics if self.opened is not None else {}
+        return self.opened_recording.recording.topics if self.opened_recording is not None else {}
 
     @property
     def stats(self) -> Mapping[str, TopicStats]:
         """Statistics written by the recorder, by topic, for topics with known statistics."""
-        return self.opened.stats if self.opened is not None else {}
+        return self.opened_recording.stats if self.opened_recording is not None else {}
 
     @property
     def lost(self) -> int:
@@ -156,7 +156,7 @@ class Replay:
     @property
     def bookmarks(self) -> Sequence[Bookmark]:
         """Bookmarks, in order of time."""
-        return self.opened.bookmarks.all if self.opened is not None else ()
+        return self.opened_recording.bookmarks.all if self.opened_recording is not None else ()
 
     def _position_ns(self) -> int:
         player = self.source.status.player
@@ -176,7 +176,7 @@ class Replay:
         self.source.queue_change("play", lambda playback: playback.pause())
 
     def toggle(self) -> None:
-        """Pause playback, or continue it."""
+        """Pause or resume playback."""
         if self.player is not None and self.player.is_playing:
             self.pause()
         else:
@@ -253,7 +253,7 @@ class Replay:
 
         Marks are bookmarks and the starts of alarms and runs.
         """
-        if self.opened is None:
+        if self.opened_recording is None:
             return
         at_ns, marks = self._position_ns(), [mark.at_ns for mark in self.bookmarks]
         marks += self.densities.spans.starts() if self.densities is not None else []
@@ -272,7 +272,11 @@ class Replay:
 
         Raises `RecordingError` if the bookmark can't be saved.
         """
-        return self.opened.bookmarks.add(self._position_ns(), name) if self.opened is not None else None
+        return (
+            self.opened_recording.bookmarks.add(self._position_ns(), name)
+            if self.opened_recording is not None
+            else None
+        )
 
     def rename_bookmark(self, bookmark: Bookmark, name: str) -> None:
         """Rename a bookmark.
@@ -281,13 +285,13 @@ class Replay:
             RecordingError: The change can't be saved.
             ValueError: The bookmark is part of the recording.
         """
-        if self.opened is not None:
-            self.opened.bookmarks.rename(bookmark, name)
+        if self.opened_recording is not None:
+            self.opened_recording.bookmarks.rename(bookmark, name)
 
     def restore_bookmark(self, bookmark: Bookmark) -> None:
         """Restore a removed bookmark. Raises `RecordingError` if the change can't be saved."""
-        if self.opened is not None:
-            self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
+        if self.opened_recording is not None:
+            self.opened_recording.bookmarks.add(bookmark.at_ns, bookmark.name)
 
     def remove_bookmark(self, bookmark: Bookmark) -> None:
         """Remove a bookmark.
@@ -296,27 +300,31 @@ class Replay:
             RecordingError: The change can't be saved.
             ValueError: The bookmark is part of the recording.
         """
-        if self.opened is not None:
-            self.opened.bookmarks.remove(bookmark)
+        if self.opened_recording is not None:
+            self.opened_recording.bookmarks.remove(bookmark)
 
     # -- tick --------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
         """Apply the messages read since the last tick at ``now`` (monotonic seconds)."""
-        if self.opened is None and self.source.opened is not None and self.player is not None:
-            self._on_opened(self.source.opened, now)
+        if (
+            self.opened_recording is None
+            and self.source.opened_recording is not None
+            and self.player is not None
+        ):
+            self._on_opened(self.source.opened_recording, now)
         self._alert_problems()
-        handed = self.source.pop_results()
-        if handed.seek_messages is not None:
-            self._apply_seek(handed.seek_messages, now)
-        self._apply_history(handed, now)
-        for topic, batch in handed.drained.batches.items():
+        results = self.source.pop_results()
+        if results.seek_messages is not None:
+            self._apply_seek(results.seek_messages, now)
+        self._apply_history(results, now)
+        for topic, batch in results.drain_result.batches.items():
             if topic in LOG_TOPICS:
                 self.console.add_messages(batch.messages, batch.dropped)
             self._add(topic, batch, now)
-        self.series.dispatch(handed.drained.batches)
-        if handed.stats:
-            self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in handed.stats.items()})
+        self.series.dispatch(results.drain_result.batches)
+        if results.stats:
+            self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in results.stats.items()})
         self.topics.update_ages(now, self._position_ns())
         if self.player is None or not self.player.is_playing:
             self.images.restart_silence()
@@ -326,10 +334,10 @@ class Replay:
     def _update_forwarding(self) -> None:
         if self.sending is not None:
             outbox = self.sending.outbox
-            self.source.forward({sent.route.recorded for sent in outbox.active_topics}, outbox.offer)
+            self.source.forward({topic.route.recorded for topic in outbox.active_topics}, outbox.offer)
 
     def _on_opened(self, opened: OpenedRecording, now: float) -> None:
-        self.opened = opened
+        self.opened_recording = opened
         recording = opened.recording
         self.series.origin_ns = recording.start_ns
         if self.sending is not None:
@@ -341,7 +349,7 @@ class Replay:
         for topic in LOG_TOPICS:
             if topic in recording.topics:
                 self.source.set_history_capacity(topic, CAPACITY)
-                self._logs.append(self.watch(topic))
+                self._log_watches.append(self.watch(topic))
 
         self._alert_not_closed(opened)
 
@@ -358,8 +366,8 @@ class Replay:
             self._alerts.raise_alert(
                 FAILED, "error", title, message, button=_("Show the file"), action=action
             )
-        if len(status.corruption) > self._damaged:
-            self._damaged = len(status.corruption)
+        if len(status.corruption) > self._known_damage_count:
+            self._known_damage_count = len(status.corruption)
             title = _("{name} is damaged.").format(name=self.name)
             detail = corruption_text(status.corruption, self.start_ns)
             self._alerts.raise_alert(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
@@ -382,10 +390,10 @@ class Replay:
         for message in messages:
             self._add(message.topic, Batch([message]), now)
 
-    def _apply_history(self, handed: ReplayResults, now: float) -> None:
-        log_messages = [message for topic in LOG_TOPICS for message in handed.history.get(topic, ())]
+    def _apply_history(self, results: ReplayResults, now: float) -> None:
+        log_messages = [message for topic in LOG_TOPICS for message in results.history.get(topic, ())]
         self.console.add_messages(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
-        for topic, messages in handed.history.items():
+        for topic, messages in results.history.items():
             batch = Batch(list(messages))
             self._add(topic, Batch(batch.messages[-2:]), now)
             self.series.reset([topic])
@@ -398,9 +406,9 @@ class Replay:
 
     def _start_watch(self, topic: str) -> None:
         self.source.watch(topic)
-        replayed = self.topics.get(topic)
-        if replayed is not None:
-            replayed.is_watched = True
+        replayed_topic = self.topics.get(topic)
+        if replayed_topic is not None:
+            replayed_topic.is_watched = True
 
     def _stop_watch(self, topic: str) -> None:
         self.source.unwatch(topic)
@@ -417,7 +425,7 @@ def create_graph(topics: Mapping[str, RecordedTopic], stats: Mapping[str, TopicS
             for number in topic.publishers or (None,)
         )
         lost = topic_stats.lost if topic_stats is not None else None
-        sent = topic_stats.received + lost if topic_stats is not None and lost is not None else 0
-        ratio = lost / sent if lost is not None and sent else None
+        sent_count = topic_stats.received + lost if topic_stats is not None and lost is not None else 0
+        ratio = lost / sent_count if lost is not None and sent_count else None
         infos[name] = TopicInfo(name, topic.msg_type, topic.codec, publishers, lost=lost, loss_ratio=ratio)
     return GraphView(1, 1, topics=infos)

@@ -50,9 +50,9 @@ class TimeScale:
         """Return the position of a time in the visible range: 0 at the left edge, 1 at the right edge."""
         return (at_ns - self.start_ns) / self.span_ns
 
-    def time(self, share: float) -> int:
+    def time(self, position: float) -> int:
         """Return the time at a position (0 at the left edge, 1 at the right), limited to the recording."""
-        at_ns = self.start_ns + round(share * self.span_ns)
+        at_ns = self.start_ns + round(position * self.span_ns)
         return max(self.first_ns, min(self.last_ns, at_ns))
 
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
@@ -62,9 +62,9 @@ class TimeScale:
             factor: Ratio of the new to the current visible range; above 1 zooms out.
             at_ns: Fixed time.
         """
-        total_span = self.last_ns - self.first_ns
-        span = max(MIN_SPAN_NS, min(total_span, round(self.span_ns * factor)))
-        return self._with_start(at_ns - round(self.relative_position(at_ns) * span), span)
+        total_span_ns = self.last_ns - self.first_ns
+        span_ns = max(MIN_SPAN_NS, min(total_span_ns, round(self.span_ns * factor)))
+        return self._with_start(at_ns - round(self.relative_position(at_ns) * span_ns), span_ns)
 
     def moved(self, by_ns: int) -> TimeScale:
         """Return the scale shifted by a duration in ns."""
@@ -76,9 +76,9 @@ class TimeScale:
             return self
         return self._with_start(at_ns - self.span_ns // 8, self.span_ns)
 
-    def _with_start(self, begin_ns: int, span: int) -> TimeScale:
-        begin_ns = max(self.first_ns, min(begin_ns, self.last_ns - span))
-        return replace(self, start_ns=begin_ns, end_ns=begin_ns + span)
+    def _with_start(self, begin_ns: int, span_ns: int) -> TimeScale:
+        begin_ns = max(self.first_ns, min(begin_ns, self.last_ns - span_ns))
+        return replace(self, start_ns=begin_ns, end_ns=begin_ns + span_ns)
 
     def mark_interval_s(self, max_marks: int) -> float:
         """Return the interval between ruler marks in seconds.
@@ -124,11 +124,11 @@ def duration_text(ns: int, *, digits: int = 3) -> str:
     """
     sign, ns = ("-", -ns) if ns < 0 else ("", ns)
     unit = 10 ** (9 - digits)
-    total_s, rest = divmod(ns // unit, 10**digits)
+    total_s, fraction = divmod(ns // unit, 10**digits)
     minutes, seconds = divmod(total_s, 60)
     hours, minutes = divmod(minutes, 60)
     text = f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
-    return f"{sign}{text}.{rest:0{digits}d}" if digits else f"{sign}{text}"
+    return f"{sign}{text}.{fraction:0{digits}d}" if digits else f"{sign}{text}"
 
 
 def clock_text(at_ns: int, *, digits: int = 3) -> str:
@@ -138,10 +138,10 @@ def clock_text(at_ns: int, *, digits: int = 3) -> str:
         at_ns: Time in ns since 1970.
         digits: Number of decimals of the seconds.
     """
-    seconds, rest = divmod(at_ns, 1_000_000_000)
+    seconds, fraction = divmod(at_ns, 1_000_000_000)
     local_time = time.localtime(seconds)
     text = f"{local_time.tm_hour}:{local_time.tm_min:02d}:{local_time.tm_sec:02d}"
-    return f"{text}.{rest // 10 ** (9 - digits):0{digits}d}" if digits else text
+    return f"{text}.{fraction // 10 ** (9 - digits):0{digits}d}" if digits else text
 
 
 def date_text(at_ns: int) -> str:

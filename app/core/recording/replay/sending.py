@@ -72,7 +72,7 @@ class SentTopic:
     publishers: dict[str, Publisher] = field(default_factory=dict)
     requested_types: set[str] = field(default_factory=set)
     node: Node | None = None
-    checked: dict[Publisher, int] = field(default_factory=dict)
+    checked_subscriber_counts: dict[Publisher, int] = field(default_factory=dict)
     is_ready: bool = False
     count: int = 0
     dropped_count: int = 0
@@ -95,13 +95,13 @@ class ReplayOutbox:
         # checked.
         self._arming, self._submit, self._gate = arming, submit, gate
         self._lock = threading.Lock()
-        self._active: dict[str, SentTopic] = {}
+        self._active_topics: dict[str, SentTopic] = {}
 
     @property
     def active_topics(self) -> tuple[SentTopic, ...]:
         """Topics that are currently published."""
         with self._lock:
-            return tuple(self._active.values())
+            return tuple(self._active_topics.values())
 
     def start(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
         """Open a publisher for a topic and publish the topic once the publisher is ready.
@@ -114,40 +114,40 @@ class ReplayOutbox:
         """
         sent = SentTopic(route, turn, is_latched)
         with self._lock:
-            old = self._active.get(route.recorded)
-            self._active[route.recorded] = sent
-        if old is not None:
-            self._submit_close(old)
+            previous = self._active_topics.get(route.recorded)
+            self._active_topics[route.recorded] = sent
+        if previous is not None:
+            self._submit_close(previous)
         self._create_publisher(sent, msg_type)
 
     def stop(self, recorded: str) -> SentTopic | None:
         """Stop publishing a topic; return its final state, or None if it wasn't published."""
         with self._lock:
-            ended = self._active.pop(recorded, None)
-        if ended is not None:
-            self._submit_close(ended)
-        return ended
+            stopped = self._active_topics.pop(recorded, None)
+        if stopped is not None:
+            self._submit_close(stopped)
+        return stopped
 
-    def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
+    def offer(self, messages: Sequence[Message], delays_s: Sequence[float]) -> None:
         """Publish messages that were just played, if their topics are active.
 
         Args:
             messages: Messages in order of time.
-            late_s: Delay of each message in seconds. Messages later than `MAX_DELAY_S` are dropped.
+            delays_s: Delay of each message in seconds. Messages later than `MAX_DELAY_S` are dropped.
         """
         with self._lock:
-            active = dict(self._active)
-        for message, late in zip(messages, late_s, strict=True):
-            sent = active.get(message.topic)
+            active_topics = dict(self._active_topics)
+        for message, delay_s in zip(messages, delays_s, strict=True):
+            sent = active_topics.get(message.topic)
             if sent is not None and sent.is_ready and not sent.problem:
-                self._send(sent, message, late)
+                self._send(sent, message, delay_s)
 
-    def _send(self, sent: SentTopic, message: Message, late_s: float) -> None:
-        kind = published_type(message)
-        publisher = sent.publishers.get(kind)
+    def _send(self, sent: SentTopic, message: Message, delay_s: float) -> None:
+        msg_type = published_type(message)
+        publisher = sent.publishers.get(msg_type)
         if publisher is None:
-            self._create_publisher(sent, kind)
-        if publisher is None or late_s > MAX_DELAY_S or self._is_rejected(sent, publisher):
+            self._create_publisher(sent, msg_type)
+        if publisher is None or delay_s > MAX_DELAY_S or self._is_rejected(sent, publisher):
             sent.dropped_count += 1
             return
         data, extension = bytes(message.data), dict(message.extension) or None
@@ -164,12 +164,12 @@ class ReplayOutbox:
         if self._gate is None or sent.node is None:
             return False
         subscribers, name = publisher.subscribers, sent.route.name
-        if subscribers == sent.checked.get(publisher):
+        if subscribers == sent.checked_subscriber_counts.get(publisher):
             return bool(self._gate.rejection_reason(name))
-        is_refused = bool(self._gate.current_rejection_reason(sent.node, name))
-        if not is_refused:
-            sent.checked[publisher] = subscribers
-        return is_refused
+        is_rejected = bool(self._gate.current_rejection_reason(sent.node, name))
+        if not is_rejected:
+            sent.checked_subscriber_counts[publisher] = subscribers
+        return is_rejected
 
     # ---- in the network thread
 
@@ -197,7 +197,7 @@ class ReplayOutbox:
 
     def _is_active(self, sent: SentTopic) -> bool:
         with self._lock:
-            return self._active.get(sent.route.recorded) is sent
+            return self._active_topics.get(sent.route.recorded) is sent
 
     def _submit_close(self, sent: SentTopic) -> None:
         self._submit("", lambda _node: self._close(sent))
@@ -221,8 +221,8 @@ class ReplaySending:
         """Name under which each chosen topic is published, by its name in the recording."""
         self.revision = 0
         self._opened: OpenedRecording | None = None
-        self._moving: MovingTopics | None = None
-        self._latched: frozenset[str] = frozenset()
+        self._moving_topics: MovingTopics | None = None
+        self._latched_topics: frozenset[str] = frozenset()
         self._pending_routes: list[ReplayRoute] = []
         self._is_asking = False
         """True while the question about the first pending route is open."""
@@ -237,7 +237,7 @@ class ReplaySending:
     @property
     def is_analyzed(self) -> bool:
         """True after `analyze` has determined which topics move robots."""
-        return self._moving is not None
+        return self._moving_topics is not None
 
     def analyze(self) -> None:
         """Determine in the background which topics move robots."""
@@ -254,9 +254,9 @@ class ReplaySending:
             recorded: Name of the topic in the recording.
             name: Name of the topic on the live network.
         """
-        known_topics = self._moving
-        if known_topics is not None and (
-            known_topics.robots_moved_by(recorded) or known_topics.robots_moved_by(name)
+        moving_topics = self._moving_topics
+        if moving_topics is not None and (
+            moving_topics.robots_moved_by(recorded) or moving_topics.robots_moved_by(name)
         ):
             return True
         return bool(self._acting.gate.robots_moved_by(name))
@@ -281,7 +281,7 @@ class ReplaySending:
             return ""
         target = name.strip() or recorded
         if recorded not in self.routes and len(self.routes) >= MAX_TARGETS:
-            return _("No more topics can be sent. Remove one first.")
+            return _("No more topics can be sent. Remove a topic first.")
         try:
             check_topic(target)
         except BadTopicError as error:
@@ -317,9 +317,9 @@ class ReplaySending:
             route.name for route in routes if self.moves_robot(route.recorded, route.name)
         }
         active_routes = {sent.route for sent in self.outbox.active_topics}
-        missing = [route for route in routes if route not in active_routes]
+        new_routes = [route for route in routes if route not in active_routes]
         self._pending_routes = sorted(
-            missing, key=lambda route: self._acting.needs_confirmation(route.target)
+            new_routes, key=lambda route: self._acting.needs_confirmation(route.target)
         )
         return self._start_next()
 
@@ -327,11 +327,11 @@ class ReplaySending:
         self._is_asking = False
         while self._pending_routes:
             route, turn = self._pending_routes[0], self._acting.arming.turn
-            not_armed = self._acting.prepare(route.target, self._start_next)
-            if not_armed:
+            problem = self._acting.prepare(route.target, self._start_next)
+            if problem:
                 self._pending_routes = []
-                return not_armed
-            if not_armed is not None:
+                return problem
+            if problem is not None:
                 self._is_asking = bool(self._pending_routes)
                 break
             self._pending_routes.remove(route)
@@ -344,7 +344,7 @@ class ReplaySending:
             return
         topic = opened.recording.topics[route.recorded]
         self._acting.notify_moved(route.target, "replay")
-        self.outbox.start(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
+        self.outbox.start(route, turn, topic.msg_type, is_latched=route.recorded in self._latched_topics)
         self._log(route, _("sent during playback"))
         self._mark_changed()
 
@@ -367,17 +367,17 @@ class ReplaySending:
     def _stop(self, sent: SentTopic) -> None:
         if self.outbox.stop(sent.route.recorded) is not None:
             text = ", ".join(filter(None, (sent.problem, sent_text(sent))))
-            self._log(sent.route, text, sent.count, is_bad=bool(sent.problem))
+            self._log(sent.route, text, sent.count, is_error=bool(sent.problem))
             self._mark_changed()
 
     def _mark_changed(self) -> None:
         self.revision += 1
         self.on_change()
 
-    def _log(self, route: ReplayRoute, text: str, sent: int = 0, *, is_bad: bool = False) -> None:
+    def _log(self, route: ReplayRoute, text: str, sent_count: int = 0, *, is_error: bool = False) -> None:
         if route.name != route.recorded:
             text = _("{topic} of the recording, {what}").format(topic=route.recorded, what=text)
-        self._acting.log("warn" if is_bad else "info", route.target, text, sent)
+        self._acting.log("warn" if is_error else "info", route.target, text, sent_count)
 
     def tick(self) -> None:
         """Stop publishing topics that are no longer allowed, or that now move a different robot.
@@ -401,14 +401,14 @@ class ReplaySending:
             self._start_next()
 
     def _apply_result(self) -> None:
-        if self._worker is None or self._moving is not None or self._opened is None:
+        if self._worker is None or self._moving_topics is not None or self._opened is None:
             return
         try:
             result = self._worker.pop_result("topics")
         except NepError:  # unreadable: every topic may move a robot
             result = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
         if result is not None:
-            self._moving, self._latched = result
+            self._moving_topics, self._latched_topics = result
             self.revision += 1
 
 

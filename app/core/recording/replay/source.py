@@ -98,13 +98,13 @@ class ReplayResults:
     Attributes:
         seek_messages: Newest message of each topic after a seek; None if there was no seek.
         history: Earlier messages of topics with history, by topic.
-        drained: Messages played after that.
+        drain_result: Messages played after that.
         stats: Statistics by topic.
     """
 
     seek_messages: Sequence[Message] | None = None
     history: dict[str, Sequence[Message]] = field(default_factory=dict)
-    drained: DrainResult = field(default_factory=lambda: DrainResult({}, [], 0))
+    drain_result: DrainResult = field(default_factory=lambda: DrainResult({}, [], 0))
     stats: dict[str, ReplayStats] = field(default_factory=dict)
 
 
@@ -117,7 +117,7 @@ class ReplaySource:
     def __init__(
         self,
         path: Path,
-        pictures: ImageSink,
+        image_sink: ImageSink,
         *,
         clock: Callable[[], float] = time.monotonic,
         opener: RecordingOpener | None = None,
@@ -125,20 +125,20 @@ class ReplaySource:
         # Tests call `open` and `process` instead of `start`. `opener` is closed at the end.
         self.path = path
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
-        self.opened: OpenedRecording | None = None
-        self._pictures, self._clock = pictures, clock
+        self.opened_recording: OpenedRecording | None = None
+        self._image_sink, self._clock = image_sink, clock
         self._changed = threading.Condition()
-        self._changes: list[tuple[str, PlaybackChange]] = []
-        self._watched: set[str] = set()
+        self._queued_changes: list[tuple[str, PlaybackChange]] = []
+        self._watched_topics: set[str] = set()
         self._history_capacities: dict[str, int] = {}
         self._panel_topics: frozenset[str] = frozenset()
         self._forwarded_topics: frozenset[str] = frozenset()
-        self._played: frozenset[str] = frozenset()
+        self._played_topics: frozenset[str] = frozenset()
         self._forward: Forward | None = None
         self._mailbox = Mailbox()
         self._results = ReplayResults()
         self._status = ReplayStatus("reading")
-        self._closing = False
+        self._is_closing = False
         self._playback: Playback | None = None
         self._pending_stats: list[tuple[int, list[str]]] = []
         self._next_stats_s = self._stats_duration_s = 0.0
@@ -166,65 +166,65 @@ class ReplaySource:
             change: Function that the replay thread calls to apply the change.
         """
         with self._changed:
-            if self._changes and self._changes[-1][0] == kind:
-                self._changes[-1] = (kind, change)
+            if self._queued_changes and self._queued_changes[-1][0] == kind:
+                self._queued_changes[-1] = (kind, change)
             else:
-                self._changes.append((kind, change))
+                self._queued_changes.append((kind, change))
             self._changed.notify_all()
 
     def watch(self, topic: str) -> None:
         """Deliver the messages of the topic with this name in the recording."""
         with self._changed:
-            self._watched.add(topic)
+            self._watched_topics.add(topic)
         self.queue_change("choose", self._update_selection)
 
     def unwatch(self, topic: str) -> None:
         """Stop delivering the messages of a topic."""
         with self._changed:
-            self._watched.discard(topic)
+            self._watched_topics.discard(topic)
         self.queue_change("choose", self._update_selection)
 
-    def set_history_capacity(self, topic: str, room: int | None) -> None:
+    def set_history_capacity(self, topic: str, capacity: int | None) -> None:
         """Request the history of a topic in addition to its newest messages.
 
         Args:
             topic: Name of the topic.
-            room: Maximum number of messages per tick; None ends the request.
+            capacity: Maximum number of messages per tick; None ends the request.
         """
         with self._changed:
-            if room is None:
+            if capacity is None:
                 self._history_capacities.pop(topic, None)
             else:
-                self._history_capacities[topic] = room
-            self._mailbox.set_capacity(topic, room)
-            is_watched = topic in self._watched
-        if room is not None and is_watched:  # otherwise its history is read when it is watched
+                self._history_capacities[topic] = capacity
+            self._mailbox.set_capacity(topic, capacity)
+            is_watched = topic in self._watched_topics
+        if capacity is not None and is_watched:  # otherwise its history is read when it is watched
             self.queue_change(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
-    def forward(self, topics: Collection[str], to: Forward | None) -> None:
+    def forward(self, topics: Collection[str], callback: Forward | None) -> None:
         """Also pass the played messages of some topics to a callback.
 
         Messages delivered by a seek are not passed.
 
         Args:
             topics: Names of the topics.
-            to: Callback; None ends the forwarding.
+            callback: Callback; None ends the forwarding.
         """
         with self._changed:
-            self._forwarded_topics, self._forward = frozenset(topics), to
+            self._forwarded_topics, self._forward = frozenset(topics), callback
         self.queue_change("choose", self._update_selection)
 
     def pop_results(self) -> ReplayResults:
         """Return and clear the results collected since the last call."""
         with self._changed:
-            handed, self._results = self._results, ReplayResults()
-            handed.drained = self._mailbox.drain()
-        return handed
+            results, self._results = self._results, ReplayResults()
+            results.drain_result = self._mailbox.drain()
+        return results
 
     def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it."""
         with self._changed:
-            self._closing = True
+            self._is_closing = True
             self._changed.notify_all()
         self._opener.close()
 
@@ -238,8 +238,8 @@ class ReplaySource:
         self.request_stop()
         if self._thread.is_alive():
             self._thread.join(timeout_s)
-        elif self.opened is not None:
-            self.opened.recording.close()
+        elif self.opened_recording is not None:
+            self.opened_recording.recording.close()
 
     # -- its thread --------------------------------------------------------------------------------
 
@@ -249,35 +249,35 @@ class ReplaySource:
             while True:
                 wait_s = self.process()
                 with self._changed:
-                    if not self._closing and not self._changes:
+                    if not self._is_closing and not self._queued_changes:
                         self._changed.wait(wait_s)
-                    if self._closing:
+                    if self._is_closing:
                         return
         except _ClosingError:
             return
         except NepError as error:
-            if self._closing:
+            if self._is_closing:
                 return
             reason = error.reason if isinstance(error, RecordingError) else str(error)
             self._status = ReplayStatus("failed", message=reason)
         except Exception as error:  # noqa: BLE001  a file may cause any error, which the window reports
             self._status = ReplayStatus("failed", message=error_text(error))
         finally:
-            if self.opened is not None:
-                self.opened.recording.close()
+            if self.opened_recording is not None:
+                self.opened_recording.recording.close()
 
     def open(self) -> None:
         """Read the index of the file and seek to the first message.
 
         Raises `RecordingError` if the file can't be read.
         """
-        self.opened = opened = open_recording(self.path, self._report_progress, self._opener)
+        self.opened_recording = opened = open_recording(self.path, self._report_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
         self._update_status(playback)
 
     def _report_progress(self, progress: float) -> None:
-        if self._closing:
+        if self._is_closing:
             raise _ClosingError
         self._status = ReplayStatus("reading", progress)
 
@@ -290,13 +290,13 @@ class ReplaySource:
         if playback is None:
             return None
         with self._changed:
-            orders, self._changes = self._changes, []
+            changes, self._queued_changes = self._queued_changes, []
         was_playing = playback.status().is_playing
-        for _kind, change in orders:
+        for _kind, change in changes:
             change(playback)
         if not was_playing and playback.status().is_playing and self._forwarded_topics:
-            first = playback.messages_at_start(self._forwarded_topics)
-            self._forward_messages(first, [0.0] * len(first))
+            start_messages = playback.messages_at_start(self._forwarded_topics)
+            self._forward_messages(start_messages, [0.0] * len(start_messages))
         due = playback.advance()
         if due.is_jump:
             self._apply_seek(due.messages)
@@ -318,62 +318,66 @@ class ReplaySource:
         return 0.0 if self._pending_stats else due.wait_s
 
     def _update_status(self, playback: Playback) -> None:
-        damage = self.opened.recording.corruption if self.opened is not None else ()
+        damage = self.opened_recording.recording.corruption if self.opened_recording is not None else ()
         self._status = ReplayStatus("there", 1.0, player=playback.status(), corruption=damage)
 
     def _update_selection(self, playback: Playback) -> None:
         with self._changed:
-            watched, with_history, sent = (
-                frozenset(self._watched),
+            watched_topics, history_topics, forwarded_topics = (
+                frozenset(self._watched_topics),
                 frozenset(self._history_capacities),
                 self._forwarded_topics,
             )
-        newly_watched = watched - self._panel_topics  # by a panel, from now on
-        new = newly_watched & with_history
-        newest = list(playback.select_topics(watched | sent))
+        newly_watched = watched_topics - self._panel_topics  # by a panel, from now on
+        new_history_topics = newly_watched & history_topics
+        newest = list(playback.select_topics(watched_topics | forwarded_topics))
         # topics played only for the network: no panel has their newest message
-        played = (newly_watched & self._played) - new
-        if played and self.opened is not None:
-            before = self.opened.recording.newest(playback.status().position_ns, played)
-            newest += [each.message for each in before.values()]
-        self._post_messages([each for each in newest if each.topic in newly_watched - new])
-        self._panel_topics, self._played = watched, watched | sent
-        self._read_history(playback, new)
+        forwarded_only = (newly_watched & self._played_topics) - new_history_topics
+        if forwarded_only and self.opened_recording is not None:
+            newest_entries = self.opened_recording.recording.newest(
+                playback.status().position_ns, forwarded_only
+            )
+            newest += [each.message for each in newest_entries.values()]
+        self._post_messages([each for each in newest if each.topic in newly_watched - new_history_topics])
+        self._panel_topics, self._played_topics = watched_topics, watched_topics | forwarded_topics
+        self._read_history(playback, new_history_topics)
 
     def _post_messages(self, messages: Sequence[Message]) -> None:
         if not messages:
             return
         copies = [_own_copy(message) for message in messages]
-        self._pictures.offer([each for each in copies if each.codec == "image"])
+        self._image_sink.offer([each for each in copies if each.codec == "image"])
         with self._changed:
             for topic, group in groupby(sorted(copies, key=_topic), key=_topic):
                 self._mailbox.post(topic, list(group))
 
-    def _forward_messages(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
+    def _forward_messages(self, messages: Sequence[Message], delays_s: Sequence[float]) -> None:
         with self._changed:
-            topics, to = self._forwarded_topics, self._forward
-        forwarded = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
-        if forwarded and to is not None:
-            to([message for message, _late in forwarded], [late for _message, late in forwarded])
+            topics, callback = self._forwarded_topics, self._forward
+        forwarded = [each for each in zip(messages, delays_s, strict=True) if each[0].topic in topics]
+        if forwarded and callback is not None:
+            callback(
+                [message for message, _delay_s in forwarded], [delay_s for _message, delay_s in forwarded]
+            )
 
     def _apply_seek(self, messages: Sequence[Message]) -> None:
         copies = [_own_copy(message) for message in messages if message.topic in self._panel_topics]
-        pictures = [each for each in copies if each.codec == "image"]
-        self._pictures.reset([each.topic for each in pictures])
-        self._pictures.offer(pictures)
+        images = [each for each in copies if each.codec == "image"]
+        self._image_sink.reset([each.topic for each in images])
+        self._image_sink.offer(images)
         with self._changed:
             self._mailbox = Mailbox()
-            for topic, room in self._history_capacities.items():
-                self._mailbox.set_capacity(topic, room)
+            for topic, capacity in self._history_capacities.items():
+                self._mailbox.set_capacity(topic, capacity)
             self._results = ReplayResults(seek_messages=copies)
 
     # -- history -----------------------------------------------------------------------------------
 
     def _read_history(self, playback: Playback, topics: Collection[str]) -> None:
         # Reads messages before the playhead, of topics with history.
-        if not topics or self.opened is None:
+        if not topics or self.opened_recording is None:
             return
-        recording, at_ns = self.opened.recording, playback.status().position_ns
+        recording, at_ns = self.opened_recording.recording, playback.status().position_ns
         history: dict[str, deque[Message]] = {topic: deque() for topic in topics}
         until_ns, start_time_s = at_ns + 1, self._clock()
         for back_s in HISTORY_S:
@@ -401,13 +405,15 @@ class ReplaySource:
         start_time_s: float,
     ) -> bool:
         # Prepends the messages of a range; returns False when the limits are reached.
-        topics = [topic for topic, entry in history.items() if len(entry) < MAX_HISTORY_MESSAGES]
+        topics = [topic for topic, messages in history.items() if len(messages) < MAX_HISTORY_MESSAGES]
         earlier: dict[str, deque[Message]] = {
             topic: deque(maxlen=MAX_HISTORY_MESSAGES - len(history[topic])) for topic in topics
         }
         for number, entry in enumerate(recording.read(span[0], span[1], topics)):
             earlier[entry.message.topic].append(_own_copy(entry.message))
-            if number % 64 == 0 and (self._changes or self._clock() - start_time_s > HISTORY_TIMEOUT_S):
+            if number % 64 == 0 and (
+                self._queued_changes or self._clock() - start_time_s > HISTORY_TIMEOUT_S
+            ):
                 return False  # an incomplete range would be a gap, so it is discarded
         for topic, messages in earlier.items():
             history[topic].extendleft(reversed(messages))
@@ -417,9 +423,9 @@ class ReplaySource:
 
     def _schedule_stats(self, playback: Playback) -> None:
         # Some topics in each cycle, so that no command waits for all.
-        if self.opened is None:
+        if self.opened_recording is None:
             return
-        names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
+        names, at_ns = list(self.opened_recording.recording.topics), playback.status().position_ns
         self._pending_stats = [
             (at_ns, names[k : k + TOPICS_PER_STATS_READ]) for k in range(0, len(names), TOPICS_PER_STATS_READ)
         ]
@@ -429,17 +435,17 @@ class ReplaySource:
         self._stats_duration_s = 0.0
 
     def _read_next_stats(self) -> None:
-        if not self._pending_stats or self.opened is None:
+        if not self._pending_stats or self.opened_recording is None:
             return
-        start_time_s, recording = self._clock(), self.opened.recording
+        start_time_s, recording = self._clock(), self.opened_recording.recording
         at_ns, topics = self._pending_stats.pop(0)
         from_ns = max(recording.start_ns, at_ns - round(RATE_WINDOW_S * 1e9))
-        passed_s = (at_ns - from_ns) / 1e9
-        counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
+        elapsed_s = (at_ns - from_ns) / 1e9
+        counts = recording.densities(from_ns, at_ns + 1, 1, topics) if elapsed_s > 0 else {}
         newest_ns = recording.newest_times(at_ns, topics)
         stats = {
             topic: ReplayStats(
-                counts.get(topic, (0,))[0] / passed_s if passed_s > 0 else None, newest_ns.get(topic)
+                counts.get(topic, (0,))[0] / elapsed_s if elapsed_s > 0 else None, newest_ns.get(topic)
             )
             for topic in topics
         }
@@ -465,8 +471,8 @@ def _own_copy(message: Message) -> Message:
     # Copies small messages, so that they don't keep the chunk of the file.
     if isinstance(message.raw, bytes) or message.size_bytes > MAX_COPIED_BYTES:
         return message
-    copied = new_message(Message)
-    copied.kind, copied.raw = message.kind, bytes(message.raw)
-    copied.stamp_ns, copied.seq, copied.publisher = message.stamp_ns, message.seq, message.publisher
-    copied.extension, copied.decoded = message.extension, message.decoded
-    return copied
+    copy = new_message(Message)
+    copy.kind, copy.raw = message.kind, bytes(message.raw)
+    copy.stamp_ns, copy.seq, copy.publisher = message.stamp_ns, message.seq, message.publisher
+    copy.extension, copy.decoded = message.extension, message.decoded
+    return copy

@@ -63,31 +63,31 @@ class _Lane:
 
     def __init__(self, first_ns: int, last_ns: int) -> None:
         self._first_ns, self._last_ns = first_ns, last_ns
-        self._by_id: dict[str, RecordedSpan] = {}
+        self._spans_by_id: dict[str, RecordedSpan] = {}
         self._omitted_ids: set[str] = set()
 
     @property
     def omitted_count(self) -> int:
         return len(self._omitted_ids)
 
-    def sorted(self) -> tuple[RecordedSpan, ...]:
-        return tuple(sorted(self._by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
+    def sorted_spans(self) -> tuple[RecordedSpan, ...]:
+        return tuple(sorted(self._spans_by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
 
     def add(self, id: str, span: RecordedSpan) -> None:
         # The start is the earliest of all records.
-        existing = self._by_id.get(id)
-        if existing is None and len(self._by_id) >= MAX_SPANS:
+        existing = self._spans_by_id.get(id)
+        if existing is None and len(self._spans_by_id) >= MAX_SPANS:
             if len(self._omitted_ids) < MAX_SPANS:
                 self._omitted_ids.add(id)
             return
         start_ns = self._clamp(span.start_ns if existing is None else min(existing.start_ns, span.start_ns))
         end_ns = max(start_ns, self._clamp(span.end_ns))
-        self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
+        self._spans_by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
 
     def end_span(self, id: str, at_ns: int) -> None:
-        existing = self._by_id.get(id)
+        existing = self._spans_by_id.get(id)
         if existing is not None:
-            self._by_id[id] = replace(
+            self._spans_by_id[id] = replace(
                 existing, end_ns=max(existing.start_ns, self._clamp(at_ns)), has_ended=True
             )
 
@@ -104,18 +104,20 @@ def spans_of(recording: Recording) -> RecordedSpans:
             if isinstance(entry, Mapping) and isinstance(entry.get("id"), str):
                 lane.add(entry["id"], _parse_span(entry, at_ns, last_ns))
     _read_alerts(recording, alarms)
-    return RecordedSpans(runs.sorted(), alarms.sorted(), runs.omitted_count + alarms.omitted_count)
+    return RecordedSpans(
+        runs.sorted_spans(), alarms.sorted_spans(), runs.omitted_count + alarms.omitted_count
+    )
 
 
 def _parse_span(entry: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
-    since, until = entry.get("since_ns"), entry.get("until_ns")
-    is_over = type(until) is int
+    since_ns, until_ns = entry.get("since_ns"), entry.get("until_ns")
+    has_ended = type(until_ns) is int
     result = _text(entry, "result")
     return RecordedSpan(
-        since if type(since) is int and since <= at_ns else at_ns,
-        until if type(until) is int else last_ns,
+        since_ns if type(since_ns) is int and since_ns <= at_ns else at_ns,
+        until_ns if type(until_ns) is int else last_ns,
         _text(entry, "name"),
-        is_over,
+        has_ended,
         result if result in RESULTS else "",
         _text(entry, "words"),
         entry.get("severity") == "error",
@@ -125,7 +127,7 @@ def _parse_span(entry: Mapping[str, object], at_ns: int, last_ns: int) -> Record
 
 def _read_alerts(recording: Recording, lane: _Lane) -> None:
     # Each change of the graph's alerts lists all of them.
-    present: dict[str, str] = {}
+    span_ids: dict[str, str] = {}
     for at_ns, entry in recording.entries("alerts"):
         alert_list = entry.get("alerts") if isinstance(entry, Mapping) else None
         alerts_by_id = {
@@ -133,14 +135,14 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
             for alert in (alert_list if isinstance(alert_list, list) else ())[:MAX_SPANS]
             if isinstance(alert, Mapping) and _text(alert, "id")
         }
-        for ended_id in [id for id in present if id not in alerts_by_id]:
-            lane.end_span(present.pop(ended_id), at_ns)
+        for ended_id in [id for id in span_ids if id not in alerts_by_id]:
+            lane.end_span(span_ids.pop(ended_id), at_ns)
         for id, alert in alerts_by_id.items():
-            if id not in present:
-                present[id] = f"alert-{id}-{at_ns}"
+            if id not in span_ids:
+                span_ids[id] = f"alert-{id}-{at_ns}"
                 _kind, _colon, topic = id.partition(":")
                 lane.add(
-                    present[id],
+                    span_ids[id],
                     RecordedSpan(at_ns, recording.end_ns, _text(alert, "sentence") or id, topic=topic),
                 )
 

@@ -29,14 +29,14 @@ class BridgedCommands:
             else set()
         )
         counts: dict[int, int] = {}
-        moved: list[str] = []
+        moved_robots: list[str] = []
         for robot in robots if bridges else ():
             topic = view.topics.get(robot.topics.command)
             for publisher in topic.publishers if topic is not None else ():
                 if publisher.node_id in bridges:
                     counts[publisher.id] = publisher.count
                     if publisher.count > self._counts.get(publisher.id, 0):
-                        moved.append(robot.name)
+                        moved_robots.append(robot.name)
         self._counts = counts
-        if moved:
-            self._on_moved(tuple(dict.fromkeys(moved)), "bridge")
+        if moved_robots:
+            self._on_moved(tuple(dict.fromkeys(moved_robots)), "bridge")

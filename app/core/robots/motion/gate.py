@@ -31,12 +31,12 @@ class GatedRobots(Protocol):
         """Topics whose messages move robots. Replaced by a new object when they change."""
 
     @property
-    def movable(self) -> Iterable[Robot]:
+    def movable_robots(self) -> Iterable[Robot]:
         """Robots that can be moved."""
 
     @property
     def described_topics(self) -> frozenset[str]:
-        """Description topics of the `movable` robots whose descriptions are valid."""
+        """Description topics of the `movable_robots` robots whose descriptions are valid."""
 
 
 class MovableRobots:
@@ -46,11 +46,11 @@ class MovableRobots:
         self._links, self._names = links, names
         self.view = GraphView(0, 0)
         """Newest graph."""
-        self._key: object = None
-        self._moving = MovingTopics()
+        self._cache_key: object = None
+        self._moving_topics = MovingTopics()
 
     @property
-    def movable(self) -> tuple[Robot, ...]:
+    def movable_robots(self) -> tuple[Robot, ...]:
         """Robots that can be moved, including real robots whose connection is lost."""
         return tuple(link.robot for link in self._movable_links)
 
@@ -68,14 +68,14 @@ class MovableRobots:
     def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots. Replaced by a new object when they change."""
         links = self._movable_links
-        now = [(link.robot, link.earlier_topics, link.identity) for link in links]
-        described = self.described_topics
-        key = (self.view.epoch, self.view.revision, described, now)
-        if key != self._key:
+        robot_states = [(link.robot, link.earlier_topics, link.identity) for link in links]
+        described_topics = self.described_topics
+        key = (self.view.epoch, self.view.revision, described_topics, robot_states)
+        if key != self._cache_key:
             controls = [controls_of(link.robot, link.earlier_topics) for link in links]
-            unread = description_topics(self.view) - described
-            self._key, self._moving = key, moving_topics(self.view, controls, unread)
-        return self._moving
+            unread_topics = description_topics(self.view) - described_topics
+            self._cache_key, self._moving_topics = key, moving_topics(self.view, controls, unread_topics)
+        return self._moving_topics
 
 
 class _Snapshot(NamedTuple):
@@ -94,7 +94,7 @@ class MotionGate:
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
         self._permission, self._robots = permission, robots
-        self._followed_state: tuple[MovingTopics, int] | None = None
+        self._snapshot_source: tuple[MovingTopics, int] | None = None
         self._snapshot = _Snapshot()
 
     def robots_moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
@@ -112,43 +112,45 @@ class MotionGate:
         return not self.rejection_reason(topic, msg_type)
 
     def request_permission(
-        self, topic: str, go_on: Callable[[], object], msg_type: str = "", *, reason: str = ""
+        self, topic: str, on_allow: Callable[[], object], msg_type: str = "", *, reason: str = ""
     ) -> bool:
         """Return True if a message may be published now; otherwise ask the user and return False.
 
         Args:
             topic: Topic of the message.
-            go_on: Called if the user allows the motion.
+            on_allow: Called if the user allows the motion.
             msg_type: Message type; "" if unknown.
             reason: Sentence for the user about the part of Studio that wants to publish.
         """
-        robots_by_name = {robot.name: robot for robot in self._robots.movable}
+        robots_by_name = {robot.name: robot for robot in self._robots.movable_robots}
         names = self.robots_moved_by(topic, msg_type)
         targets = [
             (robots_by_name[name], _action_names(robots_by_name[name]))
             for name in names
             if name in robots_by_name
         ]
-        strangers = [name for name in names if name not in robots_by_name]
-        is_permitted = self._permission.request_permission(targets, go_on, strangers, reason)
+        unknown_robots = [name for name in names if name not in robots_by_name]
+        is_permitted = self._permission.request_permission(targets, on_allow, unknown_robots, reason)
         self.update()
         return is_permitted
 
     def update(self) -> None:
         """Update the robots and permissions that `rejection_reason` uses."""
-        now = self._robots.moving_topics, self._permission.revision
-        if now == self._followed_state:
+        source = self._robots.moving_topics, self._permission.revision
+        if source == self._snapshot_source:
             return
-        robots_by_name = {robot.name: robot for robot in self._robots.movable}
-        allowed = {
+        robots_by_name = {robot.name: robot for robot in self._robots.movable_robots}
+        allowed_names = {
             name
             for name, robot in robots_by_name.items()
             if self._permission.is_allowed(robot) or not risky_action_titles(robot, _action_names(robot))
         }
         # a permission counts until the robot is identified
-        strangers = self._permission.allowed_unknown_robots - robots_by_name.keys()
-        self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described_topics)
-        self._followed_state = now
+        unknown_robots = self._permission.allowed_unknown_robots - robots_by_name.keys()
+        self._snapshot = _Snapshot(
+            source[0], unknown_robots | allowed_names, unknown_robots, self._robots.described_topics
+        )
+        self._snapshot_source = source
 
     def rejection_reason(self, topic: str, msg_type: str = "") -> str:
         """Return the reason why a message may not be published now; "" if it may be published.
@@ -180,9 +182,10 @@ class MotionGate:
         except NepError:
             return ""  # no node can have joined without the master
         snapshot = self._snapshot
-        newcomers = moving_topics(view, (), description_topics(view) - snapshot.described_topics)
+        new_moving_topics = moving_topics(view, (), description_topics(view) - snapshot.described_topics)
         return _rejection_text(
-            topic, [name for name in newcomers.robots_on(topic) if name not in snapshot.unknown_robots]
+            topic,
+            [name for name in new_moving_topics.robots_on(topic) if name not in snapshot.unknown_robots],
         )
 
 

@@ -91,7 +91,7 @@ class MotionPermission:
     ) -> None:
         # `settings` store the *always* permissions; `identity_of` returns a robot's program.
         self._settings, self._identity_of = settings, identity_of
-        self._allowed: set[str] = set()
+        self._allowed_keys: set[str] = set()
         self.allowed_unknown_robots: frozenset[str] = frozenset()
         """Allowed robots without a readable description, and topics of unknown robots that were allowed."""
         self._question_keys: tuple[tuple[str, str], ...] = ()
@@ -103,15 +103,15 @@ class MotionPermission:
         """Return True if this robot may be moved without asking the user."""
         return (
             robot.virtual
-            or self._program_key(robot) in self._allowed
+            or self._program_key(robot) in self._allowed_keys
             or self._key(robot) in self._always_allowed()
         )
 
     def request_permission(
         self,
         requested: Iterable[tuple[Robot, Sequence[str]]],
-        go_on: Callable[[], object],
-        strangers: Iterable[str] = (),
+        on_allow: Callable[[], object],
+        unknown_robots: Iterable[str] = (),
         reason: str = "",
     ) -> bool:
         """Return True if the robots may move now; otherwise ask the user and return False.
@@ -120,8 +120,8 @@ class MotionPermission:
 
         Args:
             requested: Robots and the actions that they should execute.
-            go_on: Called if the user allows the motion.
-            strangers: Robots without a readable description, or topics of unknown robots, that would
+            on_allow: Called if the user allows the motion.
+            unknown_robots: Robots without a readable description, or topics of unknown robots, that would
                 move too.
             reason: Sentence about the origin of the command, or "" for a command of the user.
         """
@@ -130,23 +130,23 @@ class MotionPermission:
             for robot, actions in requested
             if not self.is_allowed(robot)
         ]
-        open_ = [(robot, moves) for robot, moves in unconfirmed if moves]
-        unknown = tuple(name for name in strangers if name not in self.allowed_unknown_robots)
-        if not open_ and not unknown:
+        moving = [(robot, titles) for robot, titles in unconfirmed if titles]
+        unconfirmed_names = tuple(name for name in unknown_robots if name not in self.allowed_unknown_robots)
+        if not moving and not unconfirmed_names:
             return True
-        self._question_keys = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
+        self._question_keys = tuple((self._program_key(robot), self._key(robot)) for robot, _key in moving)
         self.question = PermissionQuestion(
-            {robot.name: moves for robot, moves in open_}, go_on, unknown, reason
+            {robot.name: titles for robot, titles in moving}, on_allow, unconfirmed_names, reason
         )
         self.revision += 1
         return False
 
-    def answer(self, *, is_allowed: bool, always: bool = False) -> None:
+    def answer(self, *, is_allowed: bool, is_permanent: bool = False) -> None:
         """Apply the user's answer to the question.
 
         Args:
             is_allowed: True to allow the motion and call `PermissionQuestion.on_allow`.
-            always: True to save the permission.
+            is_permanent: True to save the permission.
 
         Raises:
             SettingsError: The permission can't be saved.
@@ -155,10 +155,10 @@ class MotionPermission:
         self.revision += 1
         if question is None or not is_allowed:
             return
-        self._allowed.update(now for now, _key in self._question_keys)
+        self._allowed_keys.update(program_key for program_key, _key in self._question_keys)
         self.allowed_unknown_robots |= set(question.unknown_robots)
         try:
-            if always and self._settings is not None:
+            if is_permanent and self._settings is not None:
                 self._settings.set(
                     SETTING_KEY,
                     sorted({*self._always_allowed(), *(key for _program_key, key in self._question_keys)}),
@@ -178,7 +178,7 @@ class MotionPermission:
         Raises:
             SettingsError: The settings can't be written. Saved permissions remain valid.
         """
-        self._allowed.clear()
+        self._allowed_keys.clear()
         self.allowed_unknown_robots = frozenset()
         self.revision += 1
         if self._settings is not None:
@@ -226,12 +226,12 @@ def actions_by_robot(program: Program, robots: Iterable[Robot]) -> list[tuple[Ro
 
     If the program publishes on the topics of a robot directly, all actions of that robot are included.
     """
-    actions_by_name, moved = program.actions, program.moves
+    actions_by_name, moved_names = program.actions, program.moves
     return [
         (
             robot,
             [action.name for action in robot.actions]
-            if actions_by_name is None or robot.name in moved
+            if actions_by_name is None or robot.name in moved_names
             else actions_by_name.get(robot.name, ()),
         )
         for robot in robots

@@ -116,14 +116,14 @@ class StopChannel:
     subscriber: StopSubscriber | None
     was_connected: bool = False
 
-    def is_connected(self, target: StopTarget, hearers: Collection[str]) -> bool:
+    def is_connected(self, target: StopTarget, subscribed_nodes: Collection[str]) -> bool:
         """Return True if a message published now would reach the robot.
 
         Robots of RIZE share one topic and can't be distinguished, so they count as connected.
 
         Args:
             target: Robot to be stopped.
-            hearers: Nodes that subscribe to the topic.
+            subscribed_nodes: Nodes that subscribe to the topic.
         """
         program = target.identity
         if self.subscriber is None or program is None:
@@ -131,9 +131,9 @@ class StopChannel:
         else:
             # By name: a hung program that was restarted may still be missing although all others are
             # connected.
-            connected, missing = self.publisher.subscribers, self.publisher.missing
-            is_complete = program.node not in missing or connected >= len(hearers)
-            is_reachable = program.node_id in hearers and connected > 0 and is_complete
+            connected_count, missing_names = self.publisher.subscribers, self.publisher.missing
+            is_complete = program.node not in missing_names or connected_count >= len(subscribed_nodes)
+            is_reachable = program.node_id in subscribed_nodes and connected_count > 0 and is_complete
         self.was_connected |= is_reachable
         return is_reachable
 

@@ -41,7 +41,7 @@ _MESSAGES = {
 _OTHER_MESSAGE = lazy("{robot} received a command and hasn't responded since")
 
 
-def ignore_moved(_names: Sequence[str], _by: str) -> None:
+def ignore_moved(_names: Sequence[str], _sender: str) -> None:
     """Do nothing; the default `OnMoved`."""
 
 
@@ -83,16 +83,16 @@ class MovedRobots:
         program_of: Callable[[str], Identity | None] = lambda _name: None,
         has_ended: Callable[[Identity], bool] = lambda _program: False,
         clock: Callable[[], float] = time.monotonic,
-        others_of: Callable[[str], Iterable[Identity]] = lambda _name: (),
+        other_programs_of: Callable[[str], Iterable[Identity]] = lambda _name: (),
     ) -> None:
-        # `others_of` returns other programs that receive a robot's commands and publish its replies.
+        # `other_programs_of` returns other programs that receive a robot's commands and publish its replies.
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
-        self._others_of = others_of
+        self._other_programs_of = other_programs_of
         self._motions: dict[str, list[UnconfirmedMotion]] = {}
-        self._count = 0
-        self._sent: dict[str, UnconfirmedMotion] = {}
+        self._last_number = 0
+        self._recent_commands: dict[str, UnconfirmedMotion] = {}
         """Newest command to each robot, as far as sent since the last but one graph."""
-        self._proven: dict[str, int] = {}
+        self._proven_stops: dict[str, int] = {}
         """Value of `mark` at each proven Stop since the last but one graph, by node id of the program."""
         self._graph_mark = 0
         """Value of `mark` when the newest graph arrived."""
@@ -108,12 +108,12 @@ class MovedRobots:
     @property
     def mark(self) -> int:
         """Number of the newest motion. A Stop that starts now does not end motions with greater numbers."""
-        return self._count
+        return self._last_number
 
     @property
     def recently_commanded(self) -> tuple[str, ...]:
         """Names of the robots that received a command after the second newest graph."""
-        return tuple(self._sent)
+        return tuple(self._recent_commands)
 
     def motion(self, name: str) -> UnconfirmedMotion | None:
         """Return the newest motion of a robot; None if the robot isn't recorded.
@@ -131,70 +131,74 @@ class MovedRobots:
             name: Name of the robot.
             current: Robot's own program.
         """
-        others = {
+        other_programs = {
             motion.program.node_id: motion.program
             for motion in self._motions.get(name, ())
             if motion.program is not None
             and (current is None or motion.program.node_id != current.node_id)
             and not self._has_ended(motion.program)
         }
-        return tuple(others.values())
+        return tuple(other_programs.values())
 
     def record_command(
-        self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None
+        self, names: Iterable[str], sender: str, *, id: str = "", program: Identity | None = None
     ) -> None:
         """Record that robots are about to receive a command that may move them. Call this before sending.
 
         Args:
             names: Names of the robots.
-            by: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
+            sender: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
             id: Id of the invocation whose final reply ends the motion; "" if there is none.
             program: Program of the robot; default: the current one.
         """
         for name in names:
-            self._count += 1
+            self._last_number += 1
             target_program = program if program is not None else self._program_of(name)
-            motion = UnconfirmedMotion(self._count, name, by, self._clock(), target_program, id)
+            motion = UnconfirmedMotion(self._last_number, name, sender, self._clock(), target_program, id)
             motions = self._motions.setdefault(name, [])
             if not id or len(motions) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
                 motion = replace(motion, id="")
                 motions[:] = [
-                    each for each in motions if each.id or (each.sender, each.program) != (by, motion.program)
+                    each
+                    for each in motions
+                    if each.id or (each.sender, each.program) != (sender, motion.program)
                 ]
             motions.append(motion)
             if program is None:
-                self._sent[name] = motion
-                self._record_others(name, by, motions)
+                self._recent_commands[name] = motion
+                self._record_others(name, sender, motions)
 
-    def _record_others(self, name: str, by: str, motions: list[UnconfirmedMotion]) -> None:
+    def _record_others(self, name: str, sender: str, motions: list[UnconfirmedMotion]) -> None:
         # Other programs of the same robot received the command too: a frozen one may execute it when it
         # resumes.
         recorded_programs = {motion.program for motion in motions if not motion.id}
-        for other in self._others_of(name):
+        for other in self._other_programs_of(name):
             if other not in recorded_programs and len(motions) < MAX_MOTIONS:
-                motions.append(UnconfirmedMotion(self._count, name, by, self._clock(), other))
+                motions.append(UnconfirmedMotion(self._last_number, name, sender, self._clock(), other))
 
-    def record_new_programs(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
+    def record_new_programs(self, new_programs: Mapping[str, Iterable[Identity]]) -> None:
         """Record commands that newly listed programs may have received before the graph listed them.
 
         Call this once for each graph. A graph is older than the call, so all commands after the second
         newest graph count.
 
         Args:
-            newcomers: New programs of each robot in `recently_commanded`.
+            new_programs: New programs of each robot in `recently_commanded`.
         """
-        for name, programs in newcomers.items():
-            sent, motions = self._sent[name], self._motions.get(name, [])
-            recorded_programs = {motion.program for motion in motions if motion.number >= sent.number}
+        for name, programs in new_programs.items():
+            command, motions = self._recent_commands[name], self._motions.get(name, [])
+            recorded_programs = {motion.program for motion in motions if motion.number >= command.number}
             for program in programs:
-                is_still = self._proven.get(program.node_id, -1) >= sent.number
-                if program not in recorded_programs and not is_still and len(motions) < MAX_MOTIONS:
-                    motions.append(replace(sent, program=program, id=""))
+                has_stopped = self._proven_stops.get(program.node_id, -1) >= command.number
+                if program not in recorded_programs and not has_stopped and len(motions) < MAX_MOTIONS:
+                    motions.append(replace(command, program=program, id=""))
             if motions:
                 self._motions[name] = motions
-        last, self._graph_mark = self._graph_mark, self._count
-        self._sent = {name: sent for name, sent in self._sent.items() if sent.number > last}
-        self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
+        previous_mark, self._graph_mark = self._graph_mark, self._last_number
+        self._recent_commands = {
+            name: command for name, command in self._recent_commands.items() if command.number > previous_mark
+        }
+        self._proven_stops = {node: mark for node, mark in self._proven_stops.items() if mark > previous_mark}
 
     def end_motion(self, name: str, id: str, program: Identity | None = None) -> None:
         """End a motion after the program that executed it has sent the final reply.
@@ -205,13 +209,13 @@ class MovedRobots:
             program: Program that replied; None ends the motion of every program.
         """
 
-        def remains(motion: UnconfirmedMotion) -> bool:
+        def is_other_motion(motion: UnconfirmedMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
                 return motion.id != id
             return program.node_id != motion.program.node_id
 
         if id:
-            self._retain_motions(name, remains)
+            self._retain_motions(name, is_other_motion)
 
     def record_stopped(self, name: str, programs: Collection[str], mark: int) -> None:
         """End the motions of programs that confirmed a Stop. Motions of other programs remain.
@@ -221,7 +225,7 @@ class MovedRobots:
             programs: Node ids of the programs.
             mark: Value of `mark` when the Stop started.
         """
-        self._proven |= dict.fromkeys(programs, mark)
+        self._proven_stops |= dict.fromkeys(programs, mark)
         self._retain_motions(
             name,
             lambda motion: (
@@ -255,14 +259,14 @@ class MovedRobots:
             mark: Value of `mark` when the Stop started.
         """
         self._retain_motions(name, lambda motion: motion.number > mark)
-        if name in self._sent and self._sent[name].number <= mark:
-            del self._sent[name]
+        if name in self._recent_commands and self._recent_commands[name].number <= mark:
+            del self._recent_commands[name]
 
     def confirm(self, names: Iterable[str]) -> None:
         """Remove robots that have stopped according to the user."""
         for name in names:
             self._motions.pop(name, None)
-            self._sent.pop(name, None)
+            self._recent_commands.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
         """End the motions of a virtual robot whose program has exited.
@@ -273,8 +277,8 @@ class MovedRobots:
             name, lambda motion: motion.program is None or not self._has_ended(motion.program)
         )
 
-    def _retain_motions(self, name: str, stays: Callable[[UnconfirmedMotion], bool]) -> None:
-        retained = [motion for motion in self._motions.get(name, ()) if stays(motion)]
+    def _retain_motions(self, name: str, is_retained: Callable[[UnconfirmedMotion], bool]) -> None:
+        retained = [motion for motion in self._motions.get(name, ()) if is_retained(motion)]
         if retained:
             self._motions[name] = retained
         else:

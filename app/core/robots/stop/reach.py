@@ -20,12 +20,14 @@ MAX_UNLISTED = 256
 """Maximum number of unlisted robots that a Stop is sent to; further robots are reported as not reached."""
 MAX_ABSENT = 64
 """Maximum number of disconnected robots that a Stop is sent to because they replied earlier."""
-_COMMAND, _ANSWER = "robot/command", "robot/answer"
-_DEFAULT_SAFE_STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
+_COMMAND_TYPE, _REPLY_TYPE = "robot/command", "robot/answer"
+_DEFAULT_SAFE_STOP = SafeStop(
+    "stop", None, 0.0, stops_on_program_end=True, stops_on_disconnect=True, can_confirm=True
+)
 
 
 def targets_of(
-    links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
+    links: Iterable[RobotLink], moved_robots: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
     """Return the targets of a Stop.
 
@@ -34,28 +36,28 @@ def targets_of(
 
     Args:
         links: Listed robots.
-        moved: Record of the robots that may be moving.
+        moved_robots: Record of the robots that may be moving.
         unlisted: Targets for robots that are not listed.
     """
     expected, absent = [], []
     for link in links:
-        is_expected = link.is_connected or link.name in moved
-        earlier = moved.other_programs(link.name, link.identity)
-        target = StopTarget(link.robot, link.identity, earlier, link.earlier_topics, is_expected)
+        is_expected = link.is_connected or link.name in moved_robots
+        earlier_programs = moved_robots.other_programs(link.name, link.identity)
+        target = StopTarget(link.robot, link.identity, earlier_programs, link.earlier_topics, is_expected)
         if is_expected:
             expected.append(target)
         elif link.has_confirmed_stop or link.last_reply_s is not None:
             absent.append(target)
     names = {target.robot.name for target in expected}
-    others = [target for target in unlisted if target.robot.name not in names]
-    unknown = [_unknown_target(topic) for topic in moved.names if "/" in topic]
-    return (*expected, *unknown, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
+    other_targets = [target for target in unlisted if target.robot.name not in names]
+    unknown_targets = [_unknown_target(topic) for topic in moved_robots.names if "/" in topic]
+    return (*expected, *unknown_targets, *absent[:MAX_ABSENT], *other_targets[:MAX_UNLISTED])
 
 
 def _unknown_target(topic: str) -> StopTarget:
     # Target for a command topic that moved a robot without a description.
-    home = topic.rpartition("/")[0]
-    return StopTarget(_placeholder_robot(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
+    base = topic.rpartition("/")[0]
+    return StopTarget(_placeholder_robot(topic, RobotTopics(f"{base}/description", topic, f"{base}/answer")))
 
 
 def _placeholder_robot(name: str, topics: RobotTopics) -> Robot:
@@ -77,26 +79,29 @@ def unlisted_targets(
     descriptions = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
     if not descriptions:
         return ()
-    subscribed_topics, published_topics = _topics_by_node(view, _COMMAND), _topics_by_node(view, _ANSWER)
+    subscribed_topics, published_topics = (
+        _topics_by_node(view, _COMMAND_TYPE),
+        _topics_by_node(view, _REPLY_TYPE),
+    )
     targets = []
     for topic in descriptions:
         name, nodes = _name_of(topic), publisher_nodes(view, topic)
         node = nodes[0] if nodes else ""
-        home = topic_of(name, "command")
-        extra_commands = [each for each in subscribed_topics.get(node, ()) if each != home]
-        commands = [*([home] if subscriber_nodes(view, home) else []), *extra_commands]
+        command_topic = topic_of(name, "command")
+        extra_topics = [each for each in subscribed_topics.get(node, ()) if each != command_topic]
+        command_topics = [*([command_topic] if subscriber_nodes(view, command_topic) else []), *extra_topics]
         reply_topics = published_topics.get(node, ())
         reply_topic = topic_of(name, "answer")
         reply_topic = reply_topic if reply_topic in reply_topics or not reply_topics else reply_topics[0]
-        topic_sets = [RobotTopics(topic, command, reply_topic) for command in commands]
+        topic_sets = [RobotTopics(topic, command, reply_topic) for command in command_topics]
         if topic_sets:
             identity = identity_of(view, node) if node else None
-            others = tuple(topic_sets[1:])
+            earlier_topics = tuple(topic_sets[1:])
             targets.append(
                 StopTarget(
                     _placeholder_robot(name, topic_sets[0]),
                     identity,
-                    earlier_topics=others,
+                    earlier_topics=earlier_topics,
                     is_expected=is_expected,
                 )
             )
@@ -112,7 +117,9 @@ def _topics_by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
     topics_by_node: dict[str, list[str]] = {}
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:
-            nodes = subscriber_nodes(view, topic) if msg_type == _COMMAND else publisher_nodes(view, topic)
+            nodes = (
+                subscriber_nodes(view, topic) if msg_type == _COMMAND_TYPE else publisher_nodes(view, topic)
+            )
             for node in nodes:
                 topics_by_node.setdefault(node, []).append(topic)
     return topics_by_node

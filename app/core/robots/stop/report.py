@@ -129,8 +129,8 @@ class StopReport:
         """Worst result of each robot among all its programs, by the robot's name."""
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
-            before = worst.get(robot.name)
-            if before is None or (robot.problem and not (before.problem and not before.program)):
+            previous = worst.get(robot.name)
+            if previous is None or (robot.problem and not (previous.problem and not previous.program)):
                 worst[robot.name] = robot
         return worst
 
@@ -146,9 +146,9 @@ class StopReport:
     @property
     def stopped_names(self) -> tuple[str, ...]:
         """Names of the robots that are proven to have stopped, because all their programs confirmed."""
-        silent = self.unconfirmed_names
+        unconfirmed = self.unconfirmed_names
         confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.is_confirmed)
-        return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
+        return tuple(dict.fromkeys(name for name in confirmed if name not in unconfirmed))
 
     def with_unreached(self, names: Iterable[str], reason: str = "") -> StopReport:
         """Return the report with a result added for each of these robots that is missing from it.
@@ -158,19 +158,19 @@ class StopReport:
             reason: Reason why the missing robots were not reached.
         """
         reported_names = {robot.name for robot in self.robots}
-        missing = [
+        unreached = [
             unreached_result(name, reason) for name in dict.fromkeys(names) if name not in reported_names
         ]
-        return replace(self, robots=(*self.robots, *missing)) if missing else self
+        return replace(self, robots=(*self.robots, *unreached)) if unreached else self
 
-    def with_late_reply(self, late: RobotStop) -> StopReport:
+    def with_late_reply(self, reply: RobotStop) -> StopReport:
         """Return the report with a late reply applied; unchanged if it doesn't include the program."""
-        lines = ((robot.name, robot.program) for robot in self.robots)
-        if (late.name, late.program) not in lines:
+        keys = ((robot.name, robot.program) for robot in self.robots)
+        if (reply.name, reply.program) not in keys:
             return self
-        same = (late.name, late.program)
-        robots = (late if (robot.name, robot.program) == same else robot for robot in self.robots)
-        return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, late.elapsed_ms or 0.0))
+        key = (reply.name, reply.program)
+        robots = (reply if (robot.name, robot.program) == key else robot for robot in self.robots)
+        return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, reply.elapsed_ms or 0.0))
 
 
 def unreached_result(name: str, reason: str = "") -> RobotStop:

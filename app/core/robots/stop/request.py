@@ -24,7 +24,7 @@ class StopRequest:
 
     Attributes:
         on_late: Called with each reply after the timeout, or None.
-        ends: Key of a program whose further commands the robot rejects, or None.
+        program_key: Key of a program whose further commands the robot rejects, or None.
         error: Reason why the Stop could not be sent, or "".
         replies: Reply of each program that serves the robot, by node; None while pending. Empty until
             the programs are known.
@@ -39,7 +39,7 @@ class StopRequest:
     id: str
     sent_s: float
     on_late: Callable[[RobotStop], object] | None
-    ends: str | None = None
+    program_key: str | None = None
     error: str = ""
     replies: dict[str, RobotStop | None] = field(default_factory=dict)
     program_names: dict[str, str] = field(default_factory=dict)
@@ -65,7 +65,12 @@ class StopRequest:
         return bool(self.replies) and all(each and each.is_confirmed for each in self.replies.values())
 
     def record_sent(self, topics: RobotTopics, now: float) -> None:
-        """Record that the command was sent on a topic while the robot was connected."""
+        """Record that the robot was connected when the command was sent on its command topic.
+
+        Args:
+            topics: Topics of the robot.
+            now: Current time in seconds.
+        """
         self.delivered_topics.add(topics)
         if self.delivered_s is None:
             self.delivered_s = now
@@ -84,14 +89,14 @@ class StopRequest:
 
     def results(self) -> list[RobotStop]:
         """Return the result of each program. Programs without a reply are unproven."""
-        unconnected = self.line.connection_problem
-        silent = RobotStop(
-            self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
+        problem = self.line.connection_problem
+        no_reply = RobotStop(
+            self.line.name, False, None, error=self.error or problem, is_pending=bool(problem)
         )
         if not self.replies:
-            return [silent]
+            return [no_reply]
         return [
-            each or replace(silent, program=self.program_names.get(node, ""))
+            each or replace(no_reply, program=self.program_names.get(node, ""))
             for node, each in self.replies.items()
         ]
 
@@ -110,16 +115,16 @@ class StopRequest:
         state = None if reply is None else reply.get("state")
         if reply is None or reply.get("id") != self.id or state not in ("succeeded", "failed"):
             return False
-        before, is_still = self.replies[node], state == "succeeded"
-        if before is not None and (before.is_confirmed or not is_still):
+        previous, has_stopped = self.replies[node], state == "succeeded"
+        if previous is not None and (previous.is_confirmed or not has_stopped):
             return False
         waited_ms = 0.0 if self.delivered_s is None else (self.delivered_s - self.sent_s) * 1000
         self.replies[node] = RobotStop(
             self.line.name,
-            is_still,
+            has_stopped,
             (now - self.sent_s) * 1000,
-            error="" if is_still else format_error(reply.get("error")),
-            has_failed=not is_still,
+            error="" if has_stopped else format_error(reply.get("error")),
+            has_failed=not has_stopped,
             program=self.program_names.get(node, ""),
             node=node,
             waited_ms=waited_ms if waited_ms > MIN_DISPLAYED_WAIT_MS else 0.0,

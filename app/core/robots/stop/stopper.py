@@ -58,15 +58,15 @@ TIMEOUT_MARGIN_S = 0.5
 MAX_STOP_TIMEOUT_S = 10.0
 
 
-def stop_timeout_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_TIMEOUT_S) -> float:
+def stop_timeout_s(robots: Iterable[Robot], max_timeout_s: float = MAX_STOP_TIMEOUT_S) -> float:
     """Return the time limit in seconds for a Stop, which exceeds the time limits of the robots' drivers.
 
     Args:
         robots: Robots to stop.
-        longest_s: Maximum of the result.
+        max_timeout_s: Maximum of the result.
     """
     needed_s = max((robot.safe_stop.within_s + TIMEOUT_MARGIN_S for robot in robots), default=0.0)
-    return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
+    return min(max_timeout_s, max(STOP_TIMEOUT_S, needed_s))
 
 
 class RobotStopper:
@@ -76,16 +76,16 @@ class RobotStopper:
         self,
         node: StopNode,
         clock: Callable[[], float] = time.monotonic,
-        longest_s: float = MAX_STOP_TIMEOUT_S,
+        max_timeout_s: float = MAX_STOP_TIMEOUT_S,
     ) -> None:
-        # `longest_s` limits the wait for replies. Robots are added by `set_robots`.
-        self._longest_s = longest_s
+        # `max_timeout_s` limits the wait for replies. Robots are added by `set_robots`.
+        self._max_timeout_s = max_timeout_s
         self._node = node
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
         self._changed = threading.Condition()
         self._opening_lock = threading.Lock()  # held while opening connections
-        self._openers: list[threading.Thread] = []
+        self._opener_threads: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
         self._requests: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
@@ -103,13 +103,13 @@ class RobotStopper:
             self._senders.update(
                 view, {topic_set.reply for target in targets for topic_set in target.topic_sets}
             )
-            late = [
+            late_replies = [
                 reply
                 for request in self._requests.values()
                 for reply in self._apply_held_replies_locked(request)
             ]
             self._changed.notify_all()
-        for notify, reply in late:
+        for notify, reply in late_replies:
             notify(reply)
 
     def set_expected(self, targets: Iterable[StopTarget]) -> None:
@@ -170,12 +170,12 @@ class RobotStopper:
         """
         with self._changed:
             now = self._clock()
-            waiting = [
+            pending_requests = [
                 request
                 for request in self._requests.values()
                 if request.is_over and now - request.sent_s <= LATE_REPLY_TIMEOUT_S
             ]
-        for request in waiting:
+        for request in pending_requests:
             self._deliver(request)
 
     def discard_late(self, names: Iterable[str]) -> None:
@@ -194,24 +194,24 @@ class RobotStopper:
             lines = [line for line in self._lines.values() if line.error and line.target.is_expected]
             return {line.name: line.error for line in lines}
 
-    def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
+    def send_stop(self, names: Iterable[str] | None = None, program_key: str | None = None) -> None:
         """Send a Stop without waiting for replies.
 
-        Robots that don't support ``ends`` (RIZE) need another Stop after the program has ended.
+        Robots that don't support ``program_key`` (RIZE) need another Stop after the program has ended.
 
         Args:
             names: Names of the robots; None for all robots whose replies are awaited.
-            ends: Key of a program (`app.robots.identity`) whose further commands the robots reject.
+            program_key: Key of a program (`app.robots.identity`) whose further commands the robots reject.
         """
         for line in self._select_lines(names):
-            self._send(line, _new_id(), ends)
+            self._send(line, _new_id(), program_key)
 
     def stop_all(
         self,
         names: Iterable[str] | None = None,
         timeout_s: float | None = None,
         on_answer: Callable[[RobotStop], object] | None = None,
-        ends: str | None = None,
+        program_key: str | None = None,
         on_late: Callable[[RobotStop], object] | None = None,
         is_for_all: bool = False,
     ) -> StopReport:
@@ -224,7 +224,7 @@ class RobotStopper:
                 at least one second.
             on_answer: Called in this thread for each reply, and at the end for each robot without a
                 reply.
-            ends: Key of a program whose further commands the robots reject (see `send_stop`).
+            program_key: Key of a program whose further commands the robots reject (see `send_stop`).
             on_late: Called in another thread (of the node or of `update_graph`) when a robot replies
                 after the timeout, or confirms the Stop after that.
             is_for_all: True to send the Stop to robots whose reply is not awaited as well.
@@ -235,13 +235,13 @@ class RobotStopper:
         names = None if names is None else tuple(names)
         start_time_s = self._clock()
         lines = self._select_lines(names)
-        requests = [self._start_request(line, ends, on_late) for line in lines]
+        requests = [self._start_request(line, program_key, on_late) for line in lines]
         if is_for_all:
             for line in self._unexpected_lines():
-                self._send(line, _new_id(), ends)
+                self._send(line, _new_id(), program_key)
         self._retry_missing_channels(requests)
         if timeout_s is None:
-            timeout_s = stop_timeout_s((line.target.robot for line in lines), self._longest_s)
+            timeout_s = stop_timeout_s((line.target.robot for line in lines), self._max_timeout_s)
         if requests:
             self._add_new_programs(requests)
         reported = self._wait_for_replies(requests, start_time_s + timeout_s, on_answer)
@@ -283,7 +283,7 @@ class RobotStopper:
     def close(self) -> None:
         """Disconnect from all robots without stopping them."""
         self.set_robots(())
-        for thread in self._openers:
+        for thread in self._opener_threads:
             thread.join(timeout=5)
         with self._changed:
             self._requests.clear()
@@ -300,14 +300,14 @@ class RobotStopper:
                 continue
             try:
                 channel = self._connect(line.target.robot, topics)
-            except NepError as failed:
-                error = f"{failed}"
+            except NepError as failure:
+                error = f"{failure}"
                 continue
             with self._changed:
-                is_wanted = self._lines.get(line.name) is line and topics in line.target.topic_sets
-                if is_wanted:
+                is_needed = self._lines.get(line.name) is line and topics in line.target.topic_sets
+                if is_needed:
                     line.channels[topics] = channel
-            if not is_wanted:
+            if not is_needed:
                 channel.close()
         with self._changed:
             line.error = error
@@ -325,30 +325,32 @@ class RobotStopper:
 
     def _retry_missing_channels(self, requests: Sequence[StopRequest]) -> None:
         # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
-        missing = [request for request in requests if not request.line.is_complete]
-        if not missing:
+        incomplete_requests = [request for request in requests if not request.line.is_complete]
+        if not incomplete_requests:
             return
 
         def open_channels() -> None:
-            for request in missing:
-                before = set(request.line.channels)
+            for request in incomplete_requests:
+                previous_topics = set(request.line.channels)
                 with self._opening_lock:
                     self._open_missing_channels(request.line)
-                new = request.line.channels.keys() - before
+                new_topics = request.line.channels.keys() - previous_topics
                 error = (
-                    self._send(request.line, request.id, request.ends, new)
-                    if new
+                    self._send(request.line, request.id, request.program_key, new_topics)
+                    if new_topics
                     else request.line.send_problem
                 )
                 with self._changed:
-                    request.error = error if not before else request.error
+                    request.error = error if not previous_topics else request.error
                     self._changed.notify_all()
 
-        for request in missing:
+        for request in incomplete_requests:
             request.error = "" if not request.line.channels else request.error
-        self._openers = [thread for thread in self._openers if thread.is_alive()]
-        self._openers.append(threading.Thread(target=open_channels, name="studio-stop-line", daemon=True))
-        self._openers[-1].start()
+        self._opener_threads = [thread for thread in self._opener_threads if thread.is_alive()]
+        self._opener_threads.append(
+            threading.Thread(target=open_channels, name="studio-stop-line", daemon=True)
+        )
+        self._opener_threads[-1].start()
 
     def _select_lines(self, names: Iterable[str] | None) -> list[StopLine]:
         with self._changed:
@@ -357,9 +359,9 @@ class RobotStopper:
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
     def _start_request(
-        self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None
+        self, line: StopLine, program_key: str | None, on_late: Callable[[RobotStop], object] | None
     ) -> StopRequest:
-        request = StopRequest(line, _new_id(), self._clock(), late, ends)
+        request = StopRequest(line, _new_id(), self._clock(), on_late, program_key)
         with self._changed:
             self._evict_expired()
             self._requests[request.id] = request
@@ -368,7 +370,7 @@ class RobotStopper:
             for topics, channel in line.channels.items():
                 if self._is_connected_locked(line, channel):
                     request.record_sent(topics, request.sent_s)
-        request.error = self._send(line, request.id, ends)
+        request.error = self._send(line, request.id, program_key)
         return request
 
     def _unexpected_lines(self) -> list[StopLine]:
@@ -377,11 +379,11 @@ class RobotStopper:
 
     def _is_connected_locked(self, line: StopLine, channel: StopChannel) -> bool:
         # Call with `_changed` held.
-        hearers = self._subscribed_nodes.get(channel.topic)
-        if hearers is None:
-            hearers = frozenset(subscriber_nodes(self._view or GraphView(0, 0), channel.topic))
-            self._subscribed_nodes[channel.topic] = hearers
-        return channel.is_connected(line.target, hearers)
+        subscribed_nodes = self._subscribed_nodes.get(channel.topic)
+        if subscribed_nodes is None:
+            subscribed_nodes = frozenset(subscriber_nodes(self._view or GraphView(0, 0), channel.topic))
+            self._subscribed_nodes[channel.topic] = subscribed_nodes
+        return channel.is_connected(line.target, subscribed_nodes)
 
     def _deliver(self, request: StopRequest) -> bool:
         # Sends the command on newly connected topics; returns whether nothing is left to deliver.
@@ -389,41 +391,47 @@ class RobotStopper:
             if request.has_all_replies or request.line.target.robot.dialect == RIZE:
                 return True
             channels = dict(request.line.channels)
-            new = [
+            new_topics = [
                 topics
                 for topics, channel in channels.items()
                 if topics not in request.delivered_topics and self._is_connected_locked(request.line, channel)
             ]
-            for topics in new:
+            for topics in new_topics:
                 request.record_sent(topics, self._clock())
-        if new:
-            self._send(request.line, request.id, request.ends, new)
+        if new_topics:
+            self._send(request.line, request.id, request.program_key, new_topics)
         return bool(request.delivered_topics or request.error)
 
     def _send(
-        self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
+        self,
+        line: StopLine,
+        id: str,
+        program_key: str | None,
+        topic_sets: Iterable[RobotTopics] | None = None,
     ) -> str:
         # Returns the reason if the Stop could be sent on no topic, else an empty string.
         robot = line.target.robot
-        stop = robot.safe_stop.action
+        stop_action = robot.safe_stop.action
         if robot.dialect == RIZE:
-            command = rize.to_command(robot, stop, {}, id)
+            command = rize.to_command(robot, stop_action, {}, id)
         else:
-            command = {"id": id, "op": "stop", "from": self._sender, "action": stop, "input": {}}
-            if ends is not None:
-                command["ends"] = ends
+            command = {"id": id, "op": "stop", "from": self._sender, "action": stop_action, "input": {}}
+            if program_key is not None:
+                command["ends"] = program_key
         with self._changed:
             channels = [
-                channel for topics, channel in line.channels.items() if only is None or topics in only
+                channel
+                for topics, channel in line.channels.items()
+                if topic_sets is None or topics in topic_sets
             ]
-        sent, error = False, line.send_problem
+        is_sent, error = False, line.send_problem
         for channel in channels:
             try:
                 channel.publisher.publish(command)
-                sent = True
-            except NepError as failed:
-                error = _("Stop can't be sent to {robot}: {why}").format(robot=robot.name, why=failed)
-        return "" if sent else error
+                is_sent = True
+            except NepError as failure:
+                error = _("Stop can't be sent to {robot}: {why}").format(robot=robot.name, why=failure)
+        return "" if is_sent else error
 
     # ---- replies
 
@@ -478,41 +486,43 @@ class RobotStopper:
         identity = target.identity or first_announcer(view, target.robot.topics.description)
         own_node = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
         replies: dict[str, RobotStop | None] = {own_node: None}
-        answering = {
+        replying_nodes = {
             node for topic_set in target.topic_sets for node in publisher_nodes(view, topic_set.reply)
         }
         receivers = dict.fromkeys(
             node for topic_set in target.topic_sets for node in subscriber_nodes(view, topic_set.command)
         )
-        others = [node for node in receivers if node not in (own_node, self._node.id)]
-        for node in [node for node in others if node in answering][:MAX_SERVING_PROGRAMS]:
+        other_nodes = [node for node in receivers if node not in (own_node, self._node.id)]
+        for node in [node for node in other_nodes if node in replying_nodes][:MAX_SERVING_PROGRAMS]:
             request.program_names[node] = identity_of(view, node).node or node
             replies[node] = None
-        listening = [node for node in others if node not in answering]
-        programs = [identity_of(view, node).node or node for node in listening[:MAX_NAMED_LISTENERS]]
-        if len(listening) > MAX_NAMED_LISTENERS:
+        listening_nodes = [node for node in other_nodes if node not in replying_nodes]
+        programs = [identity_of(view, node).node or node for node in listening_nodes[:MAX_NAMED_LISTENERS]]
+        if len(listening_nodes) > MAX_NAMED_LISTENERS:
             programs = [
-                ngettext("{count} program", "{count} programs", len(listening)).format(count=len(listening))
+                ngettext("{count} program", "{count} programs", len(listening_nodes)).format(
+                    count=len(listening_nodes)
+                )
             ]
-        for node, program in zip(listening, programs, strict=False):
+        for node, program in zip(listening_nodes, programs, strict=False):
             replies[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
-        for before in target.earlier_programs:
-            if before.node_id not in replies:
-                request.program_names[before.node_id] = before.node or before.node_id
-                replies[before.node_id] = None
+        for earlier in target.earlier_programs:
+            if earlier.node_id not in replies:
+                request.program_names[earlier.node_id] = earlier.node or earlier.node_id
+                replies[earlier.node_id] = None
         return replies
 
     def _on_replies(self, messages: Sequence[Message]) -> None:
         # Checks the sender first: only messages of programs that must answer are decoded.
-        late: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
+        late_replies: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
         with self._changed:
             for message in messages:
                 node = self._senders.node_of(message)
                 for request in self._requests.values():
                     if message.topic in request.line.reply_topics:
-                        late += self._apply_reply_locked(request, node, message)
+                        late_replies += self._apply_reply_locked(request, node, message)
             self._changed.notify_all()
-        for notify, result in late:
+        for notify, result in late_replies:
             notify(result)
 
     def _apply_held_replies_locked(
@@ -526,7 +536,9 @@ class RobotStopper:
             (node, message) for message in pending if (node := self._senders.node_of(message)) is not None
         ]
         return [
-            late for node, message in attributed for late in self._apply_reply_locked(request, node, message)
+            late_reply
+            for node, message in attributed
+            for late_reply in self._apply_reply_locked(request, node, message)
         ]
 
     def _apply_reply_locked(
@@ -541,9 +553,9 @@ class RobotStopper:
                 request.foreign_replies.setdefault(node, PendingMessages(publishers=1)).add(message)
             return []
         name = request.line.name
-        is_news = request.accept(node, message, self._clock(), partial(stop_error_text, name))
+        has_changed = request.accept(node, message, self._clock(), partial(stop_error_text, name))
         reply = request.replies[node]
-        if not is_news or reply is None or not request.is_over or request.on_late is None:
+        if not has_changed or reply is None or not request.is_over or request.on_late is None:
             return []
         return [(request.on_late, reply)]
 
@@ -558,22 +570,22 @@ class RobotStopper:
             for request in requests:
                 request.is_over = True
             results = [result for request in requests for result in request.results()]
-            untold = [
+            unreported = [
                 result
                 for request in requests
                 for node, result in zip(request.replies or {"": None}, request.results(), strict=True)
                 if (request.id, node) not in reported
             ]
             view = self._view or GraphView(0, 0)
-            strangers = [
+            impostors = [
                 (request.line.name, identity_of(view, node).node or node)
                 for request in requests
                 for node in request.impostors()
             ]
-        for result in untold:
+        for result in unreported:
             if on_answer is not None:
                 on_answer(result)
-        return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(strangers)))
+        return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(impostors)))
 
     def _evict_expired(self) -> None:
         # Discards Stops whose late replies are no longer accepted.
@@ -599,7 +611,7 @@ def stop_and_report(
     *,
     on_late: Callable[[RobotStop], object],
     on_answer: Callable[[RobotStop], object] | None = None,
-    ends: str | None = None,
+    program_key: str | None = None,
     is_for_all: bool = False,
 ) -> StopReport:
     """Stop robots and return a report, even after an unexpected error.
@@ -611,14 +623,14 @@ def stop_and_report(
         names: Names of the robots.
         on_late: See `RobotStopper.stop_all`.
         on_answer: See `RobotStopper.stop_all`.
-        ends: See `RobotStopper.stop_all`.
+        program_key: See `RobotStopper.stop_all`.
         is_for_all: See `RobotStopper.stop_all`.
     """
     reason = _(NO_NETWORK)
     if stopper is not None:
         try:
             return stopper.stop_all(
-                names, on_answer=on_answer, ends=ends, on_late=on_late, is_for_all=is_for_all
+                names, on_answer=on_answer, program_key=program_key, on_late=on_late, is_for_all=is_for_all
             )
         except Exception as error:  # noqa: BLE001 - reported as unproven for these robots
             _log.exception("can't stop the robots")

@@ -107,20 +107,20 @@ class SessionActing:
         """Command topics of the robots in a recording; cleared when switched off."""
         self.question: ArmQuestion | None = None
         """Open question about arming a robot's topic."""
-        self.last: dict[str, SendResult] = {}
+        self.last_results: dict[str, SendResult] = {}
         """Result of the last sending of each saved message, by message id."""
         self.armed_s = ARMED_S
         self.revision = 0
         self._clock_s = clock_s
-        self.sent = SentLog()
+        self.sent_log = SentLog()
         """Log of messages sent and services called since the start."""
-        self.sent_at_s: dict[str, float] = {}
+        self.last_sent_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
-        self._is_newer = False
+        self._is_file_newer = False
         self._source_revision = session.source_revision
         self.path: Path | None = session.settings.path.with_name(FILE_NAME)
         self.saved_messages = self._read(self.path)
-        self._written = self.saved_messages.revision
+        self._saved_revision = self.saved_messages.revision
 
     # ---- switch
 
@@ -158,7 +158,7 @@ class SessionActing:
             self._add_record("switch", "", message)
 
     def allow(
-        self, target: Target, on_allowed: Callable[[], object] | None = None, *, is_sure: bool = False
+        self, target: Target, on_allowed: Callable[[], object] | None = None, *, is_confirmed: bool = False
     ) -> str:
         """Allow sending to a target.
 
@@ -167,20 +167,23 @@ class SessionActing:
         Args:
             target: Topic or service.
             on_allowed: Called when the target has been allowed.
-            is_sure: True to skip the question.
+            is_confirmed: True to skip the question.
 
         Returns:
             Reason why this isn't possible; "" if the target is allowed or the user is being asked.
         """
-        if not is_sure and self.needs_confirmation(target):
+        if not is_confirmed and self.needs_confirmation(target):
             names = tuple(name for name in self._moved_robots(target) if name != target.name)
             self.question = ArmQuestion(
                 target.name, names, partial(self._allow_confirmed, target, self.arming.turn, on_allowed)
             )
             self.revision += 1
             return ""
-        if not self.arming.allow(target, is_confirmed=is_sure):
-            return _("Sending isn't armed, or too many names are armed. Arm sending, or remove a name.")
+        if not self.arming.allow(target, is_confirmed=is_confirmed):
+            return _(
+                "Sending isn't armed, or too many topics and services are allowed. Arm sending, or remove a "
+                "topic or service."
+            )
         self.revision += 1
         if on_allowed is not None:
             on_allowed()
@@ -188,7 +191,7 @@ class SessionActing:
 
     def _allow_confirmed(self, target: Target, turn: int, on_allowed: Callable[[], object] | None) -> None:
         if turn == self.arming.turn:
-            self.allow(target, on_allowed, is_sure=True)
+            self.allow(target, on_allowed, is_confirmed=True)
 
     def answer(self, *, is_allowed: bool) -> None:
         """Apply the user's answer to `question`, and remove the question.
@@ -231,16 +234,16 @@ class SessionActing:
         is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
         return is_permitted and not self.needs_confirmation(target)
 
-    def notify_moved(self, target: Target, asker: SendOrigin) -> None:
+    def notify_moved(self, target: Target, origin: SendOrigin) -> None:
         """Call `on_moved` with the robots that a message to a target moves. Use this before sending.
 
         Args:
             target: Topic or service.
-            asker: Origin of the message.
+            origin: Origin of the message.
         """
-        moved = self._moved_robots(target)
-        if moved:
-            self.on_moved(moved, _SENDERS_BY_ORIGIN.get(asker, asker))
+        moved_robots = self._moved_robots(target)
+        if moved_robots:
+            self.on_moved(moved_robots, _SENDERS_BY_ORIGIN.get(origin, origin))
 
     # ---- messages
 
@@ -255,15 +258,15 @@ class SessionActing:
         if not is_editable(message.msg_type):
             template = _("Messages of type {type} can't be edited by hand.")
             return template.format(type=message.msg_type)
-        read = None if is_plain_text(message.msg_type) else parse_json_text(message.text)
-        if read is not None and read.fault is not None:
-            return read.fault.message  # checked before the topic, so that the invalid line is shown
+        json_text = None if is_plain_text(message.msg_type) else parse_json_text(message.text)
+        if json_text is not None and json_text.fault is not None:
+            return json_text.fault.message  # checked before the topic, so that the invalid line is shown
         if not message.topic.strip():
             return _("Choose a topic first.")
-        if read is None:
+        if json_text is None:
             return ""
-        typed = {name for name, value in message.values if value.strip()}
-        missing = [name for name in read.manual_placeholders if name not in typed]
+        filled_names = {name for name, value in message.values if value.strip()}
+        missing = [name for name in json_text.manual_placeholders if name not in filled_names]
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
 
     def send(self, message: SavedMessage, *, rate_hz: float = 0.0) -> str:
@@ -297,54 +300,54 @@ class SessionActing:
         Returns:
             Reason why this isn't possible; "" if it is sent, or will be if the user allows it.
         """
-        not_now = self._replay_problem()
-        if not_now:
-            return not_now
-        not_armed = self.prepare(order.target, partial(self.send_order, order, rate_hz=rate_hz))
-        if not_armed is not None:
-            return not_armed
+        problem = self._replay_problem()
+        if problem:
+            return problem
+        reason = self.prepare(order.target, partial(self.send_order, order, rate_hz=rate_hz))
+        if reason is not None:
+            return reason
         self.notify_moved(order.target, order.origin)
         if not rate_hz:
             self.outbox.send(order)
         elif not self.outbox.start(order, rate_hz):
-            return _("No more messages can be sent repeatedly. Stop one first.")
+            return _("No more messages can be sent repeatedly. Stop a message first.")
         self.revision += 1
         return ""
 
     def _replay_problem(self) -> str:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
-    def prepare(self, target: Target, go_on: Callable[[], object]) -> str | None:
+    def prepare(self, target: Target, on_allow: Callable[[], object]) -> str | None:
         """Prepare sending to a target, asking the user if necessary.
 
         Sending is armed if it isn't yet.
 
         Args:
             target: Topic or service.
-            go_on: Called if the user allows sending.
+            on_allow: Called if the user allows sending.
 
         Returns:
             None if sending is allowed now; otherwise the reason why not, which is "" if the user is
-            being asked or ``go_on`` was already called.
+            being asked or ``on_allow`` was already called.
         """
         if not self.arming.is_on:
             problem = self.arm()
             if problem:
                 return problem
         if not self.arming.allows(target) or self.needs_confirmation(target):
-            return self.allow(target, go_on)
+            return self.allow(target, on_allow)
         turn = self.arming.turn
 
         def resume_if_unchanged() -> None:
             if turn == self.arming.turn:
-                go_on()
+                on_allow()
 
         if target.kind != "topic":
             return None
         return None if self.gate.request_permission(target.name, resume_if_unchanged) else ""
 
     def resend(self, number: int) -> str:
-        """Send the message or call of an entry of `sent` again, if its target is armed.
+        """Send the message or call of an entry of `sent_log` again, if its target is armed.
 
         Args:
             number: Id of the entry.
@@ -352,7 +355,7 @@ class SessionActing:
         Returns:
             Reason why this isn't possible, or "".
         """
-        record = self.sent.get(number)
+        record = self.sent_log.get(number)
         if record is None or record.resend is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
@@ -381,12 +384,12 @@ class SessionActing:
             request = parse_json_text(text).fill({})
         except NepError as error:
             return str(error)
-        not_now = self._replay_problem()
-        if not_now:
-            return not_now
-        not_armed = self.prepare(Target("service", service), partial(self.call, service, text, timeout_s))
-        if not_armed is not None:
-            return not_armed
+        problem = self._replay_problem()
+        if problem:
+            return problem
+        reason = self.prepare(Target("service", service), partial(self.call, service, text, timeout_s))
+        if reason is not None:
+            return reason
         try:
             self.calls.call(service, request, text, timeout_s)
         except NepError as error:
@@ -420,21 +423,21 @@ class SessionActing:
     def _apply_result(self, result: SendResult) -> None:
         order = result.order
         if self.saved_messages.get(order.id) is not None:
-            self.last[order.id] = result
-            self.sent_at_s[order.id] = self._clock_s()
-        for values_by_id in (self.last, self.sent_at_s):
+            self.last_results[order.id] = result
+            self.last_sent_s[order.id] = self._clock_s()
+        for values_by_id in (self.last_results, self.last_sent_s):
             for old_id in [id for id in values_by_id if self.saved_messages.get(id) is None]:
                 del values_by_id[old_id]
         self.revision += 1
-        is_bad = result.kind == "failed"
+        is_error = result.kind == "failed"
         message = f"{order.name}, {result_text(result)}"
-        self._log_to_console("warn" if is_bad else "info", f"{order.topic}: {message}")
-        was_once = result.kind == "sent"
-        resend = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
+        self._log_to_console("warn" if is_error else "info", f"{order.topic}: {message}")
+        was_sent_once = result.kind == "sent"
+        resend = partial(self.send_order, order) if was_sent_once or (is_error and not result.count) else None
         self._add_record(
             order.origin, order.topic, message,
-            sent=1 if was_once else result.count, is_bad=is_bad, text=result.text, source=order.source,
-            resend=resend,
+            sent_count=1 if was_sent_once else result.count, is_error=is_error, text=result.text,
+            source=order.source, resend=resend,
         )  # fmt: skip
         if order.on_result is not None:
             order.on_result(result)
@@ -442,30 +445,32 @@ class SessionActing:
     def _log_call(self, record: CallRecord) -> None:
         self._add_record(
             "service", record.service, call_text(record),
-            sent=1 if record.was_sent else 0, is_bad=record.state != "answered",
+            sent_count=1 if record.was_sent else 0, is_error=record.state != "answered",
             text=record.request, source=record.request,
             resend=partial(self.call, record.service, record.request, record.timeout_s),
         )  # fmt: skip
 
-    def log(self, level: str, target: Target, text: str, sent: int = 0) -> None:
-        """Log a result of publishing a recording, in the Console and in `sent`.
+    def log(self, level: str, target: Target, text: str, sent_count: int = 0) -> None:
+        """Log a result of publishing a recording, in the Console and in `sent_log`.
 
         Args:
             level: Log level; "warn" for an error.
             target: Topic.
             text: Result as text.
-            sent: Number of messages that were sent.
+            sent_count: Number of messages that were sent.
         """
         self.revision += 1
         self._log_to_console(level, f"{target.name}: {text}")
-        self._add_record("replay", target.name, text, sent=sent, is_bad=level == "warn")
+        self._add_record("replay", target.name, text, sent_count=sent_count, is_error=level == "warn")
 
     def _add_record(
-        self, asker: SendOrigin, name: str, message: str, *, sent: int = 0, is_bad: bool = False,
+        self, origin: SendOrigin, name: str, message: str, *, sent_count: int = 0, is_error: bool = False,
         text: str = "",
         source: str = "", resend: Callable[[], str] | None = None,
     ) -> None:  # fmt: skip
-        self.sent.add(SentRecord(self._clock_s(), asker, name, message, is_bad, text, source, resend), sent)
+        self.sent_log.add(
+            SentRecord(self._clock_s(), origin, name, message, is_error, text, source, resend), sent_count
+        )
 
     def _log_to_console(self, level: str, message: str) -> None:
         self._session.console.add(level, "studio", message)
@@ -477,8 +482,10 @@ class SessionActing:
             if self._worker.pop_result(FILE_NAME):
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
-            self._written = -1  # retried at the next check
-            detail = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
+            self._saved_revision = -1  # retried at the next check
+            detail = _("Reason: {reason}. The changes are kept until Studio closes.").format(
+                reason=error.strerror or error
+            )
             title = _("Changes to saved messages can't be saved.")
             self._session.alerts.raise_alert("messages:kept", "warn", title, detail, count=0)
 
@@ -495,9 +502,9 @@ class SessionActing:
 
     def _write(self) -> None:
         path, revision = self.path, self.saved_messages.revision
-        if path is None or self._is_newer or revision == self._written:
+        if path is None or self._is_file_newer or revision == self._saved_revision:
             return
-        self._written = revision
+        self._saved_revision = revision
         snapshot = SavedMessages(self.saved_messages.messages, self.saved_messages.requests)
 
         def write() -> bool:
@@ -508,12 +515,14 @@ class SessionActing:
 
     def _read(self, path: Path) -> SavedMessages:
         def parse(data: bytes) -> tuple[SavedMessages, str]:
-            saved_messages, unread = parse_saved_messages(data)
-            template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
-            return saved_messages, template.format(count=unread) if unread else ""
+            saved_messages, unread_count = parse_saved_messages(data)
+            template = ngettext(
+                "{count} message can't be read", "{count} messages can't be read", unread_count
+            )
+            return saved_messages, template.format(count=unread_count) if unread_count else ""
 
         stored = read_stored(path, parse, NewerSavedMessagesError, MAX_BYTES)
-        self._is_newer = stored.is_newer
+        self._is_file_newer = stored.is_newer
         if stored.problem:
             title = _("Saved messages couldn't be read.")
             self._session.alerts.raise_alert("messages:file", "warn", title, stored.problem)
@@ -524,7 +533,7 @@ def _do_nothing() -> None: ...
 
 
 def result_text(result: SendResult) -> str:
-    """Format the result of sending, such as "received by 2" or "412 sent, 3 late messages skipped".
+    """Format the result of sending, such as "2 subscribers" or "412 sent, 3 late messages skipped".
 
     For a failure, the text is the reason, preceded by the number of messages sent before it if there
     were any.
@@ -535,18 +544,18 @@ def result_text(result: SendResult) -> str:
         return _("started")
     text = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
     if result.dropped_count:
-        left_out = ngettext(
+        template = ngettext(
             "{count} late message skipped", "{count} late messages skipped", result.dropped_count
         )
-        text = f"{text}, {left_out.format(count=result.dropped_count)}"
+        text = f"{text}, {template.format(count=result.dropped_count)}"
     parts = (text if result.count else "", result.message)
     return ", ".join(filter(None, parts)) or text
 
 
 def subscribers_text(count: int) -> str:
-    """Format the number of subscribers, such as "received by 2" or "no subscribers"."""
+    """Format the number of subscribers, such as "2 subscribers" or "no subscribers"."""
     return (
-        ngettext("received by {count}", "received by {count}", count).format(count=count)
+        ngettext("{count} subscriber", "{count} subscribers", count).format(count=count)
         if count
         else _("no subscribers")
     )

@@ -28,10 +28,10 @@ class Arming:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._lock = threading.RLock()
-        self._until_s = 0.0
+        self._end_s = 0.0
         self._is_on = False
         self._targets: tuple[Target, ...] = ()
-        self._confirmed: frozenset[str] = frozenset()
+        self._confirmed_topics: frozenset[str] = frozenset()
         self.turn = 0
         """Number that increases with each switching; requests made during one turn are invalid in the next.
         """
@@ -40,17 +40,17 @@ class Arming:
     @property
     def is_on(self) -> bool:
         """True if sending is allowed now."""
-        return self._is_on and self._clock() < self._until_s
+        return self._is_on and self._clock() < self._end_s
 
     @property
     def has_expired(self) -> bool:
         """True if the time has elapsed and `disarm` has not been called since then."""
-        return self._is_on and self._clock() >= self._until_s
+        return self._is_on and self._clock() >= self._end_s
 
     @property
     def remaining_s(self) -> float:
         """Remaining time in seconds; 0 if sending is off."""
-        return max(0.0, self._until_s - self._clock()) if self._is_on else 0.0
+        return max(0.0, self._end_s - self._clock()) if self._is_on else 0.0
 
     @property
     def targets(self) -> tuple[Target, ...]:
@@ -69,10 +69,10 @@ class Arming:
         """
         with self._lock:
             if not self.is_on:
-                self._targets, self._confirmed = (), frozenset()
+                self._targets, self._confirmed_topics = (), frozenset()
                 self.turn += 1
             self._is_on = True
-            self._until_s = self._clock() + min(MAX_ARMED_S, max(MIN_ARMED_S, seconds))
+            self._end_s = self._clock() + min(MAX_ARMED_S, max(MIN_ARMED_S, seconds))
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
@@ -88,26 +88,26 @@ class Arming:
             if target not in self._targets:
                 self._targets = (*self._targets, target)
             if is_confirmed:
-                self._confirmed |= {target.name}
+                self._confirmed_topics |= {target.name}
             self.revision += 1
             return True
 
     def is_confirmed(self, topic: str) -> bool:
         """Return True if the user has confirmed that the topic moves robots."""
-        return topic in self._confirmed
+        return topic in self._confirmed_topics
 
     def deny(self, target: Target) -> None:
         """Deny a target."""
         with self._lock:
             self._targets = tuple(each for each in self._targets if each != target)
-            self._confirmed -= {target.name}
+            self._confirmed_topics -= {target.name}
             self.revision += 1
 
     def disarm(self) -> bool:
         """Switch sending off; return True if it was on. Nothing is sent after this returns."""
         with self._lock:
             was_on, self._is_on = self._is_on, False
-            self._targets, self._confirmed = (), frozenset()
+            self._targets, self._confirmed_topics = (), frozenset()
             if was_on:
                 self.turn += 1
                 self.revision += 1

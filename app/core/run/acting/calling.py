@@ -40,7 +40,7 @@ class CallRecord:
         duration_s: Duration in seconds.
         error: Reason for a failure, or "".
         reply: Value of the reply.
-        text: Reply as JSON; shortened if `is_cut` is True.
+        text: Reply as JSON; shortened if `is_truncated` is True.
         is_retained: False if `reply` and `text` were discarded in favour of newer calls.
     """
 
@@ -100,7 +100,7 @@ class ServiceCalls:
         self._numbers = itertools.count(1)
         self._records: deque[CallRecord] = deque(maxlen=MAX_RECORDS)
         self._lock = threading.Lock()
-        self._ended: deque[_CallResult] = deque(maxlen=MAX_RECORDS)
+        self._results: deque[_CallResult] = deque(maxlen=MAX_RECORDS)
         self._in_flight: _CallInFlight | None = None
         self._finished_calls: list[CallRecord] = []
         self._clients: dict[str, Client] = {}
@@ -122,13 +122,13 @@ class ServiceCalls:
         """Seconds since the start of the call in flight; 0 if there is none."""
         return self._clock() - self._in_flight.requested_s if self._in_flight is not None else 0.0
 
-    def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
+    def call(self, service: str, request: object, request_text: str, timeout_s: float) -> CallRecord:
         """Call a service and return the record of the call.
 
         Args:
             service: Name of the service.
             request: Request as a value.
-            words: Request as shown to the user.
+            request_text: Request as shown to the user.
             timeout_s: Timeout in seconds, limited to `MIN_TIMEOUT_S` to `MAX_TIMEOUT_S`.
 
         Raises:
@@ -137,11 +137,11 @@ class ServiceCalls:
         if self.in_flight is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.in_flight.service))
         timeout_s = min(MAX_TIMEOUT_S, max(MIN_TIMEOUT_S, timeout_s))
-        record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
-        now = _CallInFlight(record.number, self._arming.turn, self._clock())
-        self._in_flight = now
+        record = CallRecord(next(self._numbers), service, request_text, self._clock_s(), timeout_s)
+        call = _CallInFlight(record.number, self._arming.turn, self._clock())
+        self._in_flight = call
         self._add_record(record)
-        self._submit("", lambda node: self._start(node, now, record, request))
+        self._submit("", lambda node: self._start(node, call, record, request))
         return record
 
     def cancel(self) -> None:
@@ -150,26 +150,26 @@ class ServiceCalls:
 
     def tick(self) -> list[CallRecord]:
         """Apply results; return the calls that ended since the last tick, including cancelled ones."""
-        while self._ended:
-            ended = self._ended.popleft()
-            index = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
+        while self._results:
+            result = self._results.popleft()
+            index = next((i for i, each in enumerate(self._records) if each.number == result.number), None)
             if index is None or self._records[index].state != "waiting":
                 continue
-            self._apply(index, ended)
-        waiting, now = self.in_flight, self._in_flight
-        has_begun = now is None or now.future is not None  # from then on, the client measures the timeout
-        if waiting is not None and not has_begun and self.elapsed_s > waiting.timeout_s:
-            error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
+            self._apply(index, result)
+        pending_record, call = self.in_flight, self._in_flight
+        has_started = call is None or call.future is not None  # from then on, the client measures the timeout
+        if pending_record is not None and not has_started and self.elapsed_s > pending_record.timeout_s:
+            error = _("no master was found within {time} s").format(time=number(pending_record.timeout_s))
             self._cancel("failed", error)
         finished, self._finished_calls = self._finished_calls, []
         return finished
 
     def clear(self) -> None:
         """Remove all past calls."""
-        waiting = self.in_flight
+        pending_record = self.in_flight
         self._records.clear()
-        if waiting is not None:
-            self._records.append(waiting)
+        if pending_record is not None:
+            self._records.append(pending_record)
         self.revision += 1
 
     def close(self) -> None:
@@ -186,15 +186,15 @@ class ServiceCalls:
                 self._records[index] = replace(self._records[index], reply=None, text="", is_retained=False)
         self.revision += 1
 
-    def _apply(self, index: int, ended: _CallResult) -> None:
+    def _apply(self, index: int, result: _CallResult) -> None:
         updated = replace(
             self._records[index],
-            state=ended.state,
-            duration_s=ended.duration_s,
-            error=ended.error,
-            reply=ended.reply,
-            text=ended.text,
-            is_truncated=ended.is_truncated,
+            state=result.state,
+            duration_s=result.duration_s,
+            error=result.error,
+            reply=result.reply,
+            text=result.text,
+            is_truncated=result.is_truncated,
             was_sent=self._in_flight is not None and self._in_flight.future is not None,
         )
         self._records[index] = updated
@@ -203,37 +203,37 @@ class ServiceCalls:
         self.revision += 1
 
     def _cancel(self, state: State, error: str) -> None:
-        now, waiting = self._in_flight, self.in_flight
-        if now is None or waiting is None:
+        call, pending_record = self._in_flight, self.in_flight
+        if call is None or pending_record is None:
             return
         with self._lock:
-            now.is_over = True
-            future = now.future
+            call.is_over = True
+            future = call.future
         if future is not None:
             future.cancel()
-        self._apply(len(self._records) - 1, _CallResult(now.number, state, self.elapsed_s, error))
+        self._apply(len(self._records) - 1, _CallResult(call.number, state, self.elapsed_s, error))
 
-    def _start(self, node: Node, now: _CallInFlight, record: CallRecord, request: object) -> None:
+    def _start(self, node: Node, call: _CallInFlight, record: CallRecord, request: object) -> None:
         # Runs in the network thread.
-        began_s = time.monotonic()
+        start_s = time.monotonic()
         try:
             client = self._open_client(node, record.service)
             target = Target("service", record.service)
 
             def start_call() -> None:
                 with self._lock:
-                    if now.is_over:
+                    if call.is_over:
                         return
-                    now.future = client.call_async(request, record.timeout_s)
+                    call.future = client.call_async(request, record.timeout_s)
 
-            if not self._arming.run_if_armed(now.turn, target, start_call):
+            if not self._arming.run_if_armed(call.turn, target, start_call):
                 raise NepError(_("not called: no longer armed"))
         except Exception as error:  # noqa: BLE001 - reported as the result of this call
             text = str(error) if isinstance(error, NepError) else error_text(error)
-            self._ended.append(_CallResult(record.number, "failed", 0.0, text))
+            self._results.append(_CallResult(record.number, "failed", 0.0, text))
             return
-        if now.future is not None:
-            now.future.add_done_callback(lambda future: self._on_reply(record, began_s, future))
+        if call.future is not None:
+            call.future.add_done_callback(lambda future: self._on_reply(record, start_s, future))
 
     def _open_client(self, node: Node, service: str) -> Client:
         client = self._clients.get(service)
@@ -243,29 +243,29 @@ class ServiceCalls:
             client = self._clients[service] = node.new_client(service)
         return client
 
-    def _on_reply(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
+    def _on_reply(self, record: CallRecord, start_s: float, future: Future[object]) -> None:
         # Runs in the client's thread.
-        took_s = time.monotonic() - began_s
+        duration_s = time.monotonic() - start_s
         try:
             reply = future.result()
             text = format_json(reply)
         except CancelledError:
             return
         except Exception as error:  # noqa: BLE001 - the server's callback may raise anything
-            self._ended.append(
-                _CallResult(record.number, "failed", took_s, failure_reason(error, record.timeout_s))
+            self._results.append(
+                _CallResult(record.number, "failed", duration_s, failure_reason(error, record.timeout_s))
             )
             return
-        is_cut = len(text) > MAX_REPLY_LENGTH
-        retained_reply = None if is_cut else reply
-        self._ended.append(
+        is_truncated = len(text) > MAX_REPLY_LENGTH
+        retained_reply = None if is_truncated else reply
+        self._results.append(
             _CallResult(
                 record.number,
                 "answered",
-                took_s,
+                duration_s,
                 reply=retained_reply,
                 text=text[:MAX_REPLY_LENGTH],
-                is_truncated=is_cut,
+                is_truncated=is_truncated,
             )
         )
 

@@ -52,11 +52,11 @@ class JsonText:
                 self._spans.append((match.start(), match.end(), match["name"]))
         self.placeholders = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
         # replaced by strings of the same length, so that every character stays in its position
-        parts, after = [], 0
+        parts, position = [], 0
         for start, end, _name in self._spans:
-            parts += [text[after:start], '"', text[start + 1 : end - 1], '"']
-            after = end
-        self.fault = find_json_fault("".join([*parts, text[after:]]))
+            parts += [text[position:start], '"', text[start + 1 : end - 1], '"']
+            position = end
+        self.fault = find_json_fault("".join([*parts, text[position:]]))
 
     @property
     def manual_placeholders(self) -> tuple[str, ...]:
@@ -81,12 +81,12 @@ class JsonText:
         missing = [name for name in self.manual_placeholders if name not in values]
         if missing:
             raise NepError(_("Fill in “{name}” first.").format(name=missing[0]))
-        parts, after = [], 0
+        parts, position = [], 0
         for start, end, name in self._spans:
             value = AUTOMATIC_PLACEHOLDERS[name]() if name in AUTOMATIC_PLACEHOLDERS else values[name]
-            parts += [self.text[after:start], json.dumps(value, ensure_ascii=False, allow_nan=False)]
-            after = end
-        filled = "".join([*parts, self.text[after:]])
+            parts += [self.text[position:start], json.dumps(value, ensure_ascii=False, allow_nan=False)]
+            position = end
+        filled = "".join([*parts, self.text[position:]])
         fault = find_json_fault(filled)
         if fault is not None:  # a number as a field name
             raise NepError(fault.message)

@@ -12,13 +12,13 @@ MESSAGE_TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
 Button = Literal["left", "middle"]
 
 
-def default_topic(pictures: str) -> str:
+def default_topic(image_topic: str) -> str:
     """Return the default topic for clicked points.
 
     Args:
-        pictures: Topic of the images.
+        image_topic: Topic of the images.
     """
-    return f"{pictures.rstrip('/')}/point"
+    return f"{image_topic.rstrip('/')}/point"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +43,11 @@ class PicturePoint:
         """Centre of the pixel as fractions of the image's width and height."""
         return (self.x + 0.5) / max(1, self.width), (self.y + 0.5) / max(1, self.height)
 
-    def payload(self, pictures: str, msg_type: str) -> dict[str, object]:
+    def payload(self, image_topic: str, msg_type: str) -> dict[str, object]:
         """Return the payload of the message about the point.
 
         Args:
-            pictures: Topic of the images.
+            image_topic: Topic of the images.
             msg_type: One of `MESSAGE_TYPES`.
         """
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
@@ -63,5 +63,5 @@ class PicturePoint:
             "height": self.height,
             "button": self.button,
             "stamp": asdict(stamp) if stamp is not None else None,
-            "topic": pictures,
+            "topic": image_topic,
         }

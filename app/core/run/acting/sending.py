@@ -99,8 +99,8 @@ class RepeatedMessage:
     @property
     def measured_hz(self) -> float:
         """Measured rate in messages per second; 0 before the second message."""
-        passed_s = time.monotonic() - self.since_s
-        return (self.count - 1) / passed_s if self.count > 1 and passed_s > 0 else 0.0
+        elapsed_s = time.monotonic() - self.since_s
+        return (self.count - 1) / elapsed_s if self.count > 1 and elapsed_s > 0 else 0.0
 
 
 class Outbox:
@@ -122,8 +122,8 @@ class Outbox:
         self._arming, self._submit, self._clock = arming, submit, clock
         self._changed = threading.Condition()
         self._publishers: dict[tuple[str, str], Publisher] = {}
-        self._repeated: dict[str, RepeatedMessage] = {}
-        self._starting: dict[str, object] = {}
+        self._repeated_messages: dict[str, RepeatedMessage] = {}
+        self._starting_tokens: dict[str, object] = {}
         self._results: deque[SendResult] = deque(maxlen=MAX_RESULTS)
         self._thread: threading.Thread | None = None
         self._is_closed = False
@@ -138,24 +138,24 @@ class Outbox:
     def repeated(self, order_id: str) -> RepeatedMessage | None:
         """Return the state of a message that is sent repeatedly; None if the message isn't being sent."""
         with self._changed:
-            return self._repeated.get(order_id)
+            return self._repeated_messages.get(order_id)
 
     @property
     def repeated_messages(self) -> tuple[RepeatedMessage, ...]:
         """Messages that are being sent repeatedly."""
         with self._changed:
-            return tuple(self._repeated.values())
+            return tuple(self._repeated_messages.values())
 
     def is_sending(self, order_id: str) -> bool:
         """Return True if a message is being sent repeatedly, or will be once its publisher is open."""
         with self._changed:
-            return order_id in self._repeated or order_id in self._starting
+            return order_id in self._repeated_messages or order_id in self._starting_tokens
 
     # ---- requests
 
     def send(self, order: SendOrder) -> None:
         """Send a message once, in the background; `pop_results` returns the result or the error."""
-        turn, asked_s = self._arming.turn, self._clock()
+        turn, requested_s = self._arming.turn, self._clock()
 
         def send_job(node: Node) -> None:
             publisher = self._open_publisher(node, order)
@@ -168,7 +168,7 @@ class Outbox:
             else:
                 self._add_result(SendResult(order, "failed", _("not sent: no longer armed")))
 
-        self._submit("", self._guarded_job(order, asked_s, send_job))
+        self._submit("", self._guarded_job(order, requested_s, send_job))
 
     def start(self, order: SendOrder, rate_hz: float) -> bool:
         """Start sending a message repeatedly; return False if the limit is reached.
@@ -181,11 +181,14 @@ class Outbox:
             rate_hz: Messages per second, limited to `MIN_HZ` to `MAX_HZ`.
         """
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
-        turn, asked_s, token = self._arming.turn, self._clock(), object()
+        turn, requested_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
-            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MAX_REPEATED_MESSAGES:
+            if (
+                len(self._repeated_messages.keys() | self._starting_tokens.keys() | {order.id})
+                > MAX_REPEATED_MESSAGES
+            ):
                 return False
-            self._starting[order.id] = token
+            self._starting_tokens[order.id] = token
 
         def start_job(node: Node) -> None:
             codec_for(order.msg_type).encode(
@@ -195,9 +198,9 @@ class Outbox:
             now = time.monotonic()
             repeated = RepeatedMessage(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
-                if self._starting.get(order.id) is not token:
+                if self._starting_tokens.get(order.id) is not token:
                     return  # ended meanwhile
-                self._repeated[order.id] = repeated
+                self._repeated_messages[order.id] = repeated
                 if self._thread is None and not self._is_closed:
                     self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
                     self._thread.start()
@@ -209,26 +212,26 @@ class Outbox:
                 start_job(node)
             finally:
                 with self._changed:
-                    if self._starting.get(order.id) is token:
-                        del self._starting[order.id]
+                    if self._starting_tokens.get(order.id) is token:
+                        del self._starting_tokens[order.id]
 
-        self._submit("", self._guarded_job(order, asked_s, run_start_job))
+        self._submit("", self._guarded_job(order, requested_s, run_start_job))
         return True
 
     def stop(self, order_id: str) -> None:
         """Stop sending a repeated message."""
         with self._changed:
-            self._starting.pop(order_id, None)
-            ended = self._repeated.pop(order_id, None)
+            self._starting_tokens.pop(order_id, None)
+            message = self._repeated_messages.pop(order_id, None)
             self._changed.notify_all()
-        if ended is not None:
-            self._report_end(ended)
+        if message is not None:
+            self._report_end(message)
 
     def stop_all(self) -> None:
         """Stop all sending and close the publishers."""
         with self._changed:
-            self._starting.clear()
-            ids = list(self._repeated)
+            self._starting_tokens.clear()
+            ids = list(self._repeated_messages)
         for message_id in ids:
             self.stop(message_id)
         if self._publishers and not self._is_closed:
@@ -245,10 +248,10 @@ class Outbox:
 
     # ---- in the network thread
 
-    def _guarded_job(self, order: SendOrder, asked_s: float, job: Job) -> Job:
+    def _guarded_job(self, order: SendOrder, requested_s: float, job: Job) -> Job:
         def run(node: Node) -> None:
             try:
-                if self._clock() - asked_s > MAX_AGE_S:
+                if self._clock() - requested_s > MAX_AGE_S:
                     raise NepError(_("not sent: no master was running"))
                 job(node)
             except NepError as error:
@@ -274,7 +277,7 @@ class Outbox:
     def _open_publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
         with self._changed:
-            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated_messages.values()}
         publisher = self._publishers.get(key)
         if publisher is None or publisher.is_closed:
             unused = [each for each in self._publishers if each not in used_keys]
@@ -285,7 +288,7 @@ class Outbox:
 
     def _close_unused(self) -> None:
         with self._changed:
-            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
+            used_keys = {(each.order.topic, each.order.msg_type) for each in self._repeated_messages.values()}
         if self._arming.is_on:
             return  # armed again meanwhile
         for key in [each for each in self._publishers if each not in used_keys]:
@@ -299,13 +302,18 @@ class Outbox:
     def _add_result(self, result: SendResult) -> None:
         self._results.append(result)
 
-    def _report_end(self, ended: RepeatedMessage, problem: str = "") -> None:
-        if not ended.end_event.is_set():
-            ended.end_event.set()
+    def _report_end(self, message: RepeatedMessage, problem: str = "") -> None:
+        if not message.end_event.is_set():
+            message.end_event.set()
             kind = "failed" if problem else "ended"
             self._add_result(
                 SendResult(
-                    ended.order, kind, problem, ended.subscriber_count, ended.count, ended.dropped_count
+                    message.order,
+                    kind,
+                    problem,
+                    message.subscriber_count,
+                    message.count,
+                    message.dropped_count,
                 )
             )
 
@@ -317,9 +325,11 @@ class Outbox:
                 if self._is_closed:
                     return
                 now = time.monotonic()
-                due = [repeated for repeated in self._repeated.values() if repeated.due_s <= now]
+                due = [repeated for repeated in self._repeated_messages.values() if repeated.due_s <= now]
                 if not due:
-                    next_s = min((repeated.due_s for repeated in self._repeated.values()), default=None)
+                    next_s = min(
+                        (repeated.due_s for repeated in self._repeated_messages.values()), default=None
+                    )
                     self._changed.wait(None if next_s is None else max(0.0, next_s - now))
                     continue
             for repeated in due:
@@ -330,23 +340,23 @@ class Outbox:
         try:
             payload = codec_for(repeated.order.msg_type).encode(repeated.order.create_payload())
             self._check(repeated.node, repeated.order, repeated.publisher)
-            is_done = self._arming.run_if_armed(
+            is_sent = self._arming.run_if_armed(
                 repeated.turn, repeated.order.target, lambda: self._publish(repeated, payload)
             )
         except Exception as error:  # noqa: BLE001 - the other messages continue
-            is_done, problem = False, str(error) if isinstance(error, NepError) else error_text(error)
-        if is_done:
+            is_sent, problem = False, str(error) if isinstance(error, NepError) else error_text(error)
+        if is_sent:
             repeated.subscriber_count = repeated.publisher.subscribers
             repeated.dropped_count += self._schedule_next(repeated)
             return
         with self._changed:
-            if self._repeated.get(repeated.order.id) is repeated:
-                del self._repeated[repeated.order.id]
+            if self._repeated_messages.get(repeated.order.id) is repeated:
+                del self._repeated_messages[repeated.order.id]
         self._report_end(repeated, problem)
 
     def _publish(self, repeated: RepeatedMessage, payload: object) -> None:
         with self._changed:  # an ended message is not sent once more
-            if self._repeated.get(repeated.order.id) is repeated:
+            if self._repeated_messages.get(repeated.order.id) is repeated:
                 repeated.publisher.publish(payload)
                 repeated.count += 1
 
@@ -354,9 +364,9 @@ class Outbox:
     def _schedule_next(repeated: RepeatedMessage) -> int:
         # Sets the next due time; returns the number of messages omitted because they are late.
         period_s = 1 / repeated.rate_hz
-        late = max(0, int((time.monotonic() - repeated.due_s) / period_s))
-        repeated.due_s += (1 + late) * period_s
-        return late
+        late_count = max(0, int((time.monotonic() - repeated.due_s) / period_s))
+        repeated.due_s += (1 + late_count) * period_s
+        return late_count
 
 
 def _text_of(value: object) -> str:

@@ -62,7 +62,7 @@ class SentLog:
 
     def __init__(self) -> None:
         self._records: deque[SentRecord] = deque(maxlen=MAX_ENTRIES)
-        self._last = 0
+        self._last_number = 0
         self.total = 0
         """Number of messages and calls sent."""
         self.since_s: float | None = None
@@ -78,7 +78,7 @@ class SentLog:
         """Return the entry with this number, or None if it was evicted."""
         return next((each for each in self._records if each.number == number), None)
 
-    def add(self, record: SentRecord, sent: int) -> None:
+    def add(self, record: SentRecord, sent_count: int) -> None:
         """Add an entry and give it a number.
 
         If the entry equals the newest one, only the count of that one increases. Large texts are not
@@ -86,11 +86,11 @@ class SentLog:
 
         Args:
             record: New entry.
-            sent: Number of messages or calls that were sent.
+            sent_count: Number of messages or calls that were sent.
         """
         self.revision += 1
-        if sent > 0:
-            self.total += sent
+        if sent_count > 0:
+            self.total += sent_count
             self.since_s = record.at_s if self.since_s is None else self.since_s
         if is_large(record.text) or is_large(record.source):
             record = replace(record, text="", source="", resend=None)
@@ -98,8 +98,8 @@ class SentLog:
         if newest is not None and record.origin != "switch" and newest.is_like(record):
             self._records[-1] = replace(record, number=newest.number, count=newest.count + 1)
         else:
-            self._last += 1
-            self._records.append(replace(record, number=self._last))
+            self._last_number += 1
+            self._records.append(replace(record, number=self._last_number))
 
     def clear(self) -> None:
         """Remove all entries. `total` is not reset."""

@@ -56,8 +56,8 @@ class SavedMessage:
         """
         if is_plain_text(self.msg_type):
             return self.text
-        typed = {name: parse_typed_value(value) for name, value in self.values if value.strip()}
-        return parse_json_text(self.text).fill(typed)
+        values = {name: parse_typed_value(value) for name, value in self.values if value.strip()}
+        return parse_json_text(self.text).fill(values)
 
     @property
     def source(self) -> str:
@@ -66,8 +66,8 @@ class SavedMessage:
 
     def with_value(self, name: str, value: str) -> SavedMessage:
         """Return a copy in which a placeholder has another value."""
-        others = {**dict(self.values), name: value[:MAX_VALUE_LENGTH]}
-        return replace(self, values=tuple(others.items())[-MAX_VALUES:])
+        values = {**dict(self.values), name: value[:MAX_VALUE_LENGTH]}
+        return replace(self, values=tuple(values.items())[-MAX_VALUES:])
 
 
 class SavedMessages:
@@ -78,7 +78,7 @@ class SavedMessages:
     ) -> None:
         self._messages = list(messages)[:MAX_MESSAGES]
         self._requests = dict(list((requests or {}).items())[-MAX_REQUESTS:])
-        self._removed: tuple[SavedMessage, int] | None = None
+        self._last_removed: tuple[SavedMessage, int] | None = None
         self.revision = 0
 
     @property
@@ -96,7 +96,7 @@ class SavedMessages:
         return next((each for each in self._messages if each.id == id), None)
 
     def set_message(self, message: SavedMessage) -> bool:
-        """Add a message, or replace the message with the same id; return False if it is full."""
+        """Add a message, or replace the message with the same id; return False if no other can be added."""
         index = self._index(message.id)
         if index is None:
             if len(self._messages) >= MAX_MESSAGES:
@@ -117,11 +117,11 @@ class SavedMessages:
         index = self._index(id)
         if index is None or len(self._messages) >= MAX_MESSAGES:
             return None
-        old = self._messages[index]
-        copied = replace(old, id=new_message_id(), name=self.free_name(old.name))
-        self._messages.insert(index + 1, copied)
+        original = self._messages[index]
+        copy = replace(original, id=new_message_id(), name=self.free_name(original.name))
+        self._messages.insert(index + 1, copy)
         self.revision += 1
-        return copied
+        return copy
 
     def free_name(self, preferred: str) -> str:
         """Return an unused name: ``preferred``, or ``preferred`` with a number, as in "Stand still 2"."""
@@ -138,7 +138,7 @@ class SavedMessages:
         if index is None:
             return None
         removed = self._messages.pop(index)
-        self._removed = (removed, index)
+        self._last_removed = (removed, index)
         self.revision += 1
         return removed
 
@@ -147,9 +147,9 @@ class SavedMessages:
 
         Returns None if there is none, or no room for it.
         """
-        if self._removed is None or len(self._messages) >= MAX_MESSAGES:
+        if self._last_removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
-        (message, index), self._removed = self._removed, None
+        (message, index), self._last_removed = self._last_removed, None
         self._messages.insert(index, message)
         self.revision += 1
         return message
@@ -224,18 +224,20 @@ def parse_saved_messages(data: bytes) -> tuple[SavedMessages, int]:
 def _parse_message(entry: object) -> SavedMessage | None:
     if not isinstance(entry, dict):
         return None
-    id, name, topic, kind, text = (entry.get(key) for key in ("id", "name", "topic", "type", "text"))
+    id, name, topic, msg_type, text = (entry.get(key) for key in ("id", "name", "topic", "type", "text"))
     if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
         return None
-    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MAX_LENGTH + 1:
+    if not (isinstance(msg_type, str) and isinstance(text, str)) or len(text) > MAX_LENGTH + 1:
         return None
     values, rate_hz = entry.get("values"), entry.get("rate_hz")
-    typed = tuple(
+    placeholder_values = tuple(
         (name, each[:MAX_VALUE_LENGTH])
         for name, each in (values.items() if isinstance(values, dict) else ())
         if isinstance(each, str)
     )
-    hertz = 1.0
+    valid_rate_hz = 1.0
     if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
-        hertz = float(min(MAX_HZ, max(MIN_HZ, rate_hz)))
-    return SavedMessage(id, name[:MAX_NAME_LENGTH], topic, kind, text, typed[:MAX_VALUES], hertz)
+        valid_rate_hz = float(min(MAX_HZ, max(MIN_HZ, rate_hz)))
+    return SavedMessage(
+        id, name[:MAX_NAME_LENGTH], topic, msg_type, text, placeholder_values[:MAX_VALUES], valid_rate_hz
+    )

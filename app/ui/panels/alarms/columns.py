@@ -52,13 +52,13 @@ def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, s
         case "waits":
             return _("waits for {name}").format(name=rule.condition.name), "off", None
     if rule.is_snoozed(now_s):
-        until = clock_text(local_datetime(rule.snoozed_until_s))
+        snooze_end = clock_text(local_datetime(rule.snoozed_until_s))
         text = _("{seen}, snoozed until {clock}") if value_text else _("snoozed until {clock}")
-        return text.format(seen=value_text, clock=until), "warn", "bell-off"
+        return text.format(seen=value_text, clock=snooze_end), "warn", "bell-off"
     if state.phase == "on":
-        lasts = _("active for {time}").format(time=seconds_text(state.on_duration_s))
-        is_told = bool(value_text) and rule.condition.kind != "silent"
-        text = _("{state}, {seen}").format(state=lasts, seen=value_text) if is_told else lasts
+        duration = _("active for {time}").format(time=seconds_text(state.on_duration_s))
+        has_value = bool(value_text) and rule.condition.kind != "silent"
+        text = _("{state}, {seen}").format(state=duration, seen=value_text) if has_value else duration
         return text, severity_of(rule.condition), None
     if state.phase == "pending":
         return value_text or _("pending"), "warn", None
@@ -100,31 +100,33 @@ def _lower_first(text: str) -> str:
 
 
 def history_columns(
-    condition: Callable[[AlarmRecord], str], now: Callable[[], dt.datetime]
+    severity: Callable[[AlarmRecord], str], now: Callable[[], dt.datetime]
 ) -> tuple[Column[AlarmRecord], ...]:
     """Return the columns of the history table.
 
     Args:
-        condition: Returns the severity of a record's alarm, "error" or "warn".
+        severity: Returns the severity of a record's alarm, "error" or "warn".
         now: Returns the current local time.
     """
 
     def when_cell(record: AlarmRecord) -> Cell:
         recorded_at = local_datetime(record.at_s)
-        today = recorded_at.date() == now().date()
-        text = recorded_at.strftime("%H:%M:%S").lstrip("0") if today else date_time_text(recorded_at, now())
-        return Cell(text, role="textSecondary", mono=today)
+        is_today = recorded_at.date() == now().date()
+        text = (
+            recorded_at.strftime("%H:%M:%S").lstrip("0") if is_today else date_time_text(recorded_at, now())
+        )
+        return Cell(text, role="textSecondary", mono=is_today)
 
     def alarm_cell(record: AlarmRecord) -> Cell:
         icon = "check"
         if record.is_on:
-            icon = "circle-x" if condition(record) == "error" else "triangle-alert"
-        return Cell(record.cause, icon, condition(record) if record.is_on else "text")
+            icon = "circle-x" if severity(record) == "error" else "triangle-alert"
+        return Cell(record.cause, icon, severity(record) if record.is_on else "text")
 
     def duration_cell(record: AlarmRecord) -> Cell:
         if record.is_on:
             on_s = max(0.0, now().timestamp() - record.at_s)
-            return Cell(_("{time}, active").format(time=seconds_text(on_s)), role=condition(record))
+            return Cell(_("{time}, active").format(time=seconds_text(on_s)), role=severity(record))
         return Cell(seconds_text(record.duration_s) if record.duration_s is not None else "")
 
     return (
@@ -143,19 +145,19 @@ def actions_text(record: AlarmRecord) -> str:
     """Format the results of a record's actions, such as "restart_lidar did not answer, sound"."""
     if record.was_snoozed and not record.action_results:
         return _("none, snoozed")
-    return ", ".join(deed.text for deed in record.action_results)
+    return ", ".join(result.text for result in record.action_results)
 
 
 def csv_text(records: Iterable[AlarmRecord]) -> str:
     """Format records as CSV (RFC 4180) with a header row and ISO 8601 times, in the given order."""
-    out = io.StringIO()
-    rows = csv.writer(out)
-    rows.writerow(("at", "alarm", "lasted_s", "times", "did"))
+    output = io.StringIO()
+    writer = csv.writer(output)
+    writer.writerow(("at", "alarm", "lasted_s", "times", "did"))
     for record in records:
-        lasted = "" if record.duration_s is None else f"{record.duration_s:.3f}"
+        duration = "" if record.duration_s is None else f"{record.duration_s:.3f}"
         cells = [_escape_formula(text) for text in (record.cause, actions_text(record))]
-        rows.writerow((local_datetime(record.at_s).isoformat(), cells[0], lasted, record.count, cells[1]))
-    return out.getvalue()
+        writer.writerow((local_datetime(record.at_s).isoformat(), cells[0], duration, record.count, cells[1]))
+    return output.getvalue()
 
 
 def _escape_formula(text: str) -> str:

@@ -75,7 +75,7 @@ class AlarmsPanel(PanelWidget):
         self._ticks = 0
         self.rows: list[AlarmRow] = []
         self.field: SlotField | None = None
-        self._peek: Watch | None = None
+        self._value_watch: Watch | None = None
         self._new_rule_id = ""
         self._make_header()
         self._make_rows()
@@ -86,16 +86,16 @@ class AlarmsPanel(PanelWidget):
     # -- construction -------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
-        self.count = label("", "small", role="textSecondary")
+        self.count_label = label("", "small", role="textSecondary")
         self.chip = Chip(self.theme)
-        self.chips = [self.count, self.chip]
-        self.new = Button(self.theme, _("New alarm"), "plus", size="small")
-        self.new.clicked.connect(self.add_alarm)
-        self.header = [self.new]
+        self.chips = [self.count_label, self.chip]
+        self.new_button = Button(self.theme, _("New alarm"), "plus", size="small")
+        self.new_button.clicked.connect(self.add_alarm)
+        self.header = [self.new_button]
 
     def _make_rows(self) -> None:
-        self.list = ScrollColumn(_("Alarms"))
-        self.column = self.list.column
+        self.alarm_list = ScrollColumn(_("Alarms"))
+        self.column = self.alarm_list.column
         self.empty = EmptyState(
             self.theme,
             "bell",
@@ -109,9 +109,9 @@ class AlarmsPanel(PanelWidget):
         self.history_count = label("", "small", role="textSecondary")
         self.filter = FilterField(self.theme, _("Filter the history"))
         self.filter.textChanged.connect(self._show_history)
-        self.export = Button(self.theme, _("CSV"), "download", size="small")
-        self.export.setAccessibleName(_("Save the history as CSV"))
-        self.export.clicked.connect(self._save_history)
+        self.export_button = Button(self.theme, _("CSV"), "download", size="small")
+        self.export_button.setAccessibleName(_("Save the history as CSV"))
+        self.export_button.clicked.connect(self._save_history)
         columns = history_columns(self._severity, lambda: local_datetime(self.now_s()))
         self.model: TableModel[AlarmRecord] = TableModel(
             columns, lambda record: f"{record.rule_id} {record.at_s}"
@@ -123,8 +123,8 @@ class AlarmsPanel(PanelWidget):
         self.table.opened.connect(self._scroll_to_alarm)
         self.table.menu_requested.connect(self._show_record_menu)
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self._clear = QAction(_("Clear the history"), self)
-        self._clear.triggered.connect(self.alarms.history.clear)
+        self._clear_action = QAction(_("Clear the history"), self)
+        self._clear_action.triggered.connect(self.alarms.history.clear)
 
     def _arrange(self) -> None:
         header = QHBoxLayout()
@@ -134,24 +134,26 @@ class AlarmsPanel(PanelWidget):
         header.addWidget(self.history_count)
         header.addStretch(1)
         header.addWidget(self.filter)
-        header.addWidget(self.export)
+        header.addWidget(self.export_button)
         footer = QHBoxLayout()
         footer.setContentsMargins(12, 3, 12, 4)
         footer.setSpacing(6)
         hint = ElidedLabel("small", "textTertiary")
         hint.setText(_("Right-click a value, topic or node to create an alarm"))
-        self.line = LinkButton(self.theme, _("nep watch"))
-        self.line.setToolTip(plain.tip(_("Copies the command that monitors these alarms without a window")))
-        self.line.setAccessibleName(_("Copy the command for a terminal: nep watch"))
-        self.line.clicked.connect(self._copy_command)
+        self.command_button = LinkButton(self.theme, _("nep watch"))
+        self.command_button.setToolTip(
+            plain.tip(_("Copies the command that monitors these alarms without Studio"))
+        )
+        self.command_button.setAccessibleName(_("Copy the command for a terminal: nep watch"))
+        self.command_button.clicked.connect(self._copy_command)
         footer.addWidget(hint, 1)
-        footer.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
-        footer.addWidget(self.line)
+        footer.addWidget(label(_("Monitor without Studio:"), "small", role="textTertiary"))
+        footer.addWidget(self.command_button)
         content = QWidget()
         column = QVBoxLayout(content)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(self.list, 5)
+        column.addWidget(self.alarm_list, 5)
         column.addWidget(Separator(self.theme))
         column.addLayout(header)
         column.addWidget(self.table, 3)
@@ -192,9 +194,9 @@ class AlarmsPanel(PanelWidget):
         for index, (row, rule) in enumerate(zip(self.rows, rules, strict=True)):
             if self.column.indexOf(row) != index:
                 self.column.insertWidget(index, row)
-            row.show_rule(rule, self._icon(rule), snoozed=rule.is_snoozed(self.now_s()))
-        any_history = len(self.alarms.history) > 0
-        self.pages.setCurrentIndex(1 if rules or any_history else 0)
+            row.show_rule(rule, self._topic_icon(rule), is_snoozed=rule.is_snoozed(self.now_s()))
+        has_history = len(self.alarms.history) > 0
+        self.pages.setCurrentIndex(1 if rules or has_history else 0)
 
     def _new_row(self, rule_id: str) -> AlarmRow:
         row = AlarmRow(self.theme, rule_id)
@@ -205,24 +207,23 @@ class AlarmsPanel(PanelWidget):
         row.more_pressed.connect(partial(self._show_more_menu, row))
         return row
 
-    def _icon(self, rule: AlarmRule) -> str:
+    def _topic_icon(self, rule: AlarmRule) -> str:
         topic = self.session.live.topics.get(rule.condition.name)
         return TOPIC_ICONS.get(topic.codec, "box") if topic is not None else "radio-tower"
 
     def _show_states(self) -> None:
-        now_s, on = self.now_s(), 0
+        now_s, active_count = self.now_s(), 0
         now = local_datetime(now_s)
         for row, rule in zip(self.rows, self.alarms.rules, strict=True):
             state = self.alarms.alarms.evaluator.state(rule)
-            on += state.phase == "on" and not rule.is_snoozed(now_s)
+            active_count += state.phase == "on" and not rule.is_snoozed(now_s)
             row.show_state(*state_chip(rule, state, now_s), note_text(rule, state, self.alarms, now))
-            row.snooze.setVisible(rule.is_enabled)
+            row.snooze_button.setVisible(rule.is_enabled)
         count = len(self.rows)
         count_text = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
-        self.count.setText(count_text if count else "")
-        self.chip.set(
-            ngettext("{count} active", "{count} active", on).format(count=on) if on else "", "error"
-        )
+        self.count_label.setText(count_text if count else "")
+        active_text = ngettext("{count} active", "{count} active", active_count)
+        self.chip.set(active_text.format(count=active_count) if active_count else "", "error")
 
     def _show_history(self) -> None:
         history = self.alarms.history
@@ -233,12 +234,12 @@ class AlarmsPanel(PanelWidget):
         self.table.refresh_visible()
         midnight = local_datetime(self.now_s()).replace(hour=0, minute=0, second=0, microsecond=0)
         yesterday = (midnight - dt.timedelta(days=1)).timestamp()
-        today = sum(each.at_s >= midnight.timestamp() for each in history)
-        before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
-        words_today = _("today {today}, yesterday {yesterday}") if before else _("today {today}")
-        summary = words_today.format(today=today, yesterday=before)
+        today_count = sum(each.at_s >= midnight.timestamp() for each in history)
+        yesterday_count = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
+        template = _("today {today}, yesterday {yesterday}") if yesterday_count else _("today {today}")
+        summary = template.format(today=today_count, yesterday=yesterday_count)
         self.history_count.setText(summary if len(history) else _("no events yet"))
-        for widget in (self.filter, self.export):
+        for widget in (self.filter, self.export_button):
             widget.setVisible(len(history) > 0)
         if len(history) and not self.rows:
             self.pages.setCurrentIndex(1)
@@ -248,8 +249,8 @@ class AlarmsPanel(PanelWidget):
         return severity_of(rule.condition) if rule is not None else "error"
 
     def badge(self) -> tuple[str, str] | None:
-        on = len(self.alarms.active)
-        return (str(on), "error") if on else None
+        active_count = len(self.alarms.active)
+        return (str(active_count), "error") if active_count else None
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -271,7 +272,7 @@ class AlarmsPanel(PanelWidget):
         if row is None:
             return
         row.show()
-        self.list.ensureWidgetVisible(row)
+        self.alarm_list.ensureWidgetVisible(row)
         slot_widget = row.slots.get(slot) or row.slots["kind"]
         slot_widget.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if slot:
@@ -284,10 +285,10 @@ class AlarmsPanel(PanelWidget):
         self.alarms.set_rule(rule)
         self.refresh()
 
-    def _set_rule_enabled(self, rule_id: str, on: bool) -> None:
+    def _set_rule_enabled(self, rule_id: str, is_enabled: bool) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
-            self._save_rule(replace(rule, is_enabled=on))
+            self._save_rule(replace(rule, is_enabled=is_enabled))
 
     def _open_slot(self, row: AlarmRow, part: PhrasePart) -> None:
         rule = self._rule(row.rule_id)
@@ -305,9 +306,9 @@ class AlarmsPanel(PanelWidget):
         if self.field is not None:
             self.field.dismiss(keeps_focus=False)
         condition = rule.condition
-        if part.role in {"value", "limit"} and condition.name and self._peek is None:
+        if part.role in {"value", "limit"} and condition.name and self._value_watch is None:
             # field names and values to offer come from the newest message
-            self._peek = self.session.watch(condition.name)
+            self._value_watch = self.session.watch(condition.name)
         self.field = SlotField(
             self.theme,
             row,
@@ -336,9 +337,9 @@ class AlarmsPanel(PanelWidget):
 
     def _field_closed(self) -> None:
         self.field = None
-        if self._peek is not None:
-            self._peek.close()
-            self._peek = None
+        if self._value_watch is not None:
+            self._value_watch.close()
+            self._value_watch = None
 
     def _row_of(self, slot: QWidget) -> AlarmRow:
         return next(row for row in self.rows if slot in row.slots.values())
@@ -405,15 +406,15 @@ class AlarmsPanel(PanelWidget):
         changed_rule = with_kind(rule, kind)
         self._save_rule(changed_rule)
         condition = changed_rule.condition
-        missing = (
+        missing_slot = (
             "subject"
             if not condition.name
             else "value"
             if condition.is_about_value and not condition.path
             else ""
         )
-        if missing:
-            row.slots[missing].setFocus(Qt.FocusReason.OtherFocusReason)
+        if missing_slot:
+            row.slots[missing_slot].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _fill_actions(self, menu: Menu, row: AlarmRow, part: PhrasePart) -> None:
         rule = self._rule(row.rule_id)
@@ -487,7 +488,7 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         menu.addAction(self.theme.icon("copy"), _("Duplicate"), partial(self._duplicate, rule.id))
         menu.addAction(self.theme.icon("trash-2"), _("Delete"), partial(self._delete, rule.id))
-        open_below(menu, row.more)
+        open_below(menu, row.more_button)
 
     def _set_calm(self, rule_id: str, calm_s: float, _on: bool = False) -> None:
         rule = self._rule(rule_id)
@@ -507,7 +508,7 @@ class AlarmsPanel(PanelWidget):
             message = _("Deleted the alarm “{condition}”").format(condition=condition_text(rule.condition))
             self.context.show_toast(message, _("Undo"), self.alarms.restore)
             self.refresh()
-            self.new.setFocus(Qt.FocusReason.OtherFocusReason)
+            self.new_button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     # -- history ------------------------------------------------------------------------------------------
 
@@ -515,12 +516,12 @@ class AlarmsPanel(PanelWidget):
         rule_id = key.partition(" ")[0]
         row = next((row for row in self.rows if row.rule_id == rule_id), None)
         if row is not None:
-            self.list.ensureWidgetVisible(row)
+            self.alarm_list.ensureWidgetVisible(row)
 
     def _show_record_menu(self, key: str, position: QPoint) -> None:
         record = next((each for each in self.alarms.history if self.model.key_of(each) == key), None)
         file_names = (
-            [saved_file_name(deed.text) for deed in record.action_results if deed.kind == "keep"]
+            [saved_file_name(result.text) for result in record.action_results if result.kind == "keep"]
             if record
             else []
         )
@@ -558,8 +559,8 @@ class AlarmsPanel(PanelWidget):
     # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> list[QAction]:
-        self._clear.setEnabled(len(self.alarms.history) > 0)
-        return [self._clear]
+        self._clear_action.setEnabled(len(self.alarms.history) > 0)
+        return [self._clear_action]
 
     def focus_filter(self) -> bool:
         if self.filter.isVisibleTo(self):
@@ -577,8 +578,8 @@ class AlarmsPanel(PanelWidget):
     def dispose(self) -> None:
         if self.field is not None:
             self.field.dismiss(keeps_focus=False)
-        if self._peek is not None:
-            self._peek.close()
+        if self._value_watch is not None:
+            self._value_watch.close()
 
 
 PANEL = Panel("alarms", lazy("Alarms"), "bell", (), AlarmsPanel)

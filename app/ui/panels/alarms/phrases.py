@@ -162,38 +162,40 @@ def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
     """
     condition = rule.condition
     parts: list[PhrasePart] = []
-    for text, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
+    for text, slot_name, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
         if text.strip():
             parts.append(PhrasePart(f"word:{len(parts)}", text.strip(), "word"))
-        if hole:
-            parts.append(_slot(hole, condition, icon))
+        if slot_name:
+            parts.append(_slot(slot_name, condition, icon))
     for index, action in enumerate(rule.actions):
-        joint = "," if index == 0 else _("and") if index == len(rule.actions) - 1 else ","
-        parts.append(PhrasePart(f"word:{len(parts)}", joint, "word"))
+        separator = "," if index == 0 else _("and") if index == len(rule.actions) - 1 else ","
+        parts.append(PhrasePart(f"word:{len(parts)}", separator, "word"))
         parts += _action_parts(index, action)
     parts.append(PhrasePart("add", "", "dashed", "plus"))
     return parts
 
 
-def _slot(hole: str, condition: AlarmCondition, icon: str) -> PhrasePart:
-    if hole == "subject":
+def _slot(slot_name: str, condition: AlarmCondition, icon: str) -> PhrasePart:
+    if slot_name == "subject":
         if not condition.name:
-            missing = _("choose a node") if condition.is_about_node else _("choose a topic")
-            return PhrasePart(hole, missing, "dashed")
-        return PhrasePart(hole, quotable(condition.name), icon=_icon(condition, icon), mono=True)
-    if hole == "value":
-        missing = _("choose a value")
+            placeholder = _("choose a node") if condition.is_about_node else _("choose a topic")
+            return PhrasePart(slot_name, placeholder, "dashed")
+        return PhrasePart(slot_name, quotable(condition.name), icon=_icon(condition, icon), mono=True)
+    if slot_name == "value":
+        placeholder = _("choose a value")
         text = condition.path if condition.path != "." else _("the message")
-        return PhrasePart(hole, quotable(text) or missing, "slot" if text else "dashed", mono=bool(text))
-    if hole == "kind":
-        return PhrasePart(hole, _(KIND_TEXTS[condition.kind]))
-    if hole == "limit":
-        return PhrasePart(hole, limit_text(condition, condition.limit))
+        return PhrasePart(
+            slot_name, quotable(text) or placeholder, "slot" if text else "dashed", mono=bool(text)
+        )
+    if slot_name == "kind":
+        return PhrasePart(slot_name, _(KIND_TEXTS[condition.kind]))
+    if slot_name == "limit":
+        return PhrasePart(slot_name, limit_text(condition, condition.limit))
     if not condition.for_s:
-        return PhrasePart(hole, _("for…"), "dashed")
+        return PhrasePart(slot_name, _("for…"), "dashed")
     if condition.kind in {"silent", "loses"}:
-        return PhrasePart(hole, duration_text(condition.for_s))
-    return PhrasePart(hole, _("for {time}").format(time=duration_text(condition.for_s)))
+        return PhrasePart(slot_name, duration_text(condition.for_s))
+    return PhrasePart(slot_name, _("for {time}").format(time=duration_text(condition.for_s)))
 
 
 def _icon(condition: AlarmCondition, icon: str) -> str:
@@ -323,10 +325,10 @@ def parse_time(text: str) -> float | None:
     typed = text.strip()
     if not typed:
         return 0.0
-    for unit, size in (("min", 60.0), ("ms", 0.001), ("h", 3600.0), ("s", 1.0), ("", 1.0)):
+    for unit, factor in (("min", 60.0), ("ms", 0.001), ("h", 3600.0), ("s", 1.0), ("", 1.0)):
         if typed.endswith(unit):
             try:
-                seconds = parse_number(typed[: len(typed) - len(unit)]) * size
+                seconds = parse_number(typed[: len(typed) - len(unit)]) * factor
             except TypedNumberError:
                 return None
             return round(seconds, 6) if 0 <= seconds <= 86_400 else None
@@ -357,10 +359,10 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
     if kind == condition.kind:
         return rule
     limit, for_s = _DEFAULT_LIMITS.get(kind, (0 if kind in NUMBER_KINDS else None, 0.0))
-    both_values = kind in VALUE_KINDS and condition.is_about_value
-    if both_values and kind in KINDS_WITH_LIMIT:
-        keeps = kind not in NUMBER_KINDS or not math.isnan(condition.number)
-        limit = condition.limit if keeps and condition.kind in KINDS_WITH_LIMIT else limit
+    are_both_values = kind in VALUE_KINDS and condition.is_about_value
+    if are_both_values and kind in KINDS_WITH_LIMIT:
+        is_limit_valid = kind not in NUMBER_KINDS or not math.isnan(condition.number)
+        limit = condition.limit if is_limit_valid and condition.kind in KINDS_WITH_LIMIT else limit
         for_s = condition.for_s
     new_condition = AlarmCondition(kind, limit=limit, for_s=for_s)
     if new_condition.is_about_node is condition.is_about_node:

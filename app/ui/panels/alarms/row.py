@@ -47,50 +47,50 @@ class AlarmRow(QWidget):
         self.sentence.setSizePolicy(policy)
         self.chip = Chip(theme, "", "off", "")
         self.note = ElidedLabel("small", "textTertiary")
-        self.snooze = IconButton(theme, "bell-off", _("Snooze"), size=26)
-        self.more = IconButton(theme, "ellipsis", _("More"), size=26)
-        self.snooze.clicked.connect(self.snooze_pressed)
-        self.more.clicked.connect(self.more_pressed)
+        self.snooze_button = IconButton(theme, "bell-off", _("Snooze"), size=26)
+        self.more_button = IconButton(theme, "ellipsis", _("More"), size=26)
+        self.snooze_button.clicked.connect(self.snooze_pressed)
+        self.more_button.clicked.connect(self.more_pressed)
         self._arrange()
 
     def _arrange(self) -> None:
-        below = QHBoxLayout()
-        below.setContentsMargins(0, 0, 0, 0)
-        below.setSpacing(10)
-        below.addWidget(self.chip)
-        below.addWidget(self.note, 1)
+        status_row = QHBoxLayout()
+        status_row.setContentsMargins(0, 0, 0, 0)
+        status_row.setSpacing(10)
+        status_row.addWidget(self.chip)
+        status_row.addWidget(self.note, 1)
         text_column = QVBoxLayout()
         text_column.setContentsMargins(0, 0, 0, 0)
         text_column.setSpacing(5)
         text_column.addWidget(self.sentence)
-        text_column.addLayout(below)
+        text_column.addLayout(status_row)
         row = QHBoxLayout()
         row.setContentsMargins(12, 8, 8, 7)
         row.setSpacing(8)
         row.addWidget(self.switch, 0, Qt.AlignmentFlag.AlignTop)
         row.addLayout(text_column, 1)
-        row.addWidget(self.snooze, 0, Qt.AlignmentFlag.AlignTop)
-        row.addWidget(self.more, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.snooze_button, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.more_button, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addLayout(row)
         column.addWidget(Separator(self._theme))
 
-    def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
+    def show_rule(self, rule: AlarmRule, icon: str, *, is_snoozed: bool) -> None:
         """Show a rule. Widgets of unchanged slots are reused, so that they don't lose the focus.
 
         Args:
             rule: Rule to show.
             icon: Name of the icon for the message type of the rule's topic.
-            snoozed: True while the alarm is snoozed.
+            is_snoozed: True while the alarm is snoozed.
         """
         text = condition_text(rule.condition)
         self.setAccessibleName(text)
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=text))
         self.switch.setChecked(rule.is_enabled)
-        self.snooze.set_icon("bell" if snoozed else "bell-off")
-        self.snooze.set_name(_("Stop snoozing") if snoozed else _("Snooze for 10 min"))
+        self.snooze_button.set_icon("bell" if is_snoozed else "bell-off")
+        self.snooze_button.set_name(_("Stop snoozing") if is_snoozed else _("Snooze for 10 min"))
         parts = parts_of(rule, icon)
         if parts != self._shown_parts:
             self._shown_parts = parts
@@ -124,13 +124,13 @@ class AlarmRow(QWidget):
             del self.slots[key]
             slot.hide()
             slot.deleteLater()
-        before: QWidget = self.switch
+        previous: QWidget = self.switch
         for part in parts:
             if part.kind != "word":
-                QWidget.setTabOrder(before, self.slots[part.key])
-                before = self.slots[part.key]
-        QWidget.setTabOrder(before, self.snooze)
-        QWidget.setTabOrder(self.snooze, self.more)
+                QWidget.setTabOrder(previous, self.slots[part.key])
+                previous = self.slots[part.key]
+        QWidget.setTabOrder(previous, self.snooze_button)
+        QWidget.setTabOrder(self.snooze_button, self.more_button)
         self.sentence.updateGeometry()
 
     def _new_slot(self, part: PhrasePart) -> AlarmSlot:

@@ -69,25 +69,25 @@ class AlarmSlot(PaintedButton):
             super().keyPressEvent(event)
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        theme, dashed = self._theme, self.part.kind == "dashed"
+        theme, is_dashed = self._theme, self.part.kind == "dashed"
         fill = "pressed" if self.isDown() else "hover" if self.is_hovered else None
         radius = theme.radius("small")
-        edge = theme.colour("controlBorder" if dashed else "borderStrong")
-        if dashed:
-            painter.setPen(QPen(edge, 1, Qt.PenStyle.DashLine))
+        outline = theme.colour("controlBorder" if is_dashed else "borderStrong")
+        if is_dashed:
+            painter.setPen(QPen(outline, 1, Qt.PenStyle.DashLine))
             painter.setBrush(theme.colour(fill) if fill else Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
         else:
-            paint.box(painter, rect, radius, theme.colour(fill or "panel"), edge)
-        colour = theme.colour("textSecondary" if dashed else "text")
+            paint.box(painter, rect, radius, theme.colour(fill or "panel"), outline)
+        colour = theme.colour("textSecondary" if is_dashed else "text")
         left = rect.left() + PADDING
         if self.part.icon:
-            side = theme.scaled(ICON)
-            icon_rect = QRectF(left, rect.center().y() - side / 2, side, side)
+            icon_size = theme.scaled(ICON)
+            icon_rect = QRectF(left, rect.center().y() - icon_size / 2, icon_size, icon_size)
             if not self.text():
                 icon_rect.moveCenter(rect.center())
-            paint_icon(painter, icon_rect, self.part.icon, colour, filled=self.part.icon == "square")
-            left += side + GAP
+            paint_icon(painter, icon_rect, self.part.icon, colour, is_filled=self.part.icon == "square")
+            left += icon_size + GAP
         paint.text_line(
             painter, rect.adjusted(left - rect.left(), 0, 2 - PADDING, 0), self.text(), self._font(), colour
         )
@@ -128,8 +128,8 @@ class SlotField(QLineEdit):
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("small"))
         FieldContextMenu(theme, self)
-        self._offered = QStringListModel(self)
-        completer = QCompleter(self._offered, self)
+        self._completion_model = QStringListModel(self)
+        completer = QCompleter(self._completion_model, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
         completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
         completer.setMaxVisibleItems(10)
@@ -157,9 +157,9 @@ class SlotField(QLineEdit):
 
     def set_completions(self, completions: Sequence[str]) -> None:
         """Set the completions."""
-        if list(completions) == self._offered.stringList():
+        if list(completions) == self._completion_model.stringList():
             return
-        self._offered.setStringList(list(completions))
+        self._completion_model.setStringList(list(completions))
         if self.hasFocus() and completions and self.text() == "":
             self._show_all_completions()
 

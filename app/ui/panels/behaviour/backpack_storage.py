@@ -1,4 +1,4 @@
-"""Storage of the block editor's backpack in a file shared by all Studios of the user."""
+"""Storage of the block editor's backpack in a file shared by all of the user's Studio instances."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext
 from nep.text import bounded_str
 
-POLL_TICKS = 30  # refreshes at 30 Hz: changes of another Studio appear within a second
+POLL_TICKS = 30  # refreshes at 30 Hz: changes made by another instance of Studio appear within a second
 
 
 class BackpackView(Protocol):
@@ -41,7 +41,7 @@ class BackpackController:
         self.reload_if_changed()
 
     def tick(self) -> None:
-        """Poll for changes made by another Studio; call on every refresh."""
+        """Poll for changes made by another instance of Studio; call on every refresh."""
         self._ticks += 1
         if self._ticks % POLL_TICKS == 0:
             self.reload_if_changed()
@@ -52,9 +52,9 @@ class BackpackController:
         self._show()
 
     def _show(self) -> None:
-        trouble = self._backpack.take_problem()
-        if trouble:
-            self._context.show_toast(_capitalize_first(trouble))
+        problem = self._backpack.take_problem()
+        if problem:
+            self._context.show_toast(_capitalize_first(problem))
         if self._shown_revision != self._backpack.revision:
             self._shown_revision = self._backpack.revision
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
@@ -73,9 +73,9 @@ class BackpackController:
             if isinstance(blocks, list) and isinstance(count, int):
                 self._add(blocks, count, has_notes=bool(request.get("notes")))
         elif request.get("do") == "remove":
-            self._remove(lambda: self._backpack.remove([bounded_str(request.get("id"))]), emptied=False)
+            self._remove(lambda: self._backpack.remove([bounded_str(request.get("id"))]), removes_all=False)
         elif request.get("do") == "empty":
-            self._remove(self._backpack.empty, emptied=True)
+            self._remove(self._backpack.empty, removes_all=True)
 
     def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, has_notes: bool) -> None:
         # `has_notes` is True if the selection contained notes, which the backpack doesn't store.
@@ -94,10 +94,10 @@ class BackpackController:
                 message, _("Undo"), lambda: self._apply_change(lambda: self._backpack.remove(ids))
             )
 
-    def _remove(self, remove: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:
+    def _remove(self, remove: Callable[[], list[BackpackStack]], *, removes_all: bool) -> None:
         removed: list[BackpackStack] = []
         if self._apply_change(lambda: removed.extend(remove())) and removed:
-            message = _("Emptied the backpack") if emptied else _("Removed from the backpack")
+            message = _("Emptied the backpack") if removes_all else _("Removed from the backpack")
             self._context.show_toast(
                 message, _("Undo"), lambda: self._apply_change(lambda: self._backpack.restore(removed))
             )

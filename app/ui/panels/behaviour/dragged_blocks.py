@@ -91,7 +91,7 @@ class BlockDrag:
 
     The tab under the mouse pointer is highlighted. A tab opens after the pointer has hovered over it for a
     while, and the drag continues on its page. A drop on "+" creates a behaviour; a drop outside the tab bar
-    returns the blocks. Near an end of the tab bar, the tabs scroll.
+    returns the blocks to their place. Near an end of the tab bar, the tabs scroll.
 
     Args:
         flush: Fetches pending edits, then calls its argument.
@@ -112,14 +112,14 @@ class BlockDrag:
         self._home = ""  # key of the tab that the drag started on
         self._drag_position: QPoint | None = None
         self._picture: DragImage | None = None
-        self._aimed = ""
-        self._opening = QTimer(tabs)
-        self._opening.setSingleShot(True)
-        self._opening.setInterval(OPEN_DELAY_MS)
-        self._opening.timeout.connect(self._open_target)
-        self._scrolling = QTimer(tabs)
-        self._scrolling.setInterval(SCROLL_INTERVAL_MS)
-        self._scrolling.timeout.connect(self._scroll)
+        self._hovered_target = ""
+        self._open_timer = QTimer(tabs)
+        self._open_timer.setSingleShot(True)
+        self._open_timer.setInterval(OPEN_DELAY_MS)
+        self._open_timer.timeout.connect(self._open_target)
+        self._scroll_timer = QTimer(tabs)
+        self._scroll_timer.setInterval(SCROLL_INTERVAL_MS)
+        self._scroll_timer.timeout.connect(self._scroll)
         editor.blocks_dragged_outside.connect(self._drag_moved)
         editor.drag_picture_rendered.connect(self._set_image)
         editor.blocks_dropped_outside.connect(self._on_dropped)
@@ -136,31 +136,31 @@ class BlockDrag:
         self._move_image(position)
         self._update_target(position)
         if position is None:
-            self._scrolling.stop()
-        elif not self._scrolling.isActive():
-            self._scrolling.start()
+            self._scroll_timer.stop()
+        elif not self._scroll_timer.isActive():
+            self._scroll_timer.start()
 
     def _scroll(self) -> None:
         position = self._drag_position
         if position is not None and self._tabs.scroll_at(position):
             self._update_target(position)
         else:
-            self._scrolling.stop()  # the next mouse move starts it again
+            self._scroll_timer.stop()  # the next mouse move starts it again
 
     def _update_target(self, position: QPoint | None) -> None:
         self._tabs.highlight_target(self._target(position) if position is not None else "")
         target = self._tabs.target_at(position) if position is not None else ""
-        if target == self._aimed:
+        if target == self._hovered_target:
             return
-        self._aimed = target
+        self._hovered_target = target
         if target in {"", NEW_TAB, self._session.document.key}:
-            self._opening.stop()
+            self._open_timer.stop()
         else:
-            self._opening.start()
+            self._open_timer.start()
 
     def _open_target(self) -> None:
-        if self._drag_position is not None and self._aimed not in {"", NEW_TAB}:
-            self._context.run(f"tab:{self._aimed}")
+        if self._drag_position is not None and self._hovered_target not in {"", NEW_TAB}:
+            self._context.run(f"tab:{self._hovered_target}")
             self._show()
 
     def _set_image(self, data: bytes, ratio: float) -> None:
@@ -179,7 +179,7 @@ class BlockDrag:
     def _on_dropped(self, position: QPoint) -> None:
         target = self._target(position)
         self._drag_position = None
-        self._scrolling.stop()
+        self._scroll_timer.stop()
         self._move_image(None)
         self._update_target(None)
         if not target:

@@ -43,7 +43,7 @@ def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tupl
         no values.
     """
     texts: dict[str, str] = {}
-    old: set[str] = set()
+    stale_keys: set[str] = set()
     for robot, name in sensors:
         link = fleet.link(robot)
         sensor = link.robot.sensor(name) if link is not None else None
@@ -52,8 +52,8 @@ def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tupl
         sensor_values = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
         texts |= sensor_values
         if link.state == SILENT_STATE:
-            old |= sensor_values.keys()
-    return texts, old
+            stale_keys |= sensor_values.keys()
+    return texts, stale_keys
 
 
 def _value_texts(key: str, sensor: Sensor, value: object) -> dict[str, str]:

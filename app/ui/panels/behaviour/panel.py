@@ -71,21 +71,21 @@ class Editor(Protocol):
 
     @property
     def is_ready(self) -> bool: ...
-    def set_toolbox_pinned(self, pinned: bool | None) -> None: ...
+    def set_toolbox_pinned(self, is_pinned: bool | None) -> None: ...
     def set_definitions(self, definitions: Json) -> None: ...
     def show_tab(self, key: str, workspace: Json) -> None: ...
     def close_tab(self, key: str) -> None: ...
     def load(self, workspace: Json) -> None: ...
     def apply_edit(self, workspace: Json) -> None: ...
     def flush(self, callback: Callable[[WorkspaceJson], None]) -> None: ...
-    def set_theme(self, tokens: Json, dark: bool) -> None: ...
+    def set_theme(self, tokens: Json, is_dark: bool) -> None: ...
     def highlight(self, ids: Sequence[str]) -> None: ...
     def mark_stopped(self, ids: Sequence[str]) -> None: ...
     def set_errors(self, errors: Mapping[str, str]) -> None: ...
     def set_warnings(self, warnings: Mapping[str, str]) -> None: ...
     def show_value(self, id: str, text: str) -> None: ...
     def set_absent(self, ids: Sequence[str]) -> None: ...
-    def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None: ...
+    def set_live_values(self, values: Mapping[str, str], stale_keys: Collection[str] = ()) -> None: ...
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None: ...
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None: ...
     def edit_variable(self, edit: Json) -> None: ...
@@ -127,7 +127,7 @@ class BehaviourPanel(PanelWidget):
         self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = make_blockly_editor
     ) -> None:
         super().__init__(context, _("Behaviour"))
-        self._can_open = True
+        self._can_open_editor = True
         self._bar = BehaviourTitle(self.theme)
         self._bar.mode.changed.connect(self.set_mode)
         self._bar.copy.clicked.connect(self.copy_program)
@@ -149,13 +149,13 @@ class BehaviourPanel(PanelWidget):
         self._editor_layout = QVBoxLayout(self._editor_container)
         self._editor_layout.setContentsMargins(0, 0, 0, 0)
         self.pages = self.make_page_stack(self._editor_container, self.program)
-        self.waiting = LoadingMessage(self._editor_container)
+        self.loading_message = LoadingMessage(self._editor_container)
         self._shown_values: dict[str, object] = {}
         self._loaded_revisions: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
         self._sensors: tuple[tuple[str, str], ...] = ()
-        self._offered: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
-        self._watched: tuple[str, ...] = ()  # ids of variables whose values the page shows
+        self._flyout_sensors: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
+        self._watched_variable_ids: tuple[str, ...] = ()  # variables whose values the page shows
         self._ticks = 0
         self._block_drag: BlockDrag | None = None
         self._backpack: BackpackController | None = None
@@ -169,7 +169,7 @@ class BehaviourPanel(PanelWidget):
         self._ticks += 1
         documents, document = self.session.documents, self.session.document
         self._bar.tabs.show_tabs(tab_states(documents, self.session.runs), document.key)
-        if self.editor is None and self._can_open:
+        if self.editor is None and self._can_open_editor:
             self.editor = self._open_editor()
         if self.editor is not None:
             if self._has_changed("definitions", documents.definitions_revision):
@@ -184,28 +184,30 @@ class BehaviourPanel(PanelWidget):
 
     def _show_run(self, editor: Editor) -> None:
         runs, document = self.session.runs, self.session.document
-        mine = runs.document is document
-        if self._has_changed("blocks", (runs.blocks_revision, mine)):
-            editor.highlight(runs.running_blocks if mine else ())
-            editor.mark_stopped(runs.stopped_blocks if mine else ())
-            editor.set_errors(runs.block_errors if mine else {})
-            editor.set_warnings(runs.block_warnings if mine else {})
+        is_shown_run = runs.document is document
+        if self._has_changed("blocks", (runs.blocks_revision, is_shown_run)):
+            editor.highlight(runs.running_blocks if is_shown_run else ())
+            editor.mark_stopped(runs.stopped_blocks if is_shown_run else ())
+            editor.set_errors(runs.block_errors if is_shown_run else {})
+            editor.set_warnings(runs.block_warnings if is_shown_run else {})
         tried = runs.tried_value
         if self._has_changed("tried", tried) and tried is not None and tried.document is document:
             editor.show_value(tried.block, tried.text)
         alarms = alarms_of(self.session.fleet.links)
         if self._has_changed("alarms", alarms):
             editor.set_alarms(alarms)
-        if self._has_changed("values", (runs.values_revision, mine, self._watched)):
-            values = runs.values if mine else {}
-            editor.set_variable_values({id: values[id].to_json() for id in self._watched if id in values})
+        if self._has_changed("values", (runs.values_revision, is_shown_run, self._watched_variable_ids)):
+            values = runs.values if is_shown_run else {}
+            editor.set_variable_values(
+                {id: values[id].to_json() for id in self._watched_variable_ids if id in values}
+            )
         if self._ticks % LIVE_UPDATE_TICKS == 0:
             self._show_live_values()
         if self._backpack is not None:
             self._backpack.tick()
-        self.waiting.set_ready(ready=editor.is_ready)
-        robot = bool(self.session.fleet.connected or self.session.starting_robots)
-        editor.set_canvas_hint(pgettext("block", "when started"), robot)
+        self.loading_message.set_ready(is_ready=editor.is_ready)
+        has_robot = bool(self.session.fleet.connected or self.session.starting_robots)
+        editor.set_canvas_hint(pgettext("block", "when started"), has_robot)
 
     def show_current(self) -> None:
         """Show the active behaviour at once instead of on the next tick."""
@@ -245,7 +247,7 @@ class BehaviourPanel(PanelWidget):
             missing = missing_libraries(error)
             if missing is None:
                 raise
-            self._can_open = False
+            self._can_open_editor = False
             self._show_missing_libraries(missing)
             return None
         editor.changed.connect(self._on_edited)
@@ -268,7 +270,7 @@ class BehaviourPanel(PanelWidget):
         self._backpack = BackpackController(self.context, backpack, editor)
         pinned: object = self.session.settings.get(PINNED_SETTING, None)
         editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
-        editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
+        editor.set_theme(self.theme.blockly_tokens(), self.theme.is_dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
             self._editor_layout.addWidget(editor)
@@ -290,7 +292,7 @@ class BehaviourPanel(PanelWidget):
         self.context.show_toast(_("Copied “{command}”").format(command=command))
 
     def _program_changed(self, program: Program) -> None:
-        # Connected to signals of the session; updates absent blocks, sensors and the program's text.
+        # Updates absent blocks, sensors and the program's text.
         if self.editor is not None:
             self.editor.set_absent(program.absent)
         self._sensors = tuple(program.sensors)
@@ -306,11 +308,11 @@ class BehaviourPanel(PanelWidget):
                 self._watches[name] = self.session.fleet.watch_sensors(name)
 
     def _set_flyout_sensors(self, sensors: tuple[tuple[str, str], ...]) -> None:
-        self._offered = sensors
+        self._flyout_sensors = sensors
         self._show_live_values()
 
     def _watch_variables(self, ids: tuple[str, ...]) -> None:
-        self._watched = ids
+        self._watched_variable_ids = ids
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
         """Run an operation on a variable in the blocks view.
@@ -328,25 +330,25 @@ class BehaviourPanel(PanelWidget):
             else:
                 self.editor.edit_variable(edit)
 
-    def _save_pinned(self, keeps: bool) -> None:
+    def _save_pinned(self, is_pinned: bool) -> None:
         # Failed writes are shown by the status bar.
         with suppress(SettingsError):
-            self.session.settings.set(PINNED_SETTING, keeps)
+            self.session.settings.set(PINNED_SETTING, is_pinned)
 
     def _blocks_deleted(self, editor: Editor, count: int) -> None:
         message = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
         self.context.show_toast(message, _("Undo"), editor.undo_deletion)
 
     def _show_live_values(self) -> None:
-        sensors = dict.fromkeys((*self._sensors, *self._offered))
+        sensors = dict.fromkeys((*self._sensors, *self._flyout_sensors))
         self._watch_robots({robot for robot, _name in sensors})
         if self.editor is not None:
-            texts, old = sensor_texts(self.session.fleet, sensors)
-            self.editor.set_live_values(texts, old)
+            texts, stale_keys = sensor_texts(self.session.fleet, sensors)
+            self.editor.set_live_values(texts, stale_keys)
 
     def theme_changed(self) -> None:
         if self.editor is not None:
-            self.editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
+            self.editor.set_theme(self.theme.blockly_tokens(), self.theme.is_dark)
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -441,12 +443,12 @@ class BehaviourPanel(PanelWidget):
             self.editor.point_at("")
             return
         self.set_mode("blocks")
-        help_of = self.session.documents.definitions().get("help")
-        definition = help_of.get(block) if isinstance(help_of, Mapping) else None
+        help_by_type = self.session.documents.definitions().get("help")
+        definition = help_by_type.get(block) if isinstance(help_by_type, Mapping) else None
         title = str(definition.get("title", "")) if isinstance(definition, Mapping) else ""
         name = " ".join(_PLACEHOLDER.sub(" ", title).split())
-        begins = block.startswith("events_") or "_when_" in block
-        hint = _("Drag it onto the page") if begins else _("Drag it below the other blocks")
+        starts_script = block.startswith("events_") or "_when_" in block
+        hint = _("Drag it onto the page") if starts_script else _("Drag it below the other blocks")
         self.editor.point_at(block, name, hint)
 
     def show_block(self, block: str) -> None:
@@ -491,7 +493,7 @@ class BehaviourPanel(PanelWidget):
         return self._watches.values()
 
     def dispose(self) -> None:
-        self._sensors = self._offered = ()
+        self._sensors = self._flyout_sensors = ()
         self._watch_robots(set())
 
 
@@ -507,30 +509,30 @@ class LoadingMessage:
 
     def __init__(self, parent: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
         self._container, self._clock = parent, clock
-        self._since: float | None = None
+        self._waiting_since_s: float | None = None
         self.text_label = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
         self.text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.text_label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.text_label.setParent(parent)
         self.text_label.hide()
 
-    def set_ready(self, *, ready: bool) -> None:
+    def set_ready(self, *, is_ready: bool) -> None:
         """Show or hide the message; call on every refresh.
 
         Args:
-            ready: True if the block editor has loaded.
+            is_ready: True if the block editor has loaded.
         """
         now = self._clock()
-        if ready:
-            self._since = None
-        elif self._since is None:
-            self._since = now
-        late = self._since is not None and now - self._since >= LOADING_TEXT_DELAY_S
-        if late:
+        if is_ready:
+            self._waiting_since_s = None
+        elif self._waiting_since_s is None:
+            self._waiting_since_s = now
+        is_late = self._waiting_since_s is not None and now - self._waiting_since_s >= LOADING_TEXT_DELAY_S
+        if is_late:
             self.text_label.setGeometry(self._container.rect())
             self.text_label.raise_()
-        if late != self.text_label.isVisibleTo(self._container):
-            self.text_label.setVisible(late)
+        if is_late != self.text_label.isVisibleTo(self._container):
+            self.text_label.setVisible(is_late)
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
@@ -556,14 +558,14 @@ def tab_states(documents: Iterable[Document], runs: Runs) -> list[TabState]:
     for document, title in zip(
         open_documents, unique_titles([(each.name, each.path) for each in open_documents]), strict=True
     ):
-        running = runs.active and runs.document is document
+        is_running = runs.active and runs.document is document
         location = str(document.path) if document.path is not None else _("Not saved to a file yet")
         states.append(
             TabState(
                 document.key,
                 title,
                 document.dirty,
-                running,
+                is_running,
                 f"{title}\n{location}",
                 document.name,
                 document.path is not None,

@@ -28,8 +28,8 @@ class _Highlighter(QSyntaxHighlighter):
     def __init__(self, document: QTextDocument, theme: Theme) -> None:
         super().__init__(document)
         self._theme = theme
-        together = "|".join(f"(?P<r{index}>{rule})" for index, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
-        self._rules = re.compile(together)
+        pattern = "|".join(f"(?P<r{index}>{rule})" for index, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
+        self._rules = re.compile(pattern)
 
     def highlightBlock(self, text: str) -> None:
         for match in self._rules.finditer(text):
@@ -51,7 +51,7 @@ class ProgramView(QPlainTextEdit):
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setAccessibleName(_("Python program"))
         self.document().setDocumentMargin(16)
-        self._colours = _Highlighter(self.document(), theme)
+        self._highlighter = _Highlighter(self.document(), theme)
         FieldContextMenu(theme, self)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -60,7 +60,7 @@ class ProgramView(QPlainTextEdit):
         font = self._theme.font("code")
         font.setPixelSize(round(self._theme.scaled(13)))
         self.setFont(font)
-        self._colours.rehighlight()
+        self._highlighter.rehighlight()
 
     def show_program(self, source: str) -> None:
         """Show the program and keep the scroll position."""

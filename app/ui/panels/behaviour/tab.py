@@ -69,33 +69,33 @@ class BehaviourTab(PaintedButton):
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(theme, checkable=True, parent=parent)
         self.state = TabState("", "")
-        self._from: QPointF | None = None
-        self._is_close_hovered = self._close_down = False
+        self._press_position: QPointF | None = None
+        self._is_close_hovered = self._is_close_pressed = False
         self.setMouseTracking(True)
 
-    def show_state(self, state: TabState, current: bool) -> bool:
+    def show_state(self, state: TabState, is_current: bool) -> bool:
         """Update the tab. Return True if its width changed."""
-        if state == self.state and current == self.isChecked():
+        if state == self.state and is_current == self.isChecked():
             return False
-        wider = (
+        is_width_changed = (
             state.name != self.state.name
-            or current != self.isChecked()
+            or is_current != self.isChecked()
             or state.is_running != self.state.is_running
         )
         self.state = state
-        self.setChecked(current)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
+        self.setChecked(is_current)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if is_current else Qt.FocusPolicy.ClickFocus)
         states = [
             label_text
-            for label_text, so in ((_("not saved"), state.is_dirty), (_("running"), state.is_running))
-            if so
+            for label_text, is_active in ((_("not saved"), state.is_dirty), (_("running"), state.is_running))
+            if is_active
         ]
         self.set_text(state.name, ", ".join([state.name, *states]))
-        description = _("The active behaviour") if current else _("Another open behaviour")
+        description = _("The active behaviour") if is_current else _("Another open behaviour")
         self.setAccessibleDescription(description)
         self.setToolTip(plain.tip(state.tip or self.accessibleName()))
         self.update()
-        return wider
+        return is_width_changed
 
     def _icon_size(self) -> int:
         return round(self._theme.scaled(ICON_SIZE))
@@ -104,15 +104,15 @@ class BehaviourTab(PaintedButton):
         return self.isChecked() or self.state.is_running
 
     def sizeHint(self) -> QSize:
-        font = self._font(current=True)
+        font = self._font(is_current=True)
         name = min(self._theme.scaled(MAX_NAME_WIDTH), paint.width_of(font, self.state.name) + 1)
         icon = self._icon_size() + 8 if self._has_icon() else 0
         height = max(28, round(paint.height_of(font)) + 6)
         return QSize(round(PADDING + icon + name + SLOT_WIDTH + 4), height)
 
-    def _font(self, *, current: bool) -> QFont:
+    def _font(self, *, is_current: bool) -> QFont:
         font = self._theme.font("label")
-        font.setWeight(font.Weight.DemiBold if current else font.Weight.Medium)
+        font.setWeight(font.Weight.DemiBold if is_current else font.Weight.Medium)
         return font
 
     def close_rect(self) -> QRectF:
@@ -122,18 +122,18 @@ class BehaviourTab(PaintedButton):
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
-        current, is_highlighted = self.isChecked(), self.is_hovered or self._from is not None
-        if current or is_highlighted:
-            role = "selected" if current else "hover"
+        is_current, is_highlighted = self.isChecked(), self.is_hovered or self._press_position is not None
+        if is_current or is_highlighted:
+            role = "selected" if is_current else "hover"
             paint.box(painter, rect, theme.radius("small"), theme.colour(role))
-        colour = theme.colour("selectedText" if current else "textSecondary")
+        colour = theme.colour("selectedText" if is_current else "textSecondary")
         left = float(PADDING)
         if self._has_icon():
             side = self._icon_size()
             self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
             left += side + 8
         text_rect = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
-        paint.text_line(painter, text_rect, self.state.name, self._font(current=current), colour)
+        paint.text_line(painter, text_rect, self.state.name, self._font(is_current=is_current), colour)
         self._paint_slot(painter, is_highlighted or self.hasFocus())
 
     def _paint_mark(self, painter: QPainter, icon_rect: QRectF) -> None:
@@ -166,15 +166,15 @@ class BehaviourTab(PaintedButton):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._close_down = self.close_rect().contains(event.position())
-            self._from = None if self._close_down else event.position()
-            if not self._close_down:
+            self._is_close_pressed = self.close_rect().contains(event.position())
+            self._press_position = None if self._is_close_pressed else event.position()
+            if not self._is_close_pressed:
                 self.selected.emit()
         event.accept()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and not self.close_rect().contains(event.position()):
-            self._from = None
+            self._press_position = None
             self.rename_requested.emit()
             event.accept()
         else:
@@ -185,16 +185,18 @@ class BehaviourTab(PaintedButton):
         if is_over_close != self._is_close_hovered:
             self._is_close_hovered = is_over_close
             self.update()
-        if self._from is not None:
-            is_dragging = abs(event.position().x() - self._from.x()) >= QApplication.startDragDistance()
+        if self._press_position is not None:
+            is_dragging = (
+                abs(event.position().x() - self._press_position.x()) >= QApplication.startDragDistance()
+            )
             if is_dragging:
                 self.dragged.emit(round(self.mapToParent(event.position()).x()))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         is_inside = QRectF(self.rect()).contains(event.position())
-        pressed, self._close_down, self._from = self._close_down, False, None
+        is_close_pressed, self._is_close_pressed, self._press_position = self._is_close_pressed, False, None
         if (event.button() == Qt.MouseButton.MiddleButton and is_inside) or (
-            pressed and self.close_rect().contains(event.position())
+            is_close_pressed and self.close_rect().contains(event.position())
         ):
             self.close_pressed.emit()
         self.update()
@@ -240,7 +242,7 @@ class NameField(QLineEdit):
 
     def __init__(self, theme: Theme, name: str, validate: Callable[[str], str], parent: QWidget) -> None:
         super().__init__(name, parent)
-        self._theme, self._validate, self._ended = theme, validate, False
+        self._theme, self._validate, self._has_ended = theme, validate, False
         self.setAccessibleName(_("Behaviour name"))
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MAX_NAME_LENGTH)
@@ -261,8 +263,8 @@ class NameField(QLineEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        stays = {Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason}
-        if event.reason() in stays:
+        ignored_reasons = {Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason}
+        if event.reason() in ignored_reasons:
             return
         if self._validate(self.text()):
             self._finish()
@@ -273,14 +275,14 @@ class NameField(QLineEdit):
         problem = self._validate(self.text())
         if problem:
             self._show_problem(problem)
-        elif not self._ended:
-            self._ended = True
+        elif not self._has_ended:
+            self._has_ended = True
             self.committed.emit(self.text().strip())
             self.exited.emit()
 
     def _finish(self) -> None:
-        if not self._ended:
-            self._ended = True
+        if not self._has_ended:
+            self._has_ended = True
             self.exited.emit()
 
     def _show_problem(self, problem: str) -> None:

@@ -17,7 +17,7 @@ from nep.i18n import _
 
 MIN_TAB_WIDTH = 76
 GAP = 4
-NAME_FIELD_WIDTH = 180  # width of the name field
+NAME_FIELD_WIDTH = 180
 SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
 NEW_TAB = "+"
 """Key of the "+" button, used in place of a tab's key."""
@@ -44,9 +44,9 @@ class BehaviourTabs(QWidget):
         self.name_problem: Callable[[str, str], str] = lambda _key, _name: ""
         """Returns the reason why the tab with this key can't have a name, or ""."""
         self.field: NameField | None = None
-        self._edited = ""
+        self._edited_key = ""
         self.tabs: dict[str, BehaviourTab] = {}
-        self._room = QWidget(self)  # clips tabs that are scrolled out of view
+        self._clip_area = QWidget(self)  # clips tabs that are scrolled out of view
         self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
         self.list = IconButton(theme, "chevron-down", _("All open behaviours"), parent=self)
@@ -63,29 +63,29 @@ class BehaviourTabs(QWidget):
             states: Data of the tabs, from left to right.
             current: Key of the active tab.
         """
-        requested = tuple(states)
-        if (requested, current) == (self._states, self._current):
+        new_states = tuple(states)
+        if (new_states, current) == (self._states, self._current):
             return
         had_focus = any(tab.hasFocus() for tab in self.tabs.values())
-        for key in self.tabs.keys() - {each.key for each in requested}:
+        for key in self.tabs.keys() - {each.key for each in new_states}:
             removed_tab = self.tabs.pop(key)
-            if self.field is not None and key == self._edited:
+            if self.field is not None and key == self._edited_key:
                 self._end_edit()
             removed_tab.hide()
             removed_tab.deleteLater()
-        moved = current != self._current
-        self._states, self._current = requested, current
-        changed = [self._make_tab(each).show_state(each, each.key == current) for each in requested]
-        if had_focus and moved and current in self.tabs:
+        is_current_changed = current != self._current
+        self._states, self._current = new_states, current
+        changed = [self._make_tab(each).show_state(each, each.key == current) for each in new_states]
+        if had_focus and is_current_changed and current in self.tabs:
             self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
-        self._update_layout(bring=moved)
+        self._update_layout(reveals_current=is_current_changed)
         if any(changed):
             self.updateGeometry()
 
     def _make_tab(self, state: TabState) -> BehaviourTab:
         key = state.key
         if key not in self.tabs:
-            tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
+            tab = self.tabs[key] = BehaviourTab(self._theme, self._clip_area)
             tab.selected.connect(lambda: self.selected.emit(key))
             tab.close_pressed.connect(lambda: self.close_requested.emit(key))
             tab.dragged.connect(lambda x: self._drag(key, x))
@@ -113,7 +113,7 @@ class BehaviourTabs(QWidget):
         local_position = self.mapFromGlobal(position)
         if self.add.isVisible() and self.add.geometry().contains(local_position):
             return NEW_TAB
-        if not self._room.geometry().contains(local_position):
+        if not self._clip_area.geometry().contains(local_position):
             return ""
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(local_position)), "")
 
@@ -123,7 +123,7 @@ class BehaviourTabs(QWidget):
         Args:
             position: Screen position of the drag.
         """
-        local_position, room = self.mapFromGlobal(position), self._room.geometry()
+        local_position, room = self.mapFromGlobal(position), self._clip_area.geometry()
         if not self.isVisible() or not room.contains(local_position):
             return False
         margin = min(round(self._theme.scaled(SCROLL_MARGIN)), room.width() // 3)
@@ -150,11 +150,11 @@ class BehaviourTabs(QWidget):
         self._end_edit()
         state = self.tabs[key].state
         name = state.plain_name or state.name
-        self._edited = key
-        self.field = NameField(self._theme, name, lambda name: self.name_problem(key, name), self._room)
+        self._edited_key = key
+        self.field = NameField(self._theme, name, lambda name: self.name_problem(key, name), self._clip_area)
         self.field.committed.connect(lambda name: self.renamed.emit(key, name))
         self.field.exited.connect(self._end_edit)
-        self._update_layout(bring=key == self._current)
+        self._update_layout(reveals_current=key == self._current)
         self.field.show()
         self.field.raise_()
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -167,17 +167,17 @@ class BehaviourTabs(QWidget):
         field.hide()
         field.deleteLater()
         self.add.show()
-        if had_focus and self._edited in self.tabs:
-            self.tabs[self._edited].setFocus(Qt.FocusReason.OtherFocusReason)
+        if had_focus and self._edited_key in self.tabs:
+            self.tabs[self._edited_key].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _position_field(self) -> None:
         self.add.setVisible(self.field is None)  # the field may cover it
-        if self.field is None or self._edited not in self.tabs:
+        if self.field is None or self._edited_key not in self.tabs:
             return
-        tab = self.tabs[self._edited].geometry()
-        width = min(max(tab.width(), round(self._theme.scaled(NAME_FIELD_WIDTH))), self._room.width())
+        tab = self.tabs[self._edited_key].geometry()
+        width = min(max(tab.width(), round(self._theme.scaled(NAME_FIELD_WIDTH))), self._clip_area.width())
         height = max(tab.height(), self.field.sizeHint().height())
-        left = max(0, min(tab.left(), self._room.width() - width))
+        left = max(0, min(tab.left(), self._clip_area.width() - width))
         self.field.setGeometry(left, max(0, (self.height() - height) // 2), width, height)
 
     def _step(self, step: int) -> None:
@@ -199,38 +199,39 @@ class BehaviourTabs(QWidget):
 
     def _restyle(self) -> None:
         self.updateGeometry()
-        self._update_layout(bring=True)
+        self._update_layout(reveals_current=True)
 
     def _widths(self) -> list[int]:
-        # The active tab keeps its full width up to the available room; the others shrink down to MIN_LENGTH.
+        # The active tab keeps its full width up to the available room; the others shrink down to
+        # MIN_TAB_WIDTH.
         full_widths = [self.tabs[each.key].sizeHint().width() for each in self._states]
-        room = self._available_width(scrolls=False) - GAP * len(full_widths)
+        room = self._available_width(is_scrollable=False) - GAP * len(full_widths)
         min_width = round(self._theme.scaled(MIN_TAB_WIDTH))
         keys = [each.key for each in self._states]
-        alone = max(min_width, self._available_width(scrolls=len(keys) > 1))
+        max_current_width = max(min_width, self._available_width(is_scrollable=len(keys) > 1))
 
-        def cut(limit: int) -> list[int]:
+        def limit_widths(limit: int) -> list[int]:
             pairs = zip(keys, full_widths, strict=True)
-            return [min(width, alone if key == self._current else limit) for key, width in pairs]
+            return [min(width, max_current_width if key == self._current else limit) for key, width in pairs]
 
         max_width = max(full_widths, default=min_width)
-        while max_width > min_width and sum(cut(max_width)) > room:
+        while max_width > min_width and sum(limit_widths(max_width)) > room:
             max_width -= 4
-        return cut(max(max_width, min_width))
+        return limit_widths(max(max_width, min_width))
 
-    def _available_width(self, *, scrolls: bool) -> int:
+    def _available_width(self, *, is_scrollable: bool) -> int:
         reserved = self.add.sizeHint().width() + GAP
-        return self.width() - reserved - (self.list.sizeHint().width() + GAP if scrolls else 0)
+        return self.width() - reserved - (self.list.sizeHint().width() + GAP if is_scrollable else 0)
 
-    def _update_layout(self, *, bring: bool = False) -> None:
+    def _update_layout(self, *, reveals_current: bool = False) -> None:
         widths = self._widths()
         total = sum(widths) + GAP * max(0, len(widths) - 1)
-        scrolls = total > self._available_width(scrolls=False)
-        room = self._available_width(scrolls=scrolls)
-        if bring:
+        is_scrollable = total > self._available_width(is_scrollable=False)
+        room = self._available_width(is_scrollable=is_scrollable)
+        if reveals_current:
             self._scroll_offset = self._offset_for_current(widths, room)
         self._scroll_offset = max(0.0, min(self._scroll_offset, float(total - room)))
-        self._room.setGeometry(0, 0, max(0, room), self.height())
+        self._clip_area.setGeometry(0, 0, max(0, room), self.height())
         x = -self._scroll_offset
         for state, width in zip(self._states, widths, strict=True):
             tab = self.tabs[state.key]
@@ -240,7 +241,7 @@ class BehaviourTabs(QWidget):
         side = self.add.sizeHint().height()
         self.add.setGeometry(min(round(x), room + GAP), (self.height() - side) // 2, side, side)
         self.add.raise_()
-        self.list.setVisible(scrolls)
+        self.list.setVisible(is_scrollable)
         self.list.setGeometry(self.width() - side, (self.height() - side) // 2, side, side)
         self.list.raise_()
         self._position_field()
@@ -266,11 +267,11 @@ class BehaviourTabs(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._update_layout(bring=True)
+        self._update_layout(reveals_current=True)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        turned = event.angleDelta().y() or event.angleDelta().x()
-        self._scroll_offset -= turned / 2
+        delta = event.angleDelta().y() or event.angleDelta().x()
+        self._scroll_offset -= delta / 2
         self._update_layout()
         event.accept()
 

@@ -76,12 +76,12 @@ def tooltip_text(record: ConsoleRecord) -> str:
 
 def first_line(text: str) -> str:
     """Return the first line of a text, followed by the number of further lines, if any."""
-    first, _end, rest = text.partition("\n")
-    if not rest:
+    first, _end, remaining_text = text.partition("\n")
+    if not remaining_text:
         return first
-    more = rest.count("\n") + 1
-    template = ngettext("{text} (and {count} more line)", "{text} (and {count} more lines)", more)
-    return template.format(text=first, count=more)
+    further_lines = remaining_text.count("\n") + 1
+    template = ngettext("{text} (and {count} more line)", "{text} (and {count} more lines)", further_lines)
+    return template.format(text=first, count=further_lines)
 
 
 def _level_name(record: ConsoleRecord) -> str:
@@ -115,7 +115,7 @@ class ConsoleModel(QAbstractListModel):
     def __init__(self) -> None:
         super().__init__()
         self._records: deque[ConsoleRecord] = deque()  # oldest first
-        self._newest = 0
+        self._newest_number = 0
 
     def rowCount(self, parent: Index = _ROOT) -> int:
         return 0 if parent.isValid() else len(self._records)
@@ -141,7 +141,7 @@ class ConsoleModel(QAbstractListModel):
         """
         self.beginResetModel()
         self._records = deque(record for record in records if accepts(record))
-        self._newest = records[-1].number if records else 0
+        self._newest_number = records[-1].number if records else 0
         self.endResetModel()
 
     def update_records(
@@ -156,17 +156,21 @@ class ConsoleModel(QAbstractListModel):
         Returns:
             The number of rows added.
         """
-        if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
+        if (
+            not records
+            or records[-1].number < self._newest_number
+            or records[0].number > self._newest_number + 1
+        ):
             self.reset_records(records, accepts)
             return len(self._records)
         self._evict_older_than(records[0].number)
         added: list[ConsoleRecord] = []
         for record in reversed(records):
-            if record.number <= self._newest:
+            if record.number <= self._newest_number:
                 break
             if accepts(record):
                 added.append(record)
-        self._newest = records[-1].number
+        self._newest_number = records[-1].number
         if added:
             self.beginInsertRows(_ROOT, 0, len(added) - 1)
             self._records.extend(reversed(added))
@@ -213,11 +217,11 @@ class LineDelegate(QStyledItemDelegate):
         if option.state & QStyle.StateFlag.State_Selected:
             painter.fillRect(box, theme.colour("selected"))
         rect = QRectF(box).adjusted(10, 0, -8, 0)
-        small = theme.font("code")
+        time_font = theme.font("code")
         widths = self.columns(record, rect.width())
         if "time" in widths:
             clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-            paint.text_line(painter, rect, clock, small, theme.colour("textTertiary"))
+            paint.text_line(painter, rect, clock, time_font, theme.colour("textTertiary"))
             rect.setLeft(rect.left() + widths["time"])
         icon, role = LEVEL_STYLES.get(record.level, LEVEL_STYLES["info"])
         icon_rect = QRectF(rect.left(), rect.center().y() - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
@@ -227,7 +231,7 @@ class LineDelegate(QStyledItemDelegate):
             level = _(LEVEL_NAMES.get(record.level, record.level))
             paint.text_line(painter, rect, level, font, theme.colour(role))
             rect.setLeft(rect.left() + widths["level"])
-        for text, colour, max_share in self._parts(record, logger="logger" in widths):
+        for text, colour, max_share in self._parts(record, has_logger="logger" in widths):
             part = QRectF(rect)
             part.setWidth(min(paint.width_of(font, text) + 1, rect.width() * max_share))
             paint.text_line(painter, part, text, font, theme.colour(colour))
@@ -240,7 +244,7 @@ class LineDelegate(QStyledItemDelegate):
         the time. The tooltip contains all parts.
         """
         font = self._font()
-        text = MIN_TEXT_CHARS * paint.width_of(font, "n")
+        min_text_width = MIN_TEXT_CHARS * paint.width_of(font, "n")
         widths = {
             "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
             "icon": float(ICON_SIZE + 4),
@@ -249,15 +253,15 @@ class LineDelegate(QStyledItemDelegate):
             "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
         }
         for name in ("logger", "level", "time"):
-            if width - sum(widths.values()) >= text:
+            if width - sum(widths.values()) >= min_text_width:
                 break
             del widths[name]
         return widths
 
     @staticmethod
-    def _parts(record: ConsoleRecord, *, logger: bool) -> list[tuple[str, str, float]]:
+    def _parts(record: ConsoleRecord, *, has_logger: bool) -> list[tuple[str, str, float]]:
         parts = [(record.origin, "textTertiary", 0.4), (first_line(record.text), "text", 1.0)]
-        name = record.logger.rpartition(".")[2] if logger else ""
+        name = record.logger.rpartition(".")[2] if has_logger else ""
         if name:
             parts.insert(1, (name, "textDisabled", 0.3))
         return parts

@@ -51,13 +51,13 @@ class ConsolePanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Console"))
         self._last_revision = -1
-        self._choice: tuple[object, ...] = ()
-        self._unseen = 0
+        self._last_filter: tuple[object, ...] = ()
+        self._unseen_count = 0
         self.level = "all"
         self.node = ""
-        self.filter = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
-        self.filter.clicked.connect(self._show_menu)
-        self.header = [self.filter]
+        self.filter_button = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
+        self.filter_button.clicked.connect(self._show_menu)
+        self.header = [self.filter_button]
         self.find_field = LogFindField(self.theme)
         self.find_field.textChanged.connect(self.refresh)
         self.find_field.exited.connect(self._focus_lines)
@@ -65,10 +65,10 @@ class ConsolePanel(PanelWidget):
         self.model = ConsoleModel()
         self.list = self._make_list()
         self.empty = EmptyState(self.theme, "terminal", _("No events yet"), "")
-        self.newer = Button(self.theme, "", "arrow-up", size="small")
-        self.newer.setParent(self.list)
-        self.newer.hide()
-        self.newer.clicked.connect(self.list.scrollToTop)
+        self.newest_button = Button(self.theme, "", "arrow-up", size="small")
+        self.newest_button.setParent(self.list)
+        self.newest_button.hide()
+        self.newest_button.clicked.connect(self.list.scrollToTop)
         self.list.verticalScrollBar().valueChanged.connect(self._on_scrolled)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
@@ -88,19 +88,19 @@ class ConsolePanel(PanelWidget):
         self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
         line_list.setItemDelegate(self._delegate)
         line_list.find_requested.connect(self.focus_filter)
-        line_list.resized.connect(self._position_newer_button)
-        self._copy = QAction(_("Copy"), line_list)
-        self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
-        self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        self._copy.triggered.connect(self.copy)
-        line_list.addAction(self._copy)
+        line_list.resized.connect(self._position_newest_button)
+        self._copy_action = QAction(_("Copy"), line_list)
+        self._copy_action.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
+        self._copy_action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        self._copy_action.triggered.connect(self.copy)
+        line_list.addAction(self._copy_action)
         line_list.customContextMenuRequested.connect(self._show_actions)
-        self._copy_all = QAction(_("Copy all lines"), self)
-        self._copy_all.triggered.connect(self._copy_everything)
-        self._clear = QAction(_("Clear"), self)
-        self._clear.triggered.connect(self.clear)
-        self._find = QAction(_("Find text"), self)
-        self._find.triggered.connect(self.focus_filter)
+        self._copy_all_action = QAction(_("Copy all lines"), self)
+        self._copy_all_action.triggered.connect(self._copy_everything)
+        self._clear_action = QAction(_("Clear"), self)
+        self._clear_action.triggered.connect(self.clear)
+        self._find_action = QAction(_("Find text"), self)
+        self._find_action.triggered.connect(self.focus_filter)
         return line_list
 
     # display
@@ -111,29 +111,29 @@ class ConsolePanel(PanelWidget):
 
     def refresh(self) -> None:
         console = self.session.displayed_console
-        choice = (self.level, self.node, self.find_field.text())
-        if (console.revision, choice) == (self._last_revision, self._choice):
+        filter_state = (self.level, self.node, self.find_field.text())
+        if (console.revision, filter_state) == (self._last_revision, self._last_filter):
             return
         records, record_filter = console.records, self._current_filter()
-        if choice != self._choice:
+        if filter_state != self._last_filter:
             self.model.reset_records(records, record_filter)
             self.list.scrollToTop()
         else:
             self._update_records(records)
-        self._last_revision, self._choice = console.revision, choice
+        self._last_revision, self._last_filter = console.revision, filter_state
         self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
         self._update_empty_state()
 
     def _update_records(self, records: Sequence[ConsoleRecord]) -> None:
         # Keeps the visible lines in place when the user has scrolled down.
-        bar = self.list.verticalScrollBar()
-        before = bar.value()
+        scroll_bar = self.list.verticalScrollBar()
+        scroll_position = scroll_bar.value()
         added_count = self.model.update_records(records, self._current_filter())
-        if before > 0 and added_count:
+        if scroll_position > 0 and added_count:
             self.list.doItemsLayout()
-            bar.setValue(before + added_count * self._delegate.row_height())
-            self._unseen += added_count
-            self._update_newer_button()
+            scroll_bar.setValue(scroll_position + added_count * self._delegate.row_height())
+            self._unseen_count += added_count
+            self._update_newest_button()
         elif added_count:
             self.list.scrollToTop()
 
@@ -142,23 +142,23 @@ class ConsolePanel(PanelWidget):
 
     def _on_scrolled(self, value: int) -> None:
         if value == 0:
-            self._unseen = 0
-        self._update_newer_button()
+            self._unseen_count = 0
+        self._update_newest_button()
 
-    def _update_newer_button(self) -> None:
+    def _update_newest_button(self) -> None:
         is_scrolled = self.list.verticalScrollBar().value() > 0
-        if self._unseen:
-            template = ngettext("{count} new", "{count} new", self._unseen)
-            self.newer.set_label(template.format(count=group_digits(self._unseen)), "arrow-up")
+        if self._unseen_count:
+            template = ngettext("{count} new", "{count} new", self._unseen_count)
+            self.newest_button.set_label(template.format(count=group_digits(self._unseen_count)), "arrow-up")
         else:
-            self.newer.set_label(_("Jump to newest"), "arrow-up")
-        self.newer.setVisible(is_scrolled)
-        self.newer.adjustSize()
-        self._position_newer_button()
+            self.newest_button.set_label(_("Jump to newest"), "arrow-up")
+        self.newest_button.setVisible(is_scrolled)
+        self.newest_button.adjustSize()
+        self._position_newest_button()
 
-    def _position_newer_button(self) -> None:
-        port = self.list.viewport()
-        self.newer.move(port.width() - self.newer.width() - 12, 8)
+    def _position_newest_button(self) -> None:
+        viewport = self.list.viewport()
+        self.newest_button.move(viewport.width() - self.newest_button.width() - 12, 8)
 
     def _update_empty_state(self) -> None:
         is_filtered = self.level in {"warn", "error"} or self.node or self.find_field.text()
@@ -208,9 +208,9 @@ class ConsolePanel(PanelWidget):
         self.refresh()
 
     def _update_filter_button(self) -> None:
-        template = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
-        self.filter.set_name(template.format(level=_(LEVEL_LABELS[self.level]), node=self.node))
-        self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
+        template = _("Showing: {level} from {node}") if self.node else _("Showing: {level}")
+        self.filter_button.set_name(template.format(level=_(LEVEL_LABELS[self.level]), node=self.node))
+        self.filter_button.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
 
     def _show_menu(self) -> None:
@@ -227,9 +227,9 @@ class ConsolePanel(PanelWidget):
             if node:
                 self._add_choice(menu, node, node == self.node, partial(self.set_node, node))
         menu.addSeparator()
-        menu.addAction(self._find)
+        menu.addAction(self._find_action)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        open_below(menu, self.filter)
+        open_below(menu, self.filter_button)
 
     @staticmethod
     def _add_choice(menu: Menu, text: str, is_chosen: bool, choose: partial[None]) -> None:
@@ -240,12 +240,12 @@ class ConsolePanel(PanelWidget):
 
     def _show_actions(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
-        menu.addActions([self._copy, self._copy_all, self._find, self._clear])
+        menu.addActions([self._copy_action, self._copy_all_action, self._find_action, self._clear_action])
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.list.viewport().mapToGlobal(position))
 
     def more_actions(self) -> Sequence[QAction]:
-        return (self._find, self._copy_all, self._clear)
+        return (self._find_action, self._copy_all_action, self._clear_action)
 
     def focus_filter(self) -> bool:
         self.find_field.show()
@@ -277,7 +277,7 @@ class ConsolePanel(PanelWidget):
     def theme_changed(self) -> None:
         super().theme_changed()
         self.list.doItemsLayout()  # row heights depend on the font
-        self._update_newer_button()
+        self._update_newest_button()
 
     def save_state(self) -> dict[str, object]:
         return {"level": self.level}

@@ -55,11 +55,11 @@ class _StepMark(QWidget):
         if self.state == "done":
             paint_icon(painter, rect, "circle-check", theme.colour("ok"))
         else:
-            following = self.state == "next"
-            fill = theme.colour("accent") if following else None
-            edge = theme.colour("accent" if following else "controlBorder")
-            paint.box(painter, rect, rect.height() / 2, fill, edge, 1.25)
-            colour = theme.colour("onAccent" if following else "textSecondary")
+            is_next = self.state == "next"
+            fill = theme.colour("accent") if is_next else None
+            outline = theme.colour("accent" if is_next else "controlBorder")
+            paint.box(painter, rect, rect.height() / 2, fill, outline, 1.25)
+            colour = theme.colour("onAccent" if is_next else "textSecondary")
             paint.text_line(painter, rect, str(self._number), theme.font("caption"), colour, paint.CENTRE)
         painter.end()
 
@@ -81,8 +81,10 @@ class StepRow(QWidget):
         self.mark = _StepMark(theme, number)
         self.text_label = label(with_block_names(step.text), "bodyLarge", wrap=True)
         self.hint = label(with_block_names(step.hint), "body", role="textSecondary", wrap=True)
-        first = step.id == "robot"
-        self.button = Button(theme, with_block_names(step.text) if first else _("Show me"), size="small")
+        is_robot_step = step.id == "robot"
+        self.button = Button(
+            theme, with_block_names(step.text) if is_robot_step else _("Show me"), size="small"
+        )
         self.button.clicked.connect(lambda: show_me(step))
         for text_label in (self.text_label, self.hint):
             text_label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -111,9 +113,9 @@ class StepRow(QWidget):
         self.update()
         self.mark.update()
 
-    def show_hint(self, *, loose: bool) -> None:
-        """Show where to find the block; if `loose` is True, that it must be attached to the script."""
-        self.hint.setText(with_block_names(DETACHED_HINT if loose else self.step.hint))
+    def show_hint(self, *, is_detached: bool) -> None:
+        """Show where to find the block; if `is_detached` is True, that it must be attached to the script."""
+        self.hint.setText(with_block_names(DETACHED_HINT if is_detached else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.mark.state == "next":
@@ -145,18 +147,18 @@ class FirstStepsPanel(PanelWidget):
         self._clock = clock
         saved: object = self.session.settings.get(PROGRESS_SETTING, [])
         step_ids = {step.id for step in STEPS}
-        self.done: frozenset[str] = frozenset(saved if isinstance(saved, list) else ()) & step_ids
-        self._waits_since: tuple[str, float] | None = None
-        self._pointed_for = ""
-        self._edits: object = None
-        self._built: tuple[object, TutorialBlocks] = (None, TutorialBlocks())
+        self.completed_ids: frozenset[str] = frozenset(saved if isinstance(saved, list) else ()) & step_ids
+        self._step_start: tuple[str, float] | None = None
+        self._highlighted_step = ""
+        self._last_activity: object = None
+        self._cached_blocks: tuple[object, TutorialBlocks] = (None, TutorialBlocks())
         self.rows = [
             StepRow(self.theme, number, step, self.show_me) for number, step in enumerate(STEPS, start=1)
         ]
         steps = ScrollColumn(_("First steps"), margins=(8, 8, 8, 8), gap=2)
         for index, row in enumerate(self.rows):
             steps.column.insertWidget(index, row)
-        self.end = EmptyState(
+        self.end_page = EmptyState(
             self.theme,
             "circle-check",
             _(ALL_DONE_TEXT),
@@ -166,7 +168,7 @@ class FirstStepsPanel(PanelWidget):
                 EmptyAction(_("Start over"), self.start_again),
             ],
         )
-        self.pages: QStackedWidget = self.make_page_stack(steps, self.end)
+        self.pages: QStackedWidget = self.make_page_stack(steps, self.end_page)
         self.chip = Chip(self.theme, "", "off")
         self.chips = [self.chip]
         self._restart_action = QAction(_("Start over"), self)
@@ -178,16 +180,16 @@ class FirstStepsPanel(PanelWidget):
 
     def next_step(self) -> TutorialStep | None:
         """Return the next step, or None after the last one."""
-        return next((step for step in STEPS if step.id not in self.done), None)
+        return next((step for step in STEPS if step.id not in self.completed_ids), None)
 
     # -- checking -----------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         if self.next_step() is None:
             return
-        completed = completed_steps(self._current_state(), self.done)
-        if completed != self.done:
-            self.done = completed
+        completed = completed_steps(self._current_state(), self.completed_ids)
+        if completed != self.completed_ids:
+            self.completed_ids = completed
             self._save_progress()
             self._show()
             if self.next_step() is None:
@@ -196,46 +198,46 @@ class FirstStepsPanel(PanelWidget):
 
     def _current_state(self) -> TutorialState:
         runs, document = self.session.runs, self.session.document
-        mine = runs.document is document
-        edition = (document.key, document.revision, document.edits, document.fixes)
-        if self._built[0] != edition:
-            self._built = (edition, find_tutorial_blocks(document.workspace, example_block_ids()))
+        is_own_run = runs.document is document
+        revision = (document.key, document.revision, document.edits, document.fixes)
+        if self._cached_blocks[0] != revision:
+            self._cached_blocks = (revision, find_tutorial_blocks(document.workspace, example_block_ids()))
             for row in self.rows:
                 row.show_hint(
-                    loose=bool(row.step.block_suffix)
-                    and row.step.block_suffix in self._built[1].detached_suffixes
+                    is_detached=bool(row.step.block_suffix)
+                    and row.step.block_suffix in self._cached_blocks[1].detached_suffixes
                 )
         return TutorialState(
             can_speak=any(
                 action.name == "say" for link in self.session.fleet.connected for action in link.robot.actions
             ),
-            blocks=self._built[1],
+            blocks=self._cached_blocks[1],
             executed_ids=runs.ran_blocks,
-            was_stopped=mine and bool(runs.stopped_blocks) and not runs.active,
+            was_stopped=is_own_run and bool(runs.stopped_blocks) and not runs.active,
         )
 
     def _show_delayed_hint(self) -> None:
         # Shown once per step.
-        step, now = self.next_step(), self._clock()
+        step, now_s = self.next_step(), self._clock()
         activity = (self.session.document.edits, self.session.runs.active)
         if step is None:
             return
-        if self._waits_since is None or self._waits_since[0] != step.id or activity != self._edits:
-            if self._waits_since is not None and self._waits_since[0] != step.id and self._pointed_for:
+        if self._step_start is None or self._step_start[0] != step.id or activity != self._last_activity:
+            if self._step_start is not None and self._step_start[0] != step.id and self._highlighted_step:
                 self._clear_highlight()
-            self._waits_since, self._edits = (step.id, now), activity
-        elif now - self._waits_since[1] >= HINT_DELAY_S and self._pointed_for != step.id:
+            self._step_start, self._last_activity = (step.id, now_s), activity
+        elif now_s - self._step_start[1] >= HINT_DELAY_S and self._highlighted_step != step.id:
             if step.id != "robot" and not self.session.runs.active:
                 self.show_me(step)
-            self._pointed_for = step.id
+            self._highlighted_step = step.id
 
     def _show(self) -> None:
         step = self.next_step()
         had_focus = any(row.button.hasFocus() for row in self.rows)
         for row in self.rows:
-            state = "done" if row.step.id in self.done else "next" if row.step is step else "later"
+            state = "done" if row.step.id in self.completed_ids else "next" if row.step is step else "later"
             row.show_state(state)
-        count = len(self.done)
+        count = len(self.completed_ids)
         self.chip.set(
             _("{done} of {all}").format(done=count, all=len(STEPS)), "ok" if count == len(STEPS) else "off"
         )
@@ -245,7 +247,7 @@ class FirstStepsPanel(PanelWidget):
             button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _save_progress(self) -> None:
-        completed = [step.id for step in STEPS if step.id in self.done]
+        completed = [step.id for step in STEPS if step.id in self.completed_ids]
         try:
             self.session.settings.set(PROGRESS_SETTING, completed)
         except SettingsError as error:
@@ -255,29 +257,29 @@ class FirstStepsPanel(PanelWidget):
 
     def show_me(self, step: TutorialStep) -> None:
         """Highlight the block or button of a step; for the first step, start the virtual robot."""
-        self._pointed_for = step.id
+        self._highlighted_step = step.id
         if step.id == "robot":
             self.context.run("robots.virtual")
         elif step.block_suffix:
             self.context.run(f"point.block:{self._block_type(step.block_suffix)}")
         else:
-            self.context.run(f"point.button:{step.button}")
+            self.context.run(f"point.button:{step.button_command}")
 
-    def _block_type(self, end: str) -> str:
-        if end == START_BLOCK:
+    def _block_type(self, suffix: str) -> str:
+        if suffix == START_BLOCK:
             return START_BLOCK
         blocks = self.session.documents.definitions().get("blocks")
         types = [str(each.get("type", "")) for each in blocks] if isinstance(blocks, list) else []
-        return next((kind for kind in types if kind.endswith(end)), end)
+        return next((kind for kind in types if kind.endswith(suffix)), suffix)
 
     def _clear_highlight(self) -> None:
-        self._pointed_for = ""
+        self._highlighted_step = ""
         self.context.run("point.block:-")
 
     def start_again(self) -> None:
         """Restart the tutorial in a new behaviour; existing blocks are not changed."""
-        self.done = frozenset()
-        self._waits_since = None
+        self.completed_ids = frozenset()
+        self._step_start = None
         self._save_progress()
         if self.session.document.has_blocks:
             self.context.run("file.new")
@@ -285,7 +287,7 @@ class FirstStepsPanel(PanelWidget):
 
     def suspend(self) -> None:
         super().suspend()
-        if self._pointed_for:
+        if self._highlighted_step:
             self._clear_highlight()
 
 

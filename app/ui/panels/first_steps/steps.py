@@ -22,19 +22,19 @@ class TutorialStep:
         text: Sentence with the names of blocks in braces, such as ``{start}``.
         hint: Sentence that explains where to find the block or button.
         block_suffix: Suffix of the type of the block to drag, or "".
-        button: Command of the button to press, or "".
+        button_command: Command of the button to press, or "".
     """
 
     id: str
     text: str
     hint: str
     block_suffix: str = ""
-    button: str = ""
+    button_command: str = ""
 
 
 STEPS: tuple[TutorialStep, ...] = (
     TutorialStep(
-        "robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"
+        "robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button_command="robots.virtual"
     ),
     TutorialStep(
         "start",
@@ -49,7 +49,10 @@ STEPS: tuple[TutorialStep, ...] = (
         block_suffix=SAY,
     ),
     TutorialStep(
-        "run", lazy("Press Run and listen"), lazy("The button is green, at the top left."), button="run.run"
+        "run",
+        lazy("Press Run and listen"),
+        lazy("The button is green, at the top left."),
+        button_command="run.run",
     ),
     TutorialStep(
         "turn",
@@ -61,7 +64,7 @@ STEPS: tuple[TutorialStep, ...] = (
         "stop",
         lazy("Press Run, then Stop while the robot turns"),
         lazy("The Stop button is red, at the top right. F12 does the same."),
-        button="run.run",
+        button_command="run.run",
     ),
 )
 
@@ -71,13 +74,13 @@ class TutorialBlocks:
     """Blocks of the tutorial that a behaviour contains, as returned by `find_tutorial_blocks`.
 
     Attributes:
-        started: True if there is a "when started" block.
+        has_start_block: True if there is a "when started" block.
         say_ids: Ids of the "say" blocks below "when started".
         has_turn: True if there is a "turn" block below "when started".
         detached_suffixes: Type suffixes of blocks that occur only in scripts without "when started".
     """
 
-    started: bool = False
+    has_start_block: bool = False
     say_ids: frozenset[str] = frozenset()
     has_turn: bool = False
     detached_suffixes: frozenset[str] = frozenset()
@@ -100,54 +103,60 @@ class TutorialState:
     was_stopped: bool = False
 
 
-def find_tutorial_blocks(workspace: Mapping[str, object], others: Collection[str] = ()) -> TutorialBlocks:
+def find_tutorial_blocks(
+    workspace: Mapping[str, object], ignored_ids: Collection[str] = ()
+) -> TutorialBlocks:
     """Return the blocks of the tutorial that a workspace contains.
 
     Args:
         workspace: Workspace of the behaviour.
-        others: Ids of blocks to ignore because they belong to an example.
+        ignored_ids: Ids of blocks to ignore because they belong to an example.
     """
-    started: list[Script] = []
-    loose: list[Script] = []
-    is_started = False
+    started_scripts: list[Script] = []
+    detached_scripts: list[Script] = []
+    has_start_block = False
     for top in _top_blocks(workspace):
-        own_blocks = tuple((kind, id) for kind, id in _iter_blocks(top) if id not in others)
-        (started if top.get("type") == START_BLOCK else loose).append(own_blocks)
-        is_started |= top.get("type") == START_BLOCK and top.get("id") not in others
-    below = {end for end in (SAY, TURN) if _contains_type(started, end)}
+        script = tuple((kind, id) for kind, id in _iter_blocks(top) if id not in ignored_ids)
+        (started_scripts if top.get("type") == START_BLOCK else detached_scripts).append(script)
+        has_start_block |= top.get("type") == START_BLOCK and top.get("id") not in ignored_ids
+    attached_suffixes = {suffix for suffix in (SAY, TURN) if _contains_type(started_scripts, suffix)}
     return TutorialBlocks(
-        is_started,
-        frozenset(id for script in started for kind, id in script if kind.endswith(SAY)),
-        TURN in below,
-        frozenset(end for end in (SAY, TURN) if end not in below and _contains_type(loose, end)),
+        has_start_block,
+        frozenset(id for script in started_scripts for kind, id in script if kind.endswith(SAY)),
+        TURN in attached_suffixes,
+        frozenset(
+            suffix
+            for suffix in (SAY, TURN)
+            if suffix not in attached_suffixes and _contains_type(detached_scripts, suffix)
+        ),
     )
 
 
-def _contains_type(scripts: Sequence[Script], end: str) -> bool:
-    return any(kind.endswith(end) for script in scripts for kind, _id in script)
+def _contains_type(scripts: Sequence[Script], suffix: str) -> bool:
+    return any(kind.endswith(suffix) for script in scripts for kind, _id in script)
 
 
-def completed_steps(now: TutorialState, completed: Collection[str]) -> frozenset[str]:
+def completed_steps(state: TutorialState, completed: Collection[str]) -> frozenset[str]:
     """Return the ids of the completed steps.
 
     The last step, Stop, counts only after a run with a turn, so that it can't be completed by chance.
 
     Args:
-        now: Current state of the behaviour and its run.
+        state: Current state of the behaviour and its run.
         completed: Ids of steps completed before, which stay completed.
     """
     step_ids = set(completed)
-    if now.can_speak:
+    if state.can_speak:
         step_ids.add("robot")
-    if now.blocks.started:
+    if state.blocks.has_start_block:
         step_ids.add("start")
-    if now.blocks.say_ids:
+    if state.blocks.say_ids:
         step_ids.add("say")
-    if now.blocks.say_ids & set(now.executed_ids):
+    if state.blocks.say_ids & set(state.executed_ids):
         step_ids.add("run")
-    if now.blocks.has_turn:
+    if state.blocks.has_turn:
         step_ids.add("turn")
-    if now.was_stopped and now.blocks.has_turn and {"run", "turn"} <= step_ids:
+    if state.was_stopped and state.blocks.has_turn and {"run", "turn"} <= step_ids:
         step_ids.add("stop")
     return frozenset(step_ids)
 
@@ -160,14 +169,14 @@ def _top_blocks(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
 
 def _iter_blocks(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
     # Iterative, because deeply nested blocks would exceed the recursion limit.
-    waiting: list[object] = [block]
-    while waiting:
-        each = waiting.pop()
-        if not isinstance(each, Mapping):
+    pending_blocks: list[object] = [block]
+    while pending_blocks:
+        current = pending_blocks.pop()
+        if not isinstance(current, Mapping):
             continue
-        yield str(each.get("type", "")), str(each.get("id", ""))
-        inputs = each.get("inputs")
+        yield str(current.get("type", "")), str(current.get("id", ""))
+        inputs = current.get("inputs")
         input_links = inputs.values() if isinstance(inputs, Mapping) else ()
-        waiting += [
-            link.get("block") for link in (*input_links, each.get("next")) if isinstance(link, Mapping)
+        pending_blocks += [
+            link.get("block") for link in (*input_links, current.get("next")) if isinstance(link, Mapping)
         ]

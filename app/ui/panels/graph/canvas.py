@@ -51,12 +51,12 @@ PANEL_KEYS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Ke
 class GraphCanvas(QWidget):
     """Canvas that shows a scene and handles pan, zoom and selection.
 
-    The viewport stays the same when the scene changes, unless the whole graph is fitted.
+    The viewport stays the same when the scene changes, unless the whole graph is fitted into the view.
 
     Signals:
         selected: New selection, or None.
         opened: Key of a topic to inspect.
-        entered: The card of the selected node should get the focus.
+        card_focus_requested: The card of the selected node should get the focus.
         toggled: Key of a group to expand or collapse.
         quiet_nodes_requested: Key of a group whose quiet nodes should be shown.
         key_pressed: Key for the panel to handle, such as "g".
@@ -70,7 +70,7 @@ class GraphCanvas(QWidget):
 
     selected = Signal(object)
     opened = Signal(str)
-    entered = Signal()
+    card_focus_requested = Signal()
     toggled = Signal(str)
     quiet_nodes_requested = Signal(str)
     key_pressed = Signal(str)
@@ -83,14 +83,14 @@ class GraphCanvas(QWidget):
         super().__init__()
         self._theme, self._describe, self._tip = theme, describe, tip
         self.scene: GraphScene | None = None
-        self.choice: GraphSelection | None = None
+        self.selection: GraphSelection | None = None
         self.scale = 1.0
         self._offset = QPointF()
         self._shows_all = True
-        self._waiting: list[NodeItem | LineItem] = []
-        self._pressed: QPointF | None = None
-        self._dragged = False
-        self.painted = 0
+        self._pending_items: list[NodeItem | LineItem] = []
+        self._press_position: QPointF | None = None
+        self._is_dragged = False
+        self.paint_count = 0
         """Number of paint events, for tests and benchmarks."""
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setProperty("ownFocus", "true")
@@ -114,25 +114,27 @@ class GraphCanvas(QWidget):
         The selection is cleared if the new scene does not contain the selected item.
         """
         self.scene = scene
-        if self.choice is not None and not self._exists(self.choice):
+        if self.selection is not None and not self._exists(self.selection):
             self.select(None)
-        elif self.choice is not None:
-            self.setAccessibleDescription(self._describe(self.choice))
+        elif self.selection is not None:
+            self.setAccessibleDescription(self._describe(self.selection))
         if self._shows_all:
             self.show_all()
         self.update()
         self.viewport_changed.emit()
 
-    def _exists(self, choice: GraphSelection) -> bool:
+    def _exists(self, selection: GraphSelection) -> bool:
         if self.scene is None:
             return False
         graph = self.scene.graph
-        return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
+        return (
+            graph.node(selection.key) if selection.kind == "node" else graph.line_of(selection.key)
+        ) is not None
 
     def schedule_update(self) -> None:
         """Schedule a refresh of the rates and counts on visible items; `update_stats` performs it."""
         if self.scene is not None:
-            self._waiting = self.scene.items_in(self.visible_rect())
+            self._pending_items = self.scene.items_in(self.visible_rect())
 
     def update_stats(self, stats_of: StatsGetter) -> int:
         """Update the rates and counts of the next visible items, at most `MAX_UPDATES_PER_TICK`.
@@ -147,14 +149,17 @@ class GraphCanvas(QWidget):
             The number of changed areas that are visible; 0 if the zoom is too small for rates and counts.
         """
         scene = self.scene
-        if scene is None or not self._waiting:
+        if scene is None or not self._pending_items:
             return 0
         if not scene.has_stats(self.scale):
-            self._waiting = []  # updated when the user zooms in
+            self._pending_items = []  # updated when the user zooms in
             return 0
-        now, self._waiting = self._waiting[:MAX_UPDATES_PER_TICK], self._waiting[MAX_UPDATES_PER_TICK:]
-        has_words = scene.has_small_text(self.scale)
-        changed = [scene.update_stats(item, stats_of, with_words=has_words) for item in now]
+        batch, self._pending_items = (
+            self._pending_items[:MAX_UPDATES_PER_TICK],
+            self._pending_items[MAX_UPDATES_PER_TICK:],
+        )
+        has_small_text = scene.has_small_text(self.scale)
+        changed = [scene.update_stats(item, stats_of, with_small_text=has_small_text) for item in batch]
         visible_area = self.visible_rect()
         areas = [area for area in changed if area is not None and area.intersects(visible_area)]
         if len(areas) > MAX_DIRTY_RECTS:
@@ -164,24 +169,24 @@ class GraphCanvas(QWidget):
                 self.update(self._to_screen(area).adjusted(-2, -2, 2, 2).toAlignedRect())
         return len(areas)
 
-    def select(self, choice: GraphSelection | None, *, by_key: bool = False) -> None:
+    def select(self, selection: GraphSelection | None, *, by_key: bool = False) -> None:
         """Select an item.
 
         Args:
-            choice: Item to select; None clears the selection.
+            selection: Item to select; None clears the selection.
             by_key: True if the user pressed a key: the item is scrolled into view and announced to screen
                 readers.
         """
-        if choice == self.choice:
+        if selection == self.selection:
             return
-        self.choice = choice
-        description = self._describe(choice)
+        self.selection = selection
+        description = self._describe(selection)
         self.setAccessibleDescription(description)
         if by_key:
             self._scroll_to_selection()
             paint.announce(self, description)
         self.update()
-        self.selected.emit(choice)
+        self.selected.emit(selection)
 
     # -- viewport -----------------------------------------------------------------------------------------
 
@@ -232,17 +237,17 @@ class GraphCanvas(QWidget):
         self.move_by((middle.x() - point.x()) * self.scale, (middle.y() - point.y()) * self.scale)
 
     def _scroll_to_selection(self) -> None:
-        rect = self._rect_of(self.choice)
+        rect = self._rect_of(self.selection)
         if not rect.isNull() and not self.visible_rect().contains(rect):
             self.center_on(rect.center())
 
-    def _rect_of(self, choice: GraphSelection | None) -> QRectF:
+    def _rect_of(self, selection: GraphSelection | None) -> QRectF:
         scene = self.scene
-        if scene is None or choice is None:
+        if scene is None or selection is None:
             return QRectF()
-        if choice.kind == "node":
-            return scene.nodes[choice.key].rect if choice.key in scene.nodes else QRectF()
-        item = next((each for each in scene.lines if choice.key in each.line.topics), None)
+        if selection.kind == "node":
+            return scene.nodes[selection.key].rect if selection.key in scene.nodes else QRectF()
+        item = next((each for each in scene.lines if selection.key in each.line.topics), None)
         if item is None:
             return QRectF()
         return item.label if item.label is not None else QRectF(item.bounds.center(), QSizeF(1, 1))
@@ -261,7 +266,7 @@ class GraphCanvas(QWidget):
     # -- Qt events ----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        self.painted += 1
+        self.paint_count += 1
         painter = QPainter(self)
         theme = self._theme
         painter.fillRect(event.rect(), theme.colour("panel"))
@@ -272,10 +277,12 @@ class GraphCanvas(QWidget):
             clip = QRectF(event.rect())
             corner = self._to_scene(clip.topLeft())
             visible_area = QRectF(corner, clip.size() / self.scale)
-            rings = self.hasFocus() and is_keyboard_navigation()
-            paint_scene(self.scene, painter, visible_area, self.scale, self.choice, rings=rings)
+            has_focus_rings = self.hasFocus() and is_keyboard_navigation()
+            paint_scene(
+                self.scene, painter, visible_area, self.scale, self.selection, has_focus_rings=has_focus_rings
+            )
             painter.resetTransform()
-        if self.hasFocus() and is_keyboard_navigation() and self.choice is None:
+        if self.hasFocus() and is_keyboard_navigation() and self.selection is None:
             focus_rect = QRectF(self.rect()).adjusted(2, 2, -2, -2)
             paint.box(painter, focus_rect, theme.radius("small"), None, theme.colour("focus"), 2.0)
         painter.end()
@@ -319,10 +326,10 @@ class GraphCanvas(QWidget):
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if event.modifiers() & Qt.KeyboardModifier.ShiftModifier or not event.pixelDelta().isNull():
-            by = event.pixelDelta() if not event.pixelDelta().isNull() else event.angleDelta()
+            delta = event.pixelDelta() if not event.pixelDelta().isNull() else event.angleDelta()
             if not event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-                sideways = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier) and not by.x()
-                self.move_by(by.y() if sideways else by.x(), 0 if sideways else by.y())
+                is_horizontal = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier) and not delta.x()
+                self.move_by(delta.y() if is_horizontal else delta.x(), 0 if is_horizontal else delta.y())
                 event.accept()
                 return
         self.zoom_by(ZOOM_STEP ** (event.angleDelta().y() / 120), event.position())
@@ -330,15 +337,15 @@ class GraphCanvas(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() in {Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton}:
-            self._pressed, self._dragged = event.position(), False
+            self._press_position, self._is_dragged = event.position(), False
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is not None:
-            by = event.position() - self._pressed
-            if self._dragged or by.manhattanLength() > CLICK_TOLERANCE:
-                self._dragged = True
-                self.move_by(by.x(), by.y())
-                self._pressed = event.position()
+        if self._press_position is not None:
+            delta = event.position() - self._press_position
+            if self._is_dragged or delta.manhattanLength() > CLICK_TOLERANCE:
+                self._is_dragged = True
+                self.move_by(delta.x(), delta.y())
+                self._press_position = event.position()
                 self.setCursor(Qt.CursorShape.ClosedHandCursor)
             return
         self.setCursor(
@@ -348,9 +355,9 @@ class GraphCanvas(QWidget):
         )
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        clicked = self._pressed is not None and not self._dragged
-        self._pressed, self._dragged = None, False
-        if clicked and event.button() == Qt.MouseButton.LeftButton:
+        is_click = self._press_position is not None and not self._is_dragged
+        self._press_position, self._is_dragged = None, False
+        if is_click and event.button() == Qt.MouseButton.LeftButton:
             self._click_at(event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
@@ -361,20 +368,20 @@ class GraphCanvas(QWidget):
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         # Selects the item under the mouse first, so that its card fits the menu.
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
-            choice, position = self.choice, self._to_screen(self._rect_of(self.choice)).center()
+            selection, position = self.selection, self._to_screen(self._rect_of(self.selection)).center()
         else:
             target, position = self._item_at(QPointF(event.pos())), QPointF(event.pos())
-            choice = target if isinstance(target, GraphSelection) else None
-            if choice is not None:
-                self.select(choice)
-        if choice is not None:
-            self.menu_requested.emit(choice, self.mapToGlobal(position.toPoint()))
+            selection = target if isinstance(target, GraphSelection) else None
+            if selection is not None:
+                self.select(selection)
+        if selection is not None:
+            self.menu_requested.emit(selection, self.mapToGlobal(position.toPoint()))
 
     def _click_at(self, position: QPointF) -> None:
         target = self._item_at(position)
         if isinstance(target, tuple):
-            group, is_head = target
-            (self.toggled if is_head else self.quiet_nodes_requested).emit(group)
+            group, is_title = target
+            (self.toggled if is_title else self.quiet_nodes_requested).emit(group)
             return
         if target is not None and target.kind == "node" and self.expand_group(target.key):
             return
@@ -424,7 +431,7 @@ class GraphCanvas(QWidget):
             self._select_neighbour(arrow)
         elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_no_modifiers(event):
             self._activate()
-        elif key == Qt.Key.Key_Escape and self.choice is not None:
+        elif key == Qt.Key.Key_Escape and self.selection is not None:
             self.select(None)
         elif not self._handle_zoom_key(event):
             super().keyPressEvent(event)
@@ -450,18 +457,18 @@ class GraphCanvas(QWidget):
 
     def _select_neighbour(self, arrow: Arrow) -> None:
         if self.scene is not None:
-            neighbour = move_selection(self.scene.graph, self.scene.layout, self.choice, arrow)
+            neighbour = move_selection(self.scene.graph, self.scene.layout, self.selection, arrow)
             if neighbour is not None:
                 self.select(neighbour, by_key=True)
 
     def _activate(self) -> None:
-        choice = self.choice
-        if choice is None:
+        selection = self.selection
+        if selection is None:
             return
-        if choice.kind == "topic":
-            self.opened.emit(choice.key)
-        elif not self.expand_group(choice.key):
-            self.entered.emit()
+        if selection.kind == "topic":
+            self.opened.emit(selection.key)
+        elif not self.expand_group(selection.key):
+            self.card_focus_requested.emit()
 
 
 class GraphOverview(QWidget):
@@ -506,10 +513,10 @@ class GraphOverview(QWidget):
             painter.scale(scale, scale)
             for group in scene.groups:
                 painter.fillRect(group.rect, theme.colour("sunken"))
-            choice = self._canvas.choice
+            selection = self._canvas.selection
             for key, item in scene.nodes.items():
-                is_chosen = choice is not None and choice.key == key
-                painter.fillRect(item.rect, theme.colour("accent" if is_chosen else "controlBorder"))
+                is_selected = selection is not None and selection.key == key
+                painter.fillRect(item.rect, theme.colour("accent" if is_selected else "controlBorder"))
             painter.restore()
             visible_area = self._canvas.visible_rect()
             frame = QRectF(visible_area.topLeft() * scale + offset, visible_area.size() * scale)

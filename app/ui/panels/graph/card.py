@@ -33,7 +33,7 @@ from nep.i18n import _, ngettext, number
 if TYPE_CHECKING:
     from nep.protocol.graph_view import GraphView, ServiceInfo
 
-WIDTH = 316
+CARD_WIDTH = 316
 MAX_ROWS = 40
 """Maximum number of rows in a table; the number of omitted rows is shown instead."""
 
@@ -145,7 +145,7 @@ class GraphCard(QWidget):
         column.setSpacing(0)
         column.addLayout(self._header_row())
         column.addWidget(scroll, 1)
-        column.addWidget(self.steps)
+        column.addWidget(self.button_row)
         self._line = Separator(theme)
         column.addWidget(self._line)
         column.addWidget(self.foot)
@@ -164,14 +164,14 @@ class GraphCard(QWidget):
         self.alarm.clicked.connect(self._request_alarm)
         self.record = Button(theme, _("Record topic"), "circle-dot", size="form")
         self.record.clicked.connect(self._record)
-        self.steps = QWidget()
-        flow = Flow(self.steps, gap=8, row_gap=6)
+        self.button_row = QWidget()
+        flow = Flow(self.button_row, gap=8, row_gap=6)
         flow.setContentsMargins(14, 6, 14, 8)
-        for step in (self.inspect, self.plot, self.alarm, self.record):
-            flow.addWidget(step)
+        for button in (self.inspect, self.plot, self.alarm, self.record):
+            flow.addWidget(button)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
-        self.steps.setSizePolicy(policy)
+        self.button_row.setSizePolicy(policy)
 
     def _header_row(self) -> QHBoxLayout:
         header = QHBoxLayout()
@@ -217,7 +217,7 @@ class GraphCard(QWidget):
         self.inspect.setVisible(bool(content.topic))
         self.plot.setVisible(bool(content.topic) and content.has_fields)
         self.alarm.setVisible(bool(content.alarm))
-        self.steps.setVisible(bool(content.topic or content.alarm))
+        self.button_row.setVisible(bool(content.topic or content.alarm))
         self.record.setVisible(bool(content.topic) and not split_key(content.topic)[0])
         self.foot.setText(content.footer)
         self.foot.setVisible(bool(content.footer))
@@ -235,7 +235,7 @@ class GraphCard(QWidget):
             if (old := item.widget()) is not None:
                 old.hide()
                 old.deleteLater()
-        self._stat_boxes = [_StatBox(self._theme) for _figure in content.stats]
+        self._stat_boxes = [_StatBox(self._theme) for _stat in content.stats]
         if self._stat_boxes:
             card = Card(self._theme)
             grid = QGridLayout(card)
@@ -305,7 +305,7 @@ class _TableRow:
 class _Table(QWidget):
     """Table of clickable names with values to their right."""
 
-    def __init__(self, theme: Theme, table: CardTable, chose: Callable[[str, str], object]) -> None:
+    def __init__(self, theme: Theme, table: CardTable, on_select: Callable[[str, str], object]) -> None:
         super().__init__()
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 4, 0, 0)
@@ -319,16 +319,16 @@ class _Table(QWidget):
             )
         grid.addWidget(Separator(theme), 1, 0, 1, len(table.columns) + 1)
         self.rows: list[_TableRow] = []
-        for number_, (key, name, values) in enumerate(table.rows, 2):
+        for row_index, (key, name, values) in enumerate(table.rows, 2):
             button = LinkButton(theme, name)
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.setEnabled(bool(key))
-            button.clicked.connect(lambda _on=False, key=key, kind=table.item_kind: chose(kind, key))
-            grid.addWidget(button, number_, 0)
+            button.clicked.connect(lambda _on=False, key=key, kind=table.item_kind: on_select(kind, key))
+            grid.addWidget(button, row_index, 0)
             value_labels: list[QWidget] = []
-            for column, _words in enumerate(values, 1):
+            for column, _value in enumerate(values, 1):
                 value_labels.append(label("", "body"))
-                grid.addWidget(value_labels[-1], number_, column, Qt.AlignmentFlag.AlignRight)
+                grid.addWidget(value_labels[-1], row_index, column, Qt.AlignmentFlag.AlignRight)
             self.rows.append(_TableRow(button, value_labels))
 
     def set_table(self, table: CardTable) -> None:
@@ -374,15 +374,15 @@ def topic_card(key: str, sources: CardSources) -> CardContent | None:
 
 
 def _topic_content(topic: Topic, sources: CardSources) -> CardContent:
-    rate, sent = finite_or_none(topic.rate_hz), finite_or_none(topic.bandwidth_Bps)
-    size = sent / rate if sent and rate else None
+    rate, bandwidth = finite_or_none(topic.rate_hz), finite_or_none(topic.bandwidth_Bps)
+    size = bandwidth / rate if bandwidth and rate else None
     rates = tuple(topic.rates)
     minimum = _("recent minimum {rate}").format(rate=rate_text(min(rates))) if len(rates) > 1 else ""
     stats = (
         CardStat(_("Rate"), f"{rate_text(rate)} /s" if rate is not None else "", minimum, rates),
         CardStat(
             _("Bandwidth"),
-            bandwidth_text(sent),
+            bandwidth_text(bandwidth),
             _("{size} per message").format(size=size_text(size)) if size else "",
         ),
         _loss_stat(topic),
@@ -401,16 +401,16 @@ def _topic_content(topic: Topic, sources: CardSources) -> CardContent:
         _row(sources, key_of(topic.network, each.node_id), _received_texts(each.received, each.lost))
         for each in (info.subscribers if info is not None else ())[:MAX_ROWS]
     )
-    more = max(0, topic.publishers - MAX_ROWS) + max(0, topic.subscribers - MAX_ROWS)
+    omitted_count = max(0, topic.publishers - MAX_ROWS) + max(0, topic.subscribers - MAX_ROWS)
     tables = (
-        CardTable(_("Publisher"), (_("Rate /s"), _("Seq")), publishers),
+        CardTable(_("Publishers"), (_("Rate /s"), _("Seq")), publishers),
         CardTable(_("Subscribers"), (_("Received"), _("Lost")), subscribers),
     )
     return CardContent(
         topic.name,
         topic.msg_type,
         stats,
-        (_more_text(more),) if more else (),
+        (_more_text(omitted_count),) if omitted_count else (),
         tuple(table for table in tables if table.rows),
         clock_offset_text(sources.view) if not topic.network else "",
         topic.key,
@@ -432,8 +432,8 @@ def _more_text(count: int) -> str:
 def _loss_stat(topic: Topic) -> CardStat:
     if topic.lost is None:
         return CardStat(_("Lost"), "")
-    share = topic.loss_ratio
-    value = "0" if not topic.lost else percent_text(share) if share is not None else group_digits(topic.lost)
+    ratio = topic.loss_ratio
+    value = "0" if not topic.lost else percent_text(ratio) if ratio is not None else group_digits(topic.lost)
     note = ngettext("{count} message", "{count} messages", topic.lost).format(count=group_digits(topic.lost))
     return CardStat(_("Lost"), value, note if topic.lost else "", is_problem=bool(topic.lost))
 
@@ -443,7 +443,7 @@ def _latency_stat(topic: Topic) -> CardStat:
     newest = topic.newest
     latency = newest.latency_s if newest is not None else None
     if latency is None:
-        return CardStat(_("Latency"), "", _("measured while open"))
+        return CardStat(_("Latency"), "", _("measured while a panel shows the topic"))
     return CardStat(_("Latency"), latency_text(latency), _("of the newest message"))
 
 
@@ -468,8 +468,8 @@ def _service_content(service: ServiceInfo, sources: CardSources) -> CardContent:
     return CardContent(service.name, _("service"), stats, (), tuple(table for table in tables if table.rows))
 
 
-def _row(sources: CardSources, entry: str, values: tuple[str, ...]) -> Row:
-    return sources.box_of(entry), sources.name_of(entry), values
+def _row(sources: CardSources, node_key: str, values: tuple[str, ...]) -> Row:
+    return sources.box_of(node_key), sources.name_of(node_key), values
 
 
 def node_card(
@@ -489,8 +489,8 @@ def node_card(
     if entry.pid is not None:
         lines.append(_("pid {number}").format(number=entry.pid))
     if entry.since_ns and entry.gone_s is None:
-        since = max(0.0, (sources.now_ns() - entry.since_ns) / 1e9)
-        lines.append(_("connected for {age}").format(age=age_text(since - since % 10)))
+        age_s = max(0.0, (sources.now_ns() - entry.since_ns) / 1e9)
+        lines.append(_("joined {age} ago").format(age=age_text(age_s - age_s % 10)))
     if entry.gone_s is not None:
         lines.append(_("gone"))
     stats = (CardStat(_("Processor"), cpu_text(entry.cpu_ratio), _("of one core")),)

@@ -24,7 +24,7 @@ def paint_scene(
     scale: float,
     selection: GraphSelection | None = None,
     *,
-    rings: bool = False,
+    has_focus_rings: bool = False,
 ) -> None:
     """Paint a part of the scene.
 
@@ -34,10 +34,10 @@ def paint_scene(
         clip: Part to paint, in scene coordinates.
         scale: Scale of the painter, which determines the level of detail.
         selection: Selected item to highlight.
-        rings: True to paint focus rings, for use by keyboard.
+        has_focus_rings: True to paint focus rings, for use by keyboard.
     """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _ScenePainter(scene, painter, clip, scale, selection, rings=rings).paint()
+    _ScenePainter(scene, painter, clip, scale, selection, has_focus_rings=has_focus_rings).paint()
 
 
 class _ScenePainter:
@@ -51,12 +51,12 @@ class _ScenePainter:
         scale: float,
         selection: GraphSelection | None,
         *,
-        rings: bool,
+        has_focus_rings: bool,
     ) -> None:
         self.scene, self.theme, self.painter = scene, scene.theme, painter
-        self.clip, self.scale, self.rings = clip, scale, rings
+        self.clip, self.scale, self.has_focus_rings = clip, scale, has_focus_rings
         self.has_text = scale * scene.name_font.pixelSize() >= MIN_TEXT_PX
-        self.has_small = scene.has_small_text(scale)
+        self.has_small_text = scene.has_small_text(scale)
         self.is_tiny = not scene.has_stats(scale)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
         line = (
@@ -65,8 +65,8 @@ class _ScenePainter:
             else None
         )
         self.line = line
-        self.chosen = selection.key if selection is not None and selection.kind == "node" else ""
-        self.ends = {*line.sources, *line.targets} if line is not None else set[str]()
+        self.selected_key = selection.key if selection is not None and selection.kind == "node" else ""
+        self.line_ends = {*line.sources, *line.targets} if line is not None else set[str]()
 
     def paint(self) -> None:
         # Back to front: groups, lines, their labels, nodes.
@@ -79,7 +79,7 @@ class _ScenePainter:
         for item in [*(each for each in visible_lines if each.line is not self.line), *above]:
             painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
             self._paint_line(item)
-        if self.has_small:
+        if self.has_small_text:
             for item in self.scene.lines:
                 if item.label is not None and item.label.intersects(clip):
                     painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
@@ -117,8 +117,8 @@ class _ScenePainter:
             pen = QPen(theme.colour("controlBorder"), 1, Qt.PenStyle.DashLine)
             painter.setPen(pen)
             painter.setBrush(theme.colour("panel"))
-            round_end = item.quiet_rect.height() / 2
-            painter.drawRoundedRect(item.quiet_rect, round_end, round_end)
+            radius = item.quiet_rect.height() / 2
+            painter.drawRoundedRect(item.quiet_rect, radius, radius)
             paint.text_line(
                 painter,
                 item.quiet_rect,
@@ -129,9 +129,9 @@ class _ScenePainter:
             )
 
     def _paint_line(self, item: LineItem) -> None:
-        is_chosen = item.line is self.line
-        colour = self.theme.colour("accent" if is_chosen else "controlBorder")
-        width = 1.0 if self.is_tiny else SELECTION_WIDTH if is_chosen else item.stats.width
+        is_selected = item.line is self.line
+        colour = self.theme.colour("accent" if is_selected else "controlBorder")
+        width = 1.0 if self.is_tiny else SELECTION_WIDTH if is_selected else item.stats.width
         pen = QPen(colour, width)
         pen.setCosmetic(self.is_tiny)
         if item.line.kind == "service":
@@ -153,8 +153,8 @@ class _ScenePainter:
         names, _space, rate = item.stats.label.rpartition(" ")
         if not names or not rate.endswith(("/s", "/min")):
             names, rate = item.stats.label, ""
-        is_chosen = item.line is self.line
-        if is_chosen:
+        is_selected = item.line is self.line
+        if is_selected:
             paint.box(
                 painter,
                 rect.adjusted(-5, -1, 5, 1),
@@ -162,23 +162,23 @@ class _ScenePainter:
                 theme.colour("accentTint"),
                 theme.colour("accent"),
             )
-        colour = theme.colour("accentText" if is_chosen else "text")
+        colour = theme.colour("accentText" if is_selected else "text")
         _paint_text(painter, rect, names, self.scene.label_font, colour)
         if rate:
-            names_width = (len(names) + 1) * self.scene.letter
+            names_width = (len(names) + 1) * self.scene.char_width
             area = rect.adjusted(names_width, 0, 20, 0)
-            quiet = theme.colour("accentText" if is_chosen else "textSecondary")
+            quiet = theme.colour("accentText" if is_selected else "textSecondary")
             _paint_text(painter, area, rate, self.scene.label_font, quiet)
 
     def _paint_losses(self, item: LineItem) -> None:
-        if not self.has_small:
+        if not self.has_small_text:
             return
         theme, painter, font = self.theme, self.painter, self.scene.small_font
-        for box, share in item.stats.losses:
+        for box, ratio in item.stats.losses:
             tip = next((points[-1] for ends, points in item.routes.items() if ends[1] == box), None)
             if tip is None:
                 continue
-            text = percent_text(share)
+            text = percent_text(ratio)
             side = theme.scaled(12)
             width, height = paint.width_of(font, text) + side + 18, theme.scaled(20)
             chip = QRectF(tip[0] - width - 12, tip[1] + 6, width, height)
@@ -189,28 +189,30 @@ class _ScenePainter:
 
     def _paint_node(self, item: NodeItem) -> None:
         theme, painter, node = self.theme, self.painter, item.node
-        is_chosen = node.key == self.chosen
-        at_line = node.key in self.ends
+        is_selected = node.key == self.selected_key
+        is_line_end = node.key in self.line_ends
         is_source = self.line is not None and node.key in self.line.sources
-        fill = theme.colour("selected" if is_chosen or is_source else "panel")
-        edge = theme.colour("accent" if is_chosen or at_line else "controlBorder")
+        fill = theme.colour("selected" if is_selected or is_source else "panel")
+        edge = theme.colour("accent" if is_selected or is_line_end else "controlBorder")
         radius = theme.radius("panel")
-        faint = node.is_gone or node.is_quiet
-        if faint:
+        is_faint = node.is_gone or node.is_quiet
+        if is_faint:
             painter.setPen(QPen(edge, 1, Qt.PenStyle.DashLine))
             painter.setBrush(fill)
             painter.drawRoundedRect(item.rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
         else:
-            paint.box(painter, item.rect, radius, fill, edge, 1.5 if is_chosen or at_line else 1.0)
+            paint.box(painter, item.rect, radius, fill, edge, 1.5 if is_selected or is_line_end else 1.0)
         if node.bridged_network:
             self._paint_bridge_end(item.rect, node.bridged_network, edge)
-        if is_chosen and self.rings:
+        if is_selected and self.has_focus_rings:
             ring = item.rect.adjusted(-3, -3, 3, 3)
             paint.box(painter, ring, radius + 3, None, theme.colour("focus"), 2.0)
         if self.has_text:
-            self._paint_texts(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
+            self._paint_texts(
+                item, "textDisabled" if node.is_gone else "textSecondary" if is_faint else "text"
+            )
 
-    def _paint_bridge_end(self, rect: QRectF, joins: str, edge: QColor) -> None:
+    def _paint_bridge_end(self, rect: QRectF, network: str, edge: QColor) -> None:
         # Right part of a bridge, with the name of the other network.
         theme, painter = self.theme, self.painter
         part = QRectF(
@@ -219,10 +221,10 @@ class _ScenePainter:
         paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))
         painter.setPen(QPen(edge, 1))
         painter.drawLine(part.topLeft(), part.bottomLeft())
-        if self.has_small:
+        if self.has_small_text:
             font = QFont(self.scene.small_font)
             font.setWeight(QFont.Weight.DemiBold)
-            paint.text_line(painter, part, joins, font, theme.colour("textSecondary"), paint.CENTRE)
+            paint.text_line(painter, part, network, font, theme.colour("textSecondary"), paint.CENTRE)
 
     def _paint_texts(self, item: NodeItem, role: str) -> None:
         theme, painter, rect = self.theme, self.painter, item.rect
@@ -231,22 +233,24 @@ class _ScenePainter:
         quiet = theme.colour("textDisabled" if item.node.is_gone else "textSecondary")
         paint_icon(painter, icon_rect, node_icon(item.node), quiet)
         left = rect.left() + 12 + side + 10
-        has_line = self.has_small and bool(item.line)
+        has_detail = self.has_small_text and bool(item.elided_detail)
         area = QRectF(left, rect.top(), rect.right() - 4 - left, rect.height())
-        if has_line:
+        if has_detail:
             area.adjust(0, 5, 0, 1 - rect.height() / 2)
         font = self.scene.name_font
         if item.node.is_gone:
             font = QFont(font)
             font.setStrikeOut(True)
         _paint_text(painter, area, item.name, font, theme.colour(role))
-        if has_line:
+        if has_detail:
             area.translate(0, rect.height() / 2 - 4)
-            _paint_text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
+            _paint_text(
+                painter, area, item.elided_detail, self.scene.small_font, theme.colour("textTertiary")
+            )
 
 
 def _paint_text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
-    # Faster than `paint.words`, which measures the text again.
+    # Faster than `paint.text_line`, which measures the text again.
     painter.setFont(font)
     painter.setPen(colour)
     painter.drawText(rect, int(paint.LEFT), text)

@@ -34,7 +34,7 @@ from app.core.network.web_texts import page_nodes
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
-from app.ui.panels.graph.card import WIDTH, CardSources, GraphCard, node_card, topic_card
+from app.ui.panels.graph.card import CARD_WIDTH, CardSources, GraphCard, node_card, topic_card
 from app.ui.panels.graph.painting import paint_scene
 from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.texts import (
@@ -93,17 +93,19 @@ class GraphPanel(PanelWidget):
         self._requested_graph: NodeGraph | None = None
         self._requested_sizes = LayoutSizes()
         self._last_snapshot: tuple[object, ...] = ()
-        self._values: tuple[object, ...] = ()
+        self._values_revisions: tuple[object, ...] = ()
         self._ticks = 0
         self._call_rates_hz: Mapping[str, float] = {}
         self._box_of: Callable[[str], str] = lambda _entry: ""
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
-        self._menu = Menu(theme, self.export)
+        self._export_menu = Menu(theme, self.export)
         for text, kind in ((_("Image (SVG)"), SVG_KIND), (_("Graph (DOT)"), DOT_KIND)):
-            self._menu.addAction(text).triggered.connect(lambda _on=False, kind=kind: self._prompt_file(kind))
+            self._export_menu.addAction(text).triggered.connect(
+                lambda _on=False, kind=kind: self._prompt_file(kind)
+            )
         self.export.clicked.connect(
-            lambda: self._menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
+            lambda: self._export_menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
         )
         self.count.setProperty("place", "start")
         self.header = [self.count, self.export]
@@ -143,13 +145,15 @@ class GraphPanel(PanelWidget):
         tools.services.clicked.connect(
             lambda: self._update_options(shows_services=tools.services.isChecked())
         )
-        tools.whole.clicked.connect(canvas.show_all)
-        tools.larger.clicked.connect(lambda: canvas.zoom_by(1.2))
-        tools.smaller.clicked.connect(lambda: canvas.zoom_by(1 / 1.2))
+        tools.show_all_button.clicked.connect(canvas.show_all)
+        tools.zoom_in.clicked.connect(lambda: canvas.zoom_by(1.2))
+        tools.zoom_out.clicked.connect(lambda: canvas.zoom_by(1 / 1.2))
         canvas.viewport_changed.connect(lambda: tools.show_scale(canvas.scale))
         canvas.selected.connect(self._selection_changed)
         canvas.opened.connect(self._open)
-        canvas.entered.connect(lambda: self.card.first_focus_widget().setFocus(Qt.FocusReason.TabFocusReason))
+        canvas.card_focus_requested.connect(
+            lambda: self.card.first_focus_widget().setFocus(Qt.FocusReason.TabFocusReason)
+        )
         canvas.toggled.connect(self._toggle_group)
         canvas.quiet_nodes_requested.connect(self._show_quiet)
         canvas.key_pressed.connect(self._handle_key)
@@ -194,8 +198,10 @@ class GraphPanel(PanelWidget):
             self._rebuild()
         self._apply_layout()
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
-        if values != self._values or (self._has_gone_nodes() and self._ticks % QUIET_UPDATE_TICKS == 0):
-            self._values = values
+        if values != self._values_revisions or (
+            self._has_gone_nodes() and self._ticks % QUIET_UPDATE_TICKS == 0
+        ):
+            self._values_revisions = values
             self.canvas.schedule_update()
             self._update_card()
         self.canvas.update_stats(self._stats_of)
@@ -229,7 +235,9 @@ class GraphPanel(PanelWidget):
     def _rebuild(self) -> None:
         graph_input = self._graph_input()
         options = self._options
-        if len(graph_input.nodes) > MAX_EXPANDED_NODES and not (options.starts_collapsed or options.toggled):
+        if len(graph_input.nodes) > MAX_EXPANDED_NODES and not (
+            options.starts_collapsed or options.toggled_groups
+        ):
             self._layout = None
             self._update_options(starts_collapsed=True)
         graph = node_graph(graph_input, self._options)
@@ -322,12 +330,12 @@ class GraphPanel(PanelWidget):
             if group_by == name:
                 self._layout = None
                 self._update_options(
-                    group_by=group_by, toggled=frozenset(), groups_with_visible_quiet_nodes=frozenset()
+                    group_by=group_by, toggled_groups=frozenset(), groups_with_visible_quiet_nodes=frozenset()
                 )
 
     def _toggle_group(self, group: str) -> None:
         self._layout = None
-        self._update_options(toggled=self._options.toggled ^ {group})
+        self._update_options(toggled_groups=self._options.toggled_groups ^ {group})
 
     def _show_quiet(self, group: str) -> None:
         self._update_options(
@@ -344,45 +352,45 @@ class GraphPanel(PanelWidget):
             self.canvas.scene.dim_unmatched(self.tools.filter_words())
             self.canvas.update()
 
-    def _handle_key(self, letter: str) -> None:
-        if letter == "/":
+    def _handle_key(self, key: str) -> None:
+        if key == "/":
             self.focus_filter()
-        elif letter == "g":
-            now = GROUPS.index(self._options.group_by)
-            self._group_by(GROUPS[(now + 1) % len(GROUPS)])
-        elif letter == "h":
+        elif key == "g":
+            index = GROUPS.index(self._options.group_by)
+            self._group_by(GROUPS[(index + 1) % len(GROUPS)])
+        elif key == "h":
             self._update_options(
                 hides_quiet=not self._options.hides_quiet, groups_with_visible_quiet_nodes=frozenset()
             )
-        elif letter == "s":
+        elif key == "s":
             self._update_options(shows_services=not self._options.shows_services)
 
     def _open(self, key: str) -> None:
         if self.session.topic(key) is not None:
             show_messages(self.context, key)
 
-    def _show_menu(self, choice: GraphSelection, position: QPoint) -> None:
-        menu = self.menu_of(choice)
+    def _show_menu(self, selection: GraphSelection, position: QPoint) -> None:
+        menu = self.menu_of(selection)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if menu.actions():
             menu.popup(position)
         else:
             menu.deleteLater()
 
-    def menu_of(self, choice: GraphSelection) -> Menu:
+    def menu_of(self, selection: GraphSelection) -> Menu:
         """Return the context menu of a node or line.
 
         The menu of a line with several topics has a submenu for each of them, up to `MAX_MENU_TOPICS`.
         """
         menu, scene = Menu(self.theme, self), self.canvas.scene
         graph = scene.graph if scene is not None else NodeGraph()
-        if choice.kind == "node":
-            return fill_menu(menu, self.theme, self._node_actions(graph.node(choice.key)))
-        line = graph.line_of(choice.key)
-        topics = line.topics if line is not None else (choice.key,)
+        if selection.kind == "node":
+            return fill_menu(menu, self.theme, self._node_actions(graph.node(selection.key)))
+        line = graph.line_of(selection.key)
+        topics = line.topics if line is not None else (selection.key,)
         if len(topics) == 1:
             return fill_menu(menu, self.theme, self._topic_actions(topics[0]))
-        for topic in sorted(topics, key=lambda each: each != choice.key)[:MAX_MENU_TOPICS]:
+        for topic in sorted(topics, key=lambda each: each != selection.key)[:MAX_MENU_TOPICS]:
             part = Menu(self.theme, menu, plain.escape_menu_text(split_key(topic)[1]))
             menu.addMenu(fill_menu(part, self.theme, self._topic_actions(topic)))
         return menu
@@ -400,7 +408,7 @@ class GraphPanel(PanelWidget):
             return [RowAction(_("Expand the group"), "box", lambda: self.canvas.expand_group(node.key))]
         return node_actions(self.context, node.entry.network, node.entry.name)
 
-    def _selection_changed(self, _choice: object) -> None:
+    def _selection_changed(self, _selection: object) -> None:
         self._update_card()
 
     def _select_item(self, kind: str, key: str) -> None:
@@ -428,13 +436,13 @@ class GraphPanel(PanelWidget):
         )
 
     def _update_card(self) -> None:
-        choice, scene = self.canvas.choice, self.canvas.scene
+        selection, scene = self.canvas.selection, self.canvas.scene
         content = None
-        if choice is not None and scene is not None:
-            if choice.kind == "topic":
-                content = topic_card(choice.key, self._card_sources())
+        if selection is not None and scene is not None:
+            if selection.kind == "topic":
+                content = topic_card(selection.key, self._card_sources())
             else:
-                node = scene.graph.node(choice.key)
+                node = scene.graph.node(selection.key)
                 if node is not None:
                     content = node_card(node, self._services_of(node.entry_key), self._card_sources())
         self.card.show_content(content)
@@ -449,13 +457,13 @@ class GraphPanel(PanelWidget):
                 services += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
         return services
 
-    def _description_of(self, choice: GraphSelection | None) -> str:
+    def _description_of(self, selection: GraphSelection | None) -> str:
         scene = self.canvas.scene
-        if choice is None or scene is None:
+        if selection is None or scene is None:
             return ""
-        if choice.kind == "topic":
-            return self._topic_description(choice.key)
-        node = scene.graph.node(choice.key)
+        if selection.kind == "topic":
+            return self._topic_description(selection.key)
+        node = scene.graph.node(selection.key)
         if node is None:
             return ""
         outgoing = [line for line in scene.graph.lines if node.key in line.sources]
@@ -566,7 +574,7 @@ class GraphPanel(PanelWidget):
         is_wide = self.width() >= self.theme.scaled(MIN_SIDE_CARD_WIDTH)
         direction = QBoxLayout.Direction
         self._page_layout.setDirection(direction.LeftToRight if is_wide else direction.TopToBottom)
-        width = round(self.theme.scaled(WIDTH))
+        width = round(self.theme.scaled(CARD_WIDTH))
         self.card.setMinimumWidth(width if is_wide else 0)
         self.card.setMaximumWidth(width if is_wide else 16_777_215)
         self.card.setMaximumHeight(16_777_215 if is_wide else max(120, self.height() // 2))

@@ -34,8 +34,8 @@ LINE_MARGIN = 14.0
 CELL_SIZE = (160.0, 48.0)
 LABEL_RATE_CHARS = 7
 """Number of characters that every label reserves for the rate."""
-MIN_TEXT_PX = 7.0
-"""Font height in px below which text is not painted, because it would be illegible."""
+MIN_SMALL_TEXT_PX = 7.0
+"""Font height in px below which small text is not painted, because it would be illegible."""
 TINY_SCALE = 0.2
 """Scale below which rates and line widths are omitted, because thousands of lines may be visible."""
 HIT_TOLERANCE_PX = 6.0
@@ -63,7 +63,7 @@ class NodeItem:
     rect: QRectF
     name: str
     detail: str = ""
-    line: str = ""
+    elided_detail: str = ""
     """Second line, elided to the available width."""
     is_dim: bool = False
 
@@ -77,7 +77,7 @@ class LineItem:
         routes: Points of the route between each pair of source and target.
         bounds: Bounding rectangle in scene coordinates.
         label: Rectangle of the label, or None if there is no room for it.
-        is_placed: True after a place for the label has been searched.
+        is_placed: True after a place for the label has been looked for.
         stats: Label, width and losses.
         is_dim: True while the filter fades the line.
     """
@@ -175,8 +175,10 @@ class GraphScene:
         header_rects = (
             QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.header - 8)) for item in self.groups
         )
-        led = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
-        self._crossed = _OccupiedAreas(_segment_rect(*part) for item in led for part in _segments(item))
+        avoidable_lines = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
+        self._line_areas = _OccupiedAreas(
+            _segment_rect(*part) for item in avoidable_lines for part in _segments(item)
+        )
         self._occupied_areas = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *header_rects])
 
     def _update_fonts(self) -> None:
@@ -185,7 +187,7 @@ class GraphScene:
         self.small_font.setWeight(QFont.Weight.Normal)
         self.name_font.setWeight(QFont.Weight.Medium)
         self.label_font, self.title_font = theme.font("code"), theme.font("title")
-        self.letter = QFontMetricsF(self.label_font).horizontalAdvance("0")
+        self.char_width = QFontMetricsF(self.label_font).horizontalAdvance("0")
 
     def _text_width(self, node: DrawnNode) -> float:
         return self.sizes.node[0] - 46 - (BRIDGE_END_WIDTH if node.bridged_network else 0)
@@ -207,7 +209,7 @@ class GraphScene:
             group, rect, self._elide(self.title_font, group_name(group.key, self._host), room), chip
         )
 
-    # -- figures ------------------------------------------------------------------------------------------
+    # -- rates and counts ---------------------------------------------------------------------------------
 
     def items_in(self, area: QRectF) -> list[NodeItem | LineItem]:
         """Return the nodes and lines that intersect an area."""
@@ -215,33 +217,33 @@ class GraphScene:
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
     def update_stats(
-        self, item: NodeItem | LineItem, stats_of: StatsGetter, *, with_words: bool
+        self, item: NodeItem | LineItem, stats_of: StatsGetter, *, with_small_text: bool
     ) -> QRectF | None:
         """Update the second line of text of a node, or the label, width and losses of a line.
 
         Args:
             item: Item to update.
             stats_of: Returns label, width and losses of a line.
-            with_words: True if small text is legible; otherwise nodes aren't updated. The first call with
-                True places the label of a line.
+            with_small_text: True if small text is legible; otherwise nodes aren't updated. The first call
+                with True places the label of a line.
 
         Returns:
             The area to repaint, or None if nothing changed.
         """
         if isinstance(item, NodeItem):
-            detail = node_detail(item.node) if with_words else item.detail
+            detail = node_detail(item.node) if with_small_text else item.detail
             if detail == item.detail:
                 return None
             item.detail = detail
-            item.line = self._elide(self.small_font, detail, self._text_width(item.node))
+            item.elided_detail = self._elide(self.small_font, detail, self._text_width(item.node))
             return item.rect
-        now, before = stats_of(item.line), item.stats
-        item.stats = now
-        if now.width != before.width or now.losses != before.losses:
+        current, previous = stats_of(item.line), item.stats
+        item.stats = current
+        if current.width != previous.width or current.losses != previous.losses:
             area: QRectF | None = item.bounds
         else:
-            area = item.label if now.label != before.label else None
-        if with_words and not item.is_placed:
+            area = item.label if current.label != previous.label else None
+        if with_small_text and not item.is_placed:
             item.is_placed = True
             item.label = self._label_rect_for(item)
             area = area or item.label
@@ -251,17 +253,18 @@ class GraphScene:
         """Update the rates and counts of all items at once, for the export of an image."""
         items: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in items:
-            self.update_stats(item, stats_of, with_words=True)
+            self.update_stats(item, stats_of, with_small_text=True)
 
     def _label_rect_for(self, item: LineItem) -> QRectF | None:
         # Tries the longest horizontal segment first, and prefers places that no other line crosses.
-        letters = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
-        width, height = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
-        rooms = [
+        char_count = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
+        width, height = char_count * self.char_width + 4, QFontMetricsF(self.label_font).height()
+        free_rects = [
             rect for rect in _label_candidates(item, width, height) if self._occupied_areas.is_free(rect)
         ]
         label_rect = next(
-            (rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None
+            (rect for rect in free_rects if self._line_areas.is_free(rect)),
+            free_rects[0] if free_rects else None,
         )
         if label_rect is not None:
             self._occupied_areas.add(label_rect)
@@ -276,7 +279,7 @@ class GraphScene:
         Args:
             keywords: Words in lower case; empty for no filter.
         """
-        bright = {
+        matching_keys = {
             key
             for key, item in self.nodes.items()
             if all(keyword in _haystack(item.node) for keyword in keywords)
@@ -290,9 +293,9 @@ class GraphScene:
         matching_ids = {id(item) for item in matching_lines}
         for item in self.lines:
             line_ends = {*item.line.sources, *item.line.targets}
-            item.is_dim = bool(keywords) and id(item) not in matching_ids and not (line_ends & bright)
+            item.is_dim = bool(keywords) and id(item) not in matching_ids and not (line_ends & matching_keys)
         for key, box in self.nodes.items():
-            box.is_dim = bool(keywords) and key not in bright and key not in connected_nodes
+            box.is_dim = bool(keywords) and key not in matching_keys and key not in connected_nodes
 
     @property
     def dimmed_count(self) -> int:
@@ -306,7 +309,7 @@ class GraphScene:
 
     def has_small_text(self, scale: float) -> bool:
         """Return True if the small text is legible at a scale."""
-        return scale * self.small_font.pixelSize() >= MIN_TEXT_PX
+        return scale * self.small_font.pixelSize() >= MIN_SMALL_TEXT_PX
 
     # -- hit testing --------------------------------------------------------------------------------------
 
@@ -370,9 +373,9 @@ def _add_rounded(path: QPainterPath, points: Sequence[Position]) -> None:
     path.moveTo(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         radius = min(CORNER_RADIUS, math.dist(before, corner) / 2, math.dist(corner, after) / 2)
-        curve_start, out = _point_towards(corner, before, radius), _point_towards(corner, after, radius)
+        curve_start, curve_end = _point_towards(corner, before, radius), _point_towards(corner, after, radius)
         path.lineTo(*curve_start)
-        path.quadTo(*corner, *out)
+        path.quadTo(*corner, *curve_end)
     path.lineTo(*points[-1])
 
 
@@ -403,18 +406,18 @@ def _arrow(points: Sequence[Position]) -> QPolygonF:
 def _label_candidates(item: LineItem, width: float, height: float) -> Iterator[QRectF]:
     # Best candidates first: horizontal segments, then vertical ones.
     parts = _segments(item)
-    level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
-    for begin, end in sorted(level, key=_segment_length, reverse=True)[:6]:
+    horizontal = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
+    for begin, end in sorted(horizontal, key=_segment_length, reverse=True)[:6]:
         left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - width
-        for share in (0.5, 0.25, 0.75) if room >= 0 else ():
-            yield QRectF(left + room * share, begin[1] - height - 2, width, height)
-            yield QRectF(left + room * share, begin[1] + 3, width, height)
-    upright = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
-    for begin, end in sorted(upright, key=_segment_length, reverse=True)[:4]:
+        for fraction in (0.5, 0.25, 0.75) if room >= 0 else ():
+            yield QRectF(left + room * fraction, begin[1] - height - 2, width, height)
+            yield QRectF(left + room * fraction, begin[1] + 3, width, height)
+    vertical = [each for each in parts if abs(each[1][0] - each[0][0]) < 1]
+    for begin, end in sorted(vertical, key=_segment_length, reverse=True)[:4]:
         top, room = min(begin[1], end[1]), abs(end[1] - begin[1]) - height
-        for share in (0.5, 0.2, 0.8) if room >= 0 else ():
-            yield QRectF(begin[0] + 5, top + room * share, width, height)
-            yield QRectF(begin[0] - 5 - width, top + room * share, width, height)
+        for fraction in (0.5, 0.2, 0.8) if room >= 0 else ():
+            yield QRectF(begin[0] + 5, top + room * fraction, width, height)
+            yield QRectF(begin[0] - 5 - width, top + room * fraction, width, height)
 
 
 def _segments(item: LineItem) -> list[tuple[Position, Position]]:
@@ -439,11 +442,11 @@ def _distance(point: QPointF, points: Sequence[Position]) -> float:
 def _distance_to_segment(point: Position, begin: Position, end: Position) -> float:
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     length_squared = dx * dx + dy * dy
-    share = (
+    fraction = (
         ((point[0] - begin[0]) * dx + (point[1] - begin[1]) * dy) / length_squared if length_squared else 0.0
     )
-    share = min(1.0, max(0.0, share))
-    return math.dist(point, (begin[0] + dx * share, begin[1] + dy * share))
+    fraction = min(1.0, max(0.0, fraction))
+    return math.dist(point, (begin[0] + dx * fraction, begin[1] + dy * fraction))
 
 
 def _haystack(node: DrawnNode) -> str:

@@ -156,25 +156,25 @@ def group_name(key: str, host: str) -> str:
 
 
 def line_stats(
-    line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float], box_of: Callable[[str], str]
+    line: GraphLine, topic_of: FindTopic, call_rates_hz: Mapping[str, float], box_of: Callable[[str], str]
 ) -> LineStats:
     """Return label, width and losses of a line.
 
     Args:
         line: Line to describe.
         topic_of: Returns a topic by key, or None.
-        hertz: Calls per second, by name of the service; may be incomplete.
+        call_rates_hz: Calls per second, by name of the service; may be incomplete.
         box_of: Returns the key of the box that shows a node, or "" if the node is not drawn.
     """
     names = line_name(line.topics)
     if line.kind == "service":
-        rates_hz = [hertz[name] for name in line.topics if name in hertz]
+        rates_hz = [call_rates_hz[name] for name in line.topics if name in call_rates_hz]
         return LineStats(f"{names} {short_rate(sum(rates_hz))}" if rates_hz else names, MIN_WIDTH)
     topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
     rates = [hz for topic in topics if (hz := finite_or_none(topic.rate_hz)) is not None]
     rate = short_rate(sum(rates)) if rates else ""
-    sent = sum(finite_or_none(topic.bandwidth_Bps) or 0.0 for topic in topics)
-    return LineStats(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
+    bandwidth = sum(finite_or_none(topic.bandwidth_Bps) or 0.0 for topic in topics)
+    return LineStats(f"{names} {rate}".rstrip(), line_width(bandwidth), _losses(topics, box_of))
 
 
 def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
@@ -184,8 +184,8 @@ def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tupl
         for subscriber in topic.info.subscribers if topic.info is not None else ():
             box = box_of(key_of(topic.network, subscriber.node_id)) if subscriber.lost else ""
             if box and subscriber.lost:
-                share = subscriber.lost / (subscriber.lost + max(0, subscriber.received or 0))
-                loss_by_box[box] = max(loss_by_box.get(box, 0.0), share)
+                ratio = subscriber.lost / (subscriber.lost + max(0, subscriber.received or 0))
+                loss_by_box[box] = max(loss_by_box.get(box, 0.0), ratio)
     return tuple(sorted(loss_by_box.items()))
 
 
@@ -200,8 +200,10 @@ def line_name(topics: Sequence[str]) -> str:
     At most `MAX_NAMED_TOPICS` topics are named, for example "/scan /odom and 3 more".
     """
     names = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
-    more = len(topics) - MAX_NAMED_TOPICS
-    return _("{names} and {count} more").format(names=names, count=more) if more > 0 else names
+    omitted_count = len(topics) - MAX_NAMED_TOPICS
+    return (
+        _("{names} and {count} more").format(names=names, count=omitted_count) if omitted_count > 0 else names
+    )
 
 
 def short_rate(rate_hz: float) -> str:
@@ -220,10 +222,10 @@ def line_width(bytes_per_s: float) -> float:
     """
     if not bytes_per_s > MIN_WIDTH_BPS:
         return MIN_WIDTH
-    share = min(1.0, math.log10(bytes_per_s / MIN_WIDTH_BPS) / WIDTH_DECADES)
-    return MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * round(share * WIDTH_STEPS) / WIDTH_STEPS
+    ratio = min(1.0, math.log10(bytes_per_s / MIN_WIDTH_BPS) / WIDTH_DECADES)
+    return MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * round(ratio * WIDTH_STEPS) / WIDTH_STEPS
 
 
-def percent_text(share: float) -> str:
+def percent_text(ratio: float) -> str:
     """Format a ratio (0 to 1) as a percentage, such as "0.7 %" or "12 %"."""
-    return number(share, ".1%").replace("%", " %")
+    return number(ratio, ".1%").replace("%", " %")

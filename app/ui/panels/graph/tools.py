@@ -29,21 +29,21 @@ class GraphTools(QWidget):
         )
         self.quiet = ToggleButton(theme, _("Hide quiet nodes"), "eye-off")
         self.services = ToggleButton(theme, _("Services"), "spline")
-        self.smaller = IconButton(theme, "zoom-out", _("Smaller"), "-", size=26)
-        self.larger = IconButton(theme, "zoom-in", _("Larger"), "+", size=26)
+        self.zoom_out = IconButton(theme, "zoom-out", _("Zoom out"), "-", size=26)
+        self.zoom_in = IconButton(theme, "zoom-in", _("Zoom in"), "+", size=26)
         self.scale = label("100 %", "body", role="textSecondary")
         self.scale.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.scale.setMinimumWidth(round(theme.scaled(44)))
-        self.whole = Button(theme, _("Show all"), "scan", size="small")
+        self.show_all_button = Button(theme, _("Show all"), "scan", size="small")
         flow = Flow(self, gap=10, row_gap=6)
         flow.setContentsMargins(10, 8, 10, 8)
         flow.addWidget(self.filter)
         flow.addWidget(label(_("Group by"), "body", role="textSecondary"))
-        for widget in (self.group, self.quiet, self.services):
-            flow.addWidget(widget)
+        for option in (self.group, self.quiet, self.services):
+            flow.addWidget(option)
         flow.push()
-        for size in (self.smaller, self.scale, self.larger, self.whole):
-            flow.addWidget(size)
+        for widget in (self.zoom_out, self.scale, self.zoom_in, self.show_all_button):
+            flow.addWidget(widget)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -59,16 +59,16 @@ class GraphTools(QWidget):
         self.quiet.setChecked(options.hides_quiet)
         self.services.setChecked(options.shows_services)
 
-    def show_quiet_count(self, hidden: int, hides: bool) -> None:
+    def show_quiet_count(self, hidden_count: int, hides_quiet: bool) -> None:
         """Show the number of hidden quiet nodes on the button.
 
         Args:
-            hidden: Number of hidden nodes.
-            hides: True if quiet nodes are hidden.
+            hidden_count: Number of hidden nodes.
+            hides_quiet: True if quiet nodes are hidden.
         """
-        if hides and hidden:
-            template = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
-            self.quiet.set_label(template.format(count=hidden))
+        if hides_quiet and hidden_count:
+            template = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden_count)
+            self.quiet.set_label(template.format(count=hidden_count))
         else:
             self.quiet.set_label(_("Hide quiet nodes"))
 
@@ -85,7 +85,7 @@ class GraphLegend(QWidget):
         flow = Flow(self, gap=18, row_gap=2)
         flow.setContentsMargins(12, 4, 12, 8)
         for kind, text in (
-            ("topic", _("topic; thicker line: more data")),
+            ("topic", _("topic (thicker lines carry more data)")),
             ("service", _("service")),
             ("chosen", _("selected topic")),
             ("gone", _("gone or quiet")),

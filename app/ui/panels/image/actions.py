@@ -86,19 +86,19 @@ class PictureActions(QObject):
         self._by_name: dict[str, QAction] = {}
         self._by_key: dict[str, QAction] = {}
         self._menu_actions: list[QAction] = []  # with separators
-        for row in ACTION_SPECS:
-            action = QAction(f"{_(row.text)}\t{row.keys[0]}", view)
-            if row.icon is not None:
-                action.setIcon(theme.icon(row.icon))
-            action.setCheckable(row.is_checkable)
-            action.triggered.connect(lambda _on=False, do=callbacks[row.name]: do())
-            self._by_name[row.name] = action
-            if row.has_separator:
-                line = QAction(self)
-                line.setSeparator(True)
-                self._menu_actions.append(line)
+        for spec in ACTION_SPECS:
+            action = QAction(f"{_(spec.text)}\t{spec.keys[0]}", view)
+            if spec.icon is not None:
+                action.setIcon(theme.icon(spec.icon))
+            action.setCheckable(spec.is_checkable)
+            action.triggered.connect(lambda _on=False, callback=callbacks[spec.name]: callback())
+            self._by_name[spec.name] = action
+            if spec.has_separator:
+                separator = QAction(self)
+                separator.setSeparator(True)
+                self._menu_actions.append(separator)
             self._menu_actions.append(action)
-            self._by_key.update(dict.fromkeys(row.keys, action))
+            self._by_key.update(dict.fromkeys(spec.keys, action))
         view.keys = frozenset(self._by_key)
         view.key_pressed.connect(self._trigger)
         view.placement_changed.connect(self.update_checks)
@@ -132,5 +132,5 @@ class PictureActions(QObject):
         self._view.notify_changed()
 
     def _flip(self, *, is_horizontal: bool) -> None:
-        self._view.placement.flip(horizontally=is_horizontal)
+        self._view.placement.flip(is_horizontal=is_horizontal)
         self._view.notify_changed()

@@ -33,10 +33,12 @@ class Overlays:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._watches: dict[str, Watch] = {}
-        self._drawn: dict[str, tuple[Message | None, tuple[int, int], tuple[AnnotationShape, ...]]] = {}
+        self._cached_annotations: dict[
+            str, tuple[Message | None, tuple[int, int], tuple[AnnotationShape, ...]]
+        ] = {}
 
     @property
-    def selected(self) -> tuple[str, ...]:
+    def selected_topics(self) -> tuple[str, ...]:
         """Keys of the selected topics."""
         return tuple(self._watches)
 
@@ -48,20 +50,20 @@ class Overlays:
         ]
         return [*available, *(key for key in self._watches if key not in available)]
 
-    def set_visible(self, topic: str, visible: bool) -> None:
+    def set_visible(self, topic: str, is_visible: bool) -> None:
         """Show or hide the annotations of a topic. At most `MAX_OVERLAYS` topics can be shown."""
-        if visible and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
+        if is_visible and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
             self._watches[topic] = self._session.watch_displayed(topic)
-        elif not visible and topic in self._watches:
+        elif not is_visible and topic in self._watches:
             self._watches.pop(topic).close()
-            self._drawn.pop(topic, None)
+            self._cached_annotations.pop(topic, None)
 
     def restart(self) -> None:
         """Watch the selected topics again after the session switched to another source."""
-        selected = self.selected
+        selected_topics = self.selected_topics
         self.close()
-        for topic in selected:
-            self.set_visible(topic, visible=True)
+        for topic in selected_topics:
+            self.set_visible(topic, is_visible=True)
 
     def annotations_for(self, width: int, height: int) -> tuple[AnnotationShape, ...]:
         """Return the annotations to draw over an image. Each message is decoded only once.
@@ -76,14 +78,14 @@ class Overlays:
         for key in self._watches:
             topic = self._session.topic(key)
             message = topic.newest if topic is not None and topic.gone_s is None else None
-            before = self._drawn.get(key)
-            if before is None or before[0] is not message or before[1] != (width, height):
-                before = self._drawn[key] = (
+            cached = self._cached_annotations.get(key)
+            if cached is None or cached[0] is not message or cached[1] != (width, height):
+                cached = self._cached_annotations[key] = (
                     message,
                     (width, height),
                     _decode_annotations(message, width, height),
                 )
-            shapes += before[2]
+            shapes += cached[2]
         return tuple(shapes)
 
     def suspendables(self) -> Iterable[Suspendable]:
@@ -95,7 +97,7 @@ class Overlays:
         for watch in self._watches.values():
             watch.close()
         self._watches.clear()
-        self._drawn.clear()
+        self._cached_annotations.clear()
 
 
 def _decode_annotations(message: Message | None, width: int, height: int) -> tuple[AnnotationShape, ...]:

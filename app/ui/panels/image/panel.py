@@ -54,10 +54,10 @@ class ImagePanel(PanelWidget):
         self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
         self._has_image: bool | None = None
-        self.choose = IconButton(self.theme, "chevron-down", _("Choose an image topic"), size=26)
-        self.choose.setProperty("place", "start")
-        self.choose.clicked.connect(self._show_menu)
-        self.chips = [self.choose]
+        self.choose_button = IconButton(self.theme, "chevron-down", _("Choose an image topic"), size=26)
+        self.choose_button.setProperty("place", "start")
+        self.choose_button.clicked.connect(self._show_menu)
+        self.chips = [self.choose_button]
         self.view = ClickablePicture(self.theme)
         self.view.setAccessibleName(_("Image"))
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
@@ -72,18 +72,18 @@ class ImagePanel(PanelWidget):
         self.style_bar = StyleBar(self.theme, lambda: self.view.picture)
         self.style_bar.changed.connect(self._set_picture_style)
         self.style_bar.hide()
-        self.tune.toggled.connect(self.style_bar.setVisible)
-        self.points = PointBar(self.context, self.view)
-        self.points.exited.connect(lambda: self._publish_points(on=False))
-        self.view.clicked.connect(self.points.send)
-        self.shown = QWidget()
-        column = QVBoxLayout(self.shown)
+        self.style_button.toggled.connect(self.style_bar.setVisible)
+        self.point_bar = PointBar(self.context, self.view)
+        self.point_bar.exited.connect(lambda: self._publish_points(is_active=False))
+        self.view.clicked.connect(self.point_bar.send)
+        self.content = QWidget()
+        column = QVBoxLayout(self.content)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(self.points)
+        column.addWidget(self.point_bar)
         column.addWidget(self.view, 1)
         column.addWidget(self.style_bar)
-        return self.shown
+        return self.content
 
     def _set_picture_style(self, style: object) -> None:
         if isinstance(style, PictureStyle):
@@ -96,32 +96,34 @@ class ImagePanel(PanelWidget):
             "freeze": self._toggle_freeze,
             "save": self.save_image,
             "copy": self.copy_image,
-            "point": lambda: self._publish_points(on=not self.points.is_on),
+            "point": lambda: self._publish_points(is_active=not self.point_bar.is_on),
         }
         self.actions_of = PictureActions(self.theme, self.view, own_callbacks)
         self._inspect_action = QAction(self.theme.icon("list-tree"), _("Open in the Inspector"), self)
         self._inspect_action.triggered.connect(self._inspect)
-        self._sequence = QAction(self.theme.icon("film"), _("Record a sequence"), self)
-        self._sequence.triggered.connect(self.save_sequence)
-        self._line = QAction(self)
-        self._line.setSeparator(True)
+        self._sequence_action = QAction(self.theme.icon("film"), _("Record a sequence"), self)
+        self._sequence_action.triggered.connect(self.save_sequence)
+        self._separator = QAction(self)
+        self._separator.setSeparator(True)
         self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
         self.job.saved.connect(self._on_saved)
         self.job.copied.connect(self._on_copied)
         self.job.failed.connect(self._on_failed)
-        self.fit = IconButton(self.theme, "maximize", _("Fit image"), "0", size=26)
+        self.fit_button = IconButton(self.theme, "maximize", _("Fit image"), "0", size=26)
         self.freeze = IconButton(
             self.theme, "snowflake", _("Freeze this image"), "Space", checkable=True, size=26
         )
-        self.keep = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
-        self.fit.clicked.connect(self.view.fit_to_view)
+        self.save_button = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
+        self.fit_button.clicked.connect(self.view.fit_to_view)
         self.freeze.toggled.connect(self._set_frozen)
-        self.keep.clicked.connect(self.save_image)
-        tune = _("Brightness, contrast and colours")
-        self.tune: IconButton = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
-        self.layers = IconButton(self.theme, "layers", _("Annotations from messages"), size=26)
-        self.layers.clicked.connect(self._show_layers)
-        self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
+        self.save_button.clicked.connect(self.save_image)
+        style_name = _("Brightness, contrast and colours")
+        self.style_button: IconButton = IconButton(
+            self.theme, "sliders-horizontal", style_name, checkable=True, size=26
+        )
+        self.layers_button = IconButton(self.theme, "layers", _("Annotations from messages"), size=26)
+        self.layers_button.clicked.connect(self._show_layers)
+        self.header = [self.fit_button, self.style_button, self.layers_button, self.freeze, self.save_button]
 
     def topics(self) -> list[str]:
         """Return the keys of the available image topics: first Studio's own network, then other networks."""
@@ -137,7 +139,7 @@ class ImagePanel(PanelWidget):
             self._restore_view_of(name)
         self._topic = name
         self.view.clear()
-        self.points.set_image_topic(name)
+        self.point_bar.set_image_topic(name)
         self.freeze.setChecked(False)
         self.set_title(_("Image"), topic_label(name))
         if name:
@@ -152,8 +154,10 @@ class ImagePanel(PanelWidget):
         self._close_stream()
         self._stream, self._revision = None, (-1, -1)
         self.overlays.restart()
-        plays = self.session.replay is not None  # Space plays and pauses the replay in this case
-        self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
+        is_replaying = self.session.replay is not None  # Space plays and pauses the replay in this case
+        self.actions_of["freeze"].setShortcut(
+            QKeySequence() if is_replaying else QKeySequence(Qt.Key.Key_Space)
+        )
         if topic:
             self.show_topic(topic)
 
@@ -170,10 +174,10 @@ class ImagePanel(PanelWidget):
         if revision != self._revision:
             self._revision = revision
             topics = self.topics()
-            self.choose.setVisible(bool(topics))
+            self.choose_button.setVisible(bool(topics))
             if not self._topic and topics:
                 self.show_topic(topics[0])
-        self.points.refresh()
+        self.point_bar.refresh()
         if self._stream is None:
             return
         self._watch_robot()
@@ -220,15 +224,15 @@ class ImagePanel(PanelWidget):
         if self._has_image is has_image:
             return
         self._has_image = has_image
-        self.pages.setCurrentWidget(self.shown if has_image else self.empty)
+        self.pages.setCurrentWidget(self.content if has_image else self.empty)
         self.actions_of.set_enabled(has_image)
         self._fit_title()
 
     def _fit_title(self) -> None:
         # Buttons that don't fit are available in the "more" menu.
-        for button in (self.freeze, self.tune, self.layers):
+        for button in (self.freeze, self.style_button, self.layers_button):
             button.setVisible(self._has_image is True)
-        for button in (self.fit, self.keep):
+        for button in (self.fit_button, self.save_button):
             button.setVisible(
                 self._has_image is True and self.width() >= self.theme.scaled(ALL_BUTTONS_WIDTH)
             )
@@ -243,15 +247,15 @@ class ImagePanel(PanelWidget):
         return self._topic if self.view.picture is None else ""
 
     def blockers(self) -> list[Blocker]:
-        is_held = self.freeze.isChecked()
-        return [paused_blocker(self.title(), lambda: self.freeze.setChecked(False))] if is_held else []
+        is_frozen = self.freeze.isChecked()
+        return [paused_blocker(self.title(), lambda: self.freeze.setChecked(False))] if is_frozen else []
 
     def _toggle_freeze(self) -> None:
         self.freeze.setChecked(not self.freeze.isChecked())
 
-    def _publish_points(self, *, on: bool) -> None:
-        self.points.set_active(on)
-        self.actions_of["point"].setChecked(on)
+    def _publish_points(self, *, is_active: bool) -> None:
+        self.point_bar.set_active(is_active)
+        self.actions_of["point"].setChecked(is_active)
 
     def _set_frozen(self, is_frozen: bool) -> None:
         self.actions_of["freeze"].setChecked(is_frozen)
@@ -265,7 +269,7 @@ class ImagePanel(PanelWidget):
             self.job.save(message)
 
     def save_sequence(self) -> None:
-        """Start to record the images or, if a recording is open, show the export of its images."""
+        """Start recording the images or, if a recording is open, show the export of its images."""
         replay = self.session.replay
         if replay is None:
             self.context.run(f"record.topic:{self._topic}")
@@ -313,12 +317,12 @@ class ImagePanel(PanelWidget):
         for name in self.overlays.choices():
             action = menu.addAction(plain.escape_menu_text(topic_label(name)))
             action.setCheckable(True)
-            action.setChecked(name in self.overlays.selected)
-            action.toggled.connect(lambda on, name=name: self.overlays.set_visible(name, on))
+            action.setChecked(name in self.overlays.selected_topics)
+            action.toggled.connect(lambda is_visible, name=name: self.overlays.set_visible(name, is_visible))
         if menu.isEmpty():
             menu.addAction(_("No topic has image annotations")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        open_below(menu, self.layers)
+        open_below(menu, self.layers_button)
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
@@ -330,23 +334,25 @@ class ImagePanel(PanelWidget):
         if menu.isEmpty():  # Qt shows no empty menu, and would never delete it
             menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        open_below(menu, self.choose)
+        open_below(menu, self.choose_button)
 
     def more_actions(self) -> list[QAction]:
-        for action in (self._inspect_action, self._sequence):
+        for action in (self._inspect_action, self._sequence_action):
             action.setEnabled(bool(self._topic))
-        plays = self.session.replay is not None
-        self._sequence.setText(_("Save the sequence as files") if plays else _("Record a sequence"))
-        return [*self.actions_of.menu_actions(), self._line, self._sequence, self._inspect_action]
+        is_replaying = self.session.replay is not None
+        self._sequence_action.setText(
+            _("Save the sequence as files") if is_replaying else _("Record a sequence")
+        )
+        return [*self.actions_of.menu_actions(), self._separator, self._sequence_action, self._inspect_action]
 
     def save_state(self) -> dict[str, object]:
         return {
             "topic": self._topic,
             "place": self.view.placement.to_json(),
             "look": self.style_bar.picture_style.to_json(),
-            "tune": self.tune.isChecked(),
-            "layers": list(self.overlays.selected),
-            "point": self.points.to_json(),
+            "tune": self.style_button.isChecked(),
+            "layers": list(self.overlays.selected_topics),
+            "point": self.point_bar.to_json(),
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -357,13 +363,13 @@ class ImagePanel(PanelWidget):
         self.actions_of.update_checks()
         self._set_picture_style(style := parse_style(state.get("look")))
         self.style_bar.show_style(style)
-        self.tune.setChecked(state.get("tune") is True)
-        self.points.restore(state.get("point"))
-        self.actions_of["point"].setChecked(self.points.is_on)
+        self.style_button.setChecked(state.get("tune") is True)
+        self.point_bar.restore(state.get("point"))
+        self.actions_of["point"].setChecked(self.point_bar.is_on)
         layers = state.get("layers")
         for name in layers if isinstance(layers, list) else ():
             if isinstance(name, str):
-                self.overlays.set_visible(name, visible=True)
+                self.overlays.set_visible(name, is_visible=True)
 
     def _close_robot_watch(self) -> None:
         if self._watch is not None:
@@ -374,7 +380,7 @@ class ImagePanel(PanelWidget):
         return (self._stream, self._watch, *self.overlays.suspendables())
 
     def dispose(self) -> None:
-        self.points.dispose()
+        self.point_bar.dispose()
         self._close_stream()
         self.overlays.close()
 

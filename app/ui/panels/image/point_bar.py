@@ -65,25 +65,25 @@ class PointBar(QWidget):
     def __init__(self, context: PanelContext, view: ClickablePicture) -> None:
         super().__init__()
         self._context, self._view, self._acting = context, view, context.session.acting
-        self._pictures = ""
+        self._image_topic = ""
         self.is_on = False
         # armed for this turn of the switch and this target
-        self._armed: tuple[int, Target] | None = None
-        self.count = self.subscriber_count = 0
+        self._armed_target: tuple[int, Target] | None = None
+        self.sent_count = self.subscriber_count = 0
         theme = context.theme
-        self.topic = QLineEdit()
-        self.topic.setAccessibleName(_("Topic for points"))
-        self.topic.setMaxLength(MAX_TOPIC_LENGTH)
-        self.topic.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
-        self.topic.setProperty("focusRadius", theme.radius("control"))
-        self.topic.textEdited.connect(lambda _text: self._target_changed())
-        FieldContextMenu(theme, self.topic)
-        self.kind = ComboBox(theme, [(each, each) for each in MESSAGE_TYPES], name=_("Point type"))
+        self.topic_field = QLineEdit()
+        self.topic_field.setAccessibleName(_("Topic for points"))
+        self.topic_field.setMaxLength(MAX_TOPIC_LENGTH)
+        self.topic_field.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
+        self.topic_field.setProperty("focusRadius", theme.radius("control"))
+        self.topic_field.textEdited.connect(lambda _text: self._target_changed())
+        FieldContextMenu(theme, self.topic_field)
+        self.type_choice = ComboBox(theme, [(each, each) for each in MESSAGE_TYPES], name=_("Point type"))
         self.close_button = IconButton(theme, "x", _("Stop publishing points"), size=26)
         self.close_button.clicked.connect(self.exited)
-        self.problem = label("", "small", role="error", wrap=True)
-        self.problem.setMinimumWidth(0)
-        self.problem.setContentsMargins(12, 0, 12, 6)
+        self.problem_label = label("", "small", role="error", wrap=True)
+        self.problem_label.setMinimumWidth(0)
+        self.problem_label.setContentsMargins(12, 0, 12, 6)
         self.arm_button = Button(theme, "", "lock", size="small")
         self.arm_button.allow_shrinking()
         self.arm_button.clicked.connect(self._arm_clicked)
@@ -96,16 +96,16 @@ class PointBar(QWidget):
         row = QWidget()
         flow = Flow(row, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 6, 6)
-        about = label(_("Publish clicked points to"), "small", role="textSecondary")
-        about.setToolTip(plain.tip(_(KEYBOARD_HINT)))
-        flow.addWidget(about)
-        flow.add_elastic(self.topic, greedy=True)
-        for widget in (self.kind, self.arm_button, self.close_button):
+        description = label(_("Publish clicked points to"), "small", role="textSecondary")
+        description.setToolTip(plain.tip(_(KEYBOARD_HINT)))
+        flow.addWidget(description)
+        flow.add_elastic(self.topic_field, is_greedy=True)
+        for widget in (self.type_choice, self.arm_button, self.close_button):
             flow.addWidget(widget)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for part in (row, self.problem, self.strip):
+        for part in (row, self.problem_label, self.strip):
             column.addWidget(part)
 
     # -- display ------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ class PointBar(QWidget):
     @property
     def target(self) -> Target:
         """Topic to which points are published."""
-        return Target("topic", self.topic.text().strip() or self.topic.placeholderText())
+        return Target("topic", self.topic_field.text().strip() or self.topic_field.placeholderText())
 
     @property
     def is_armed(self) -> bool:
@@ -122,7 +122,7 @@ class PointBar(QWidget):
         return (
             self.is_on
             and not self._context.session.is_replaying
-            and self._armed == (arming.turn, target)
+            and self._armed_target == (arming.turn, target)
             and arming.allows(target)
         )
 
@@ -134,7 +134,7 @@ class PointBar(QWidget):
         acting = self._acting
         is_waiting = acting.arming.is_on and not self.is_armed and acting.question is None
         self.arm_button.setVisible(
-            is_waiting and not self.problem.text() and not self._context.session.is_replaying
+            is_waiting and not self.problem_label.text() and not self._context.session.is_replaying
         )
         self.strip.refresh()
 
@@ -144,41 +144,43 @@ class PointBar(QWidget):
         Args:
             key: Key of the topic, or "".
         """
-        if key != self._pictures:
-            self._pictures = key
+        if key != self._image_topic:
+            self._image_topic = key
             self._view.discard_click()
-            self.topic.setPlaceholderText(default_topic(split_key(key)[1]) if key else "")
+            self.topic_field.setPlaceholderText(default_topic(split_key(key)[1]) if key else "")
             self._target_changed()
 
     def _target_changed(self) -> None:
         # Another target has to be armed again.
         self._disarm()
-        self.count = self.subscriber_count = 0
+        self.sent_count = self.subscriber_count = 0
         try:
             check_topic(self.target.name)
             problem = ""
         except BadTopicError as error:
-            problem = str(error) if self._pictures else ""
-        self.problem.setText(problem)
-        self.problem.setVisible(bool(problem))
+            problem = str(error) if self._image_topic else ""
+        self.problem_label.setText(problem)
+        self.problem_label.setVisible(bool(problem))
         self.arm_button.set_label(_("Send points"), "lock")
         self.arm_button.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
         self.refresh()
 
     def _count_text(self) -> str:
-        if not self.count:
+        if not self.sent_count:
             return ""
-        text = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
+        text = ngettext("{count} point sent", "{count} points sent", self.sent_count).format(
+            count=self.sent_count
+        )
         return f"{text}, {subscribers_text(self.subscriber_count)}"
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def set_active(self, on: bool) -> None:
+    def set_active(self, is_on: bool) -> None:
         """Show or hide the bar. A visible bar must be armed before clicks are published."""
-        if on != self.is_on:
-            self.is_on = on
-            self.setVisible(on)
-            if not on:
+        if is_on != self.is_on:
+            self.is_on = is_on
+            self.setVisible(is_on)
+            if not is_on:
                 self._disarm()
             self.refresh()
 
@@ -187,15 +189,15 @@ class PointBar(QWidget):
 
         Return the reason if arming is not possible, or "".
         """
-        if self.problem.text():
-            return self.problem.text()
+        if self.problem_label.text():
+            return self.problem_label.text()
         arming, target = self._acting.arming, self.target
         error = self._acting.arm() if not arming.is_on else ""
         return error or self._acting.allow(target, partial(self._arming_confirmed, arming.turn, target))
 
     def _arming_confirmed(self, turn: int, target: Target) -> None:
         if self.is_on and target == self.target:
-            self._armed = (turn, target)
+            self._armed_target = (turn, target)
             self.refresh()
 
     def _arm_clicked(self) -> None:
@@ -205,23 +207,23 @@ class PointBar(QWidget):
 
     def _disarm(self) -> None:
         # Disarms this panel's target only.
-        armed, self._armed = self._armed, None
+        armed_target, self._armed_target = self._armed_target, None
         arming = self._acting.arming
-        if armed is None or armed[0] != arming.turn:
+        if armed_target is None or armed_target[0] != arming.turn:
             return
-        if set(arming.targets) <= {armed[1]}:
+        if set(arming.targets) <= {armed_target[1]}:
             self._acting.disarm()
         else:
-            self._acting.deny(armed[1])
+            self._acting.deny(armed_target[1])
 
     def send(self, point: PicturePoint) -> None:
         """Publish a clicked point."""
         if not self.is_armed:
             return
-        payload = point.payload(split_key(self._pictures)[1], self.kind.value)
+        payload = point.payload(split_key(self._image_topic)[1], self.type_choice.value)
         name = _("Point ({x}, {y})").format(x=point.x, y=point.y)
         order = SendOrder(
-            "image", name, self.target.name, self.kind.value, lambda: payload, source=str(payload),
+            "image", name, self.target.name, self.type_choice.value, lambda: payload, source=str(payload),
             origin="image", on_result=partial(self._handle_result, point),
         )  # fmt: skip
         error = self._acting.send_order(order)
@@ -232,14 +234,14 @@ class PointBar(QWidget):
         if result.kind != "sent":
             self._context.show_toast(result.message)
         elif result.order.target == self.target:
-            self.count, self.subscriber_count = self.count + 1, result.subscriber_count
+            self.sent_count, self.subscriber_count = self.sent_count + 1, result.subscriber_count
             self._view.show_mark(point)
 
     # -- saved state --------------------------------------------------------------------------------------
 
     def to_json(self) -> dict[str, object]:
         """Return the state for the layout, without the arming."""
-        return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
+        return {"on": self.is_on, "topic": self.topic_field.text().strip(), "type": self.type_choice.value}
 
     def restore(self, saved: object) -> None:
         """Restore a state returned by `to_json`. Invalid entries are ignored, and nothing is armed."""
@@ -247,9 +249,9 @@ class PointBar(QWidget):
             return
         topic, kind = saved.get("topic"), saved.get("type")
         if isinstance(topic, str):
-            self.topic.setText(topic[:MAX_TOPIC_LENGTH])
+            self.topic_field.setText(topic[:MAX_TOPIC_LENGTH])
         if isinstance(kind, str):
-            self.kind.set_value(kind)
+            self.type_choice.set_value(kind)
         self._target_changed()
         self.set_active(saved.get("on") is True)
 

@@ -40,7 +40,7 @@ class SnapshotJob(QObject):
 
     saved = Signal(str)  # path of the file
     copied = Signal(QImage)
-    failed = Signal(str)  # error sentence
+    failed = Signal(str)  # error message
 
     def __init__(self, parent: QObject, folder: Callable[[], Path] = snapshots.folder) -> None:
         super().__init__(parent)
@@ -82,7 +82,7 @@ class SnapshotJob(QObject):
             self._timer.start()
 
     def _run(self, job: Callable[[], JobResult], results: queue.SimpleQueue[JobResult]) -> None:
-        # Runs in the background thread. Exceptions are returned as a sentence.
+        # Runs in the background thread. An exception is returned as an error message.
         try:
             result: JobResult = job()
         except NepError as error:

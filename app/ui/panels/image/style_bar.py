@@ -49,34 +49,34 @@ class StyleBar(QWidget):
     def __init__(self, theme: Theme, picture: Callable[[], Picture | None]) -> None:
         super().__init__()
         self._picture = picture
-        self._of_numbers = True
+        self._has_one_channel = True
         self.picture_style = PLAIN
         self.brightness = self._make_slider(theme, _("Brightness"), self._set_brightness)
         self.contrast = self._make_slider(theme, _("Contrast"), self._set_contrast)
         maps = [(name, _(COLOUR_MAP_NAMES[name])) for name in COLOUR_MAPS]
         names = [("", _("Default colours")), *maps]
-        self.colours = ComboBox(theme, names, name=_("Colour map"))
-        self.colours.activated.connect(
-            lambda _at: self._apply(replace(self.picture_style, colours=self.colours.value))
+        self.colour_map_choice = ComboBox(theme, names, name=_("Colour map"))
+        self.colour_map_choice.activated.connect(
+            lambda _at: self._apply(replace(self.picture_style, colour_map=self.colour_map_choice.value))
         )
-        self.own_range = ToggleButton(theme, _("Custom range"), "ruler")
-        self.own_range.toggled.connect(self._set_manual_range)
-        self.low, self.high = (_RangeEdit(theme, None, None) for _end in range(2))
+        self.range_button = ToggleButton(theme, _("Custom range"), "ruler")
+        self.range_button.toggled.connect(self._set_manual_range)
+        self.low_field, self.high_field = (_RangeEdit(theme, None, None) for _end in range(2))
         for field, name in (
-            (self.low, _("Value of the first colour")),
-            (self.high, _("Value of the last colour")),
+            (self.low_field, _("Value of the first colour")),
+            (self.high_field, _("Value of the last colour")),
         ):
             field.setAccessibleName(name)
             field.setFixedWidth(92)
-            field.number.connect(lambda _value: self._apply_range())
-        self.again = Button(theme, _("Original"), "undo-2", size="small")
-        self.again.clicked.connect(lambda: self._apply(PLAIN, show=True))
+            field.number_entered.connect(lambda _value: self._apply_range())
+        self.reset_button = Button(theme, _("Reset"), "undo-2", size="small")
+        self.reset_button.clicked.connect(lambda: self._apply(PLAIN, updates_fields=True))
         flow = Flow(self, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 12, 6)
         parts: tuple[QWidget, ...] = (
             label(_("Brightness"), "small", role="textSecondary"), self.brightness,
             label(_("Contrast"), "small", role="textSecondary"), self.contrast,
-            self.colours, self.own_range, self.low, self.high, self.again,
+            self.colour_map_choice, self.range_button, self.low_field, self.high_field, self.reset_button,
         )  # fmt: skip
         for part in parts:
             flow.addWidget(part)
@@ -102,12 +102,12 @@ class StyleBar(QWidget):
             slider.setValue(value)
             slider.blockSignals(False)
             slider.update()
-        self.colours.set_value(style.colours)
+        self.colour_map_choice.set_value(style.colour_map)
         has_range = style.low is not None and style.high is not None
-        self.own_range.blockSignals(True)
-        self.own_range.setChecked(has_range)
-        self.own_range.blockSignals(False)
-        for field, end in ((self.low, style.low), (self.high, style.high)):
+        self.range_button.blockSignals(True)
+        self.range_button.setChecked(has_range)
+        self.range_button.blockSignals(False)
+        for field, end in ((self.low_field, style.low), (self.high_field, style.high)):
             field.setVisible(has_range)
             if end is not None:
                 field.show_number(end)
@@ -115,16 +115,16 @@ class StyleBar(QWidget):
     def refresh(self) -> None:
         """Enable only the settings that affect the current image."""
         picture = self._picture()
-        of_numbers = picture is None or picture.has_one_channel
-        if of_numbers != self._of_numbers:
-            self._of_numbers = of_numbers
-            for part in (self.colours, self.own_range, self.low, self.high):
-                part.setEnabled(of_numbers)
+        has_one_channel = picture is None or picture.has_one_channel
+        if has_one_channel != self._has_one_channel:
+            self._has_one_channel = has_one_channel
+            for part in (self.colour_map_choice, self.range_button, self.low_field, self.high_field):
+                part.setEnabled(has_one_channel)
 
-    def _apply(self, style: PictureStyle, *, show: bool = False) -> None:
-        if show:
+    def _apply(self, style: PictureStyle, *, updates_fields: bool = False) -> None:
+        if updates_fields:
             self.show_style(style)
-        if style != self.picture_style or show:
+        if style != self.picture_style or updates_fields:
             self.picture_style = style
             self.changed.emit(style)
 
@@ -134,18 +134,19 @@ class StyleBar(QWidget):
     def _set_contrast(self, value: int) -> None:
         self._apply(replace(self.picture_style, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
 
-    def _set_manual_range(self, on: bool) -> None:
+    def _set_manual_range(self, is_enabled: bool) -> None:
         picture = self._picture()
         scale = picture.scale if picture is not None else None
         low, high = (scale.low, scale.high) if scale is not None else (0.0, 255.0)
         low, high = (low, high) if low < high else (low, low + 1)
         self._apply(
-            replace(self.picture_style, low=low if on else None, high=high if on else None), show=True
+            replace(self.picture_style, low=low if is_enabled else None, high=high if is_enabled else None),
+            updates_fields=True,
         )
 
     def _apply_range(self) -> None:
         try:
-            low, high = (parse_number(field.text()) for field in (self.low, self.high))
+            low, high = (parse_number(field.text()) for field in (self.low_field, self.high_field))
         except ValueError:  # a field is incomplete; it marks itself
             return
         if low < high:

@@ -78,12 +78,12 @@ class InspectorActions(QObject):
             action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             if icon:
                 action.setIcon(theme.icon(icon))
-            action.triggered.connect(lambda _on=False, do=callback: do())
+            action.triggered.connect(lambda _on=False, callback=callback: callback())
             (body.tree if key.endswith("C") else panel).addAction(action)  # text fields have their own Ctrl+C
             self._actions.append(action)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        # Ctrl+F finds in the panel; without this shortcut the window's would search the blocks.
+        # Ctrl+F searches the panel; without this filter, the window's shortcut would search the blocks.
         if isinstance(event, QKeyEvent) and event.keyCombination() == FIND_KEY:
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()
@@ -128,7 +128,10 @@ class InspectorActions(QObject):
         if path:
             self._plot(path)
         elif node is not None:
-            self._toast(_("{path} isn't a number, text or boolean").format(path=node.path))
+            template = _(
+                "Can't plot {path}. Only numbers, texts, booleans and lists of numbers can be plotted."
+            )
+            self._toast(template.format(path=node.path))
 
     def copy_message(self) -> None:
         """Copy the whole message to the clipboard.

@@ -37,15 +37,16 @@ class CompareStrip(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self._with = ""
         self.text_label = ElidedLabel("small", "textSecondary")
-        self.only = IconButton(theme, "filter", _("Show changes only"), checkable=True, size=24)
-        self.only.toggled.connect(self.changes_only_toggled)
+        self.changes_only_button = IconButton(
+            theme, "filter", _("Show changes only"), checkable=True, size=24
+        )
+        self.changes_only_button.toggled.connect(self.changes_only_toggled)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 8, 3)
         row.setSpacing(6)
         row.addWidget(self.text_label, 1)
-        row.addWidget(self.only)
+        row.addWidget(self.changes_only_button)
         self.hide()
 
     def set_summary(self, compared_with: str, counts: Counts, is_complete: bool) -> None:
@@ -67,7 +68,7 @@ class InspectorBody(QWidget):
     """Contents of the inspector below its title bar.
 
     Args:
-        looked_through: Returns the value that the find bar searches, and the index of a large message or
+        search_source: Returns the value that the find bar searches, and the index of a large message or
             None.
         toast: Shows a toast.
     """
@@ -75,16 +76,16 @@ class InspectorBody(QWidget):
     def __init__(
         self,
         theme: Theme,
-        looked_through: Callable[[], tuple[object, JsonIndex | None]],
+        search_source: Callable[[], tuple[object, JsonIndex | None]],
         toast: Callable[[str], None],
     ) -> None:
         super().__init__()
-        self._waiting = ""
+        self._waiting_text = ""
         self.model = TreeModel()
         self.tree = TreeView(theme, self.model)
         self.tree.setAccessibleName(_("Newest message"))
         self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.finder = FindBar(theme, looked_through)
+        self.finder = FindBar(theme, search_source)
         self.finder.match_selected.connect(self.reveal)
         self.finder.field.exited.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
         modes = [("tree", _("Tree"), None), ("table", _("Table"), None), ("raw", _("Raw"), None)]
@@ -93,8 +94,8 @@ class InspectorBody(QWidget):
         self.compare = IconButton(theme, "equal", compare, checkable=True, size=26)
         self.strip = CompareStrip(theme)
         self.query = QueryStrip()
-        self.sentence = label("", "small", role="warn", wrap=True)
-        self.sentence.setContentsMargins(12, 6, 12, 6)
+        self.error_label = label("", "small", role="warn", wrap=True)
+        self.error_label.setContentsMargins(12, 6, 12, 6)
         self.bytes = HexView(theme)
         self.objects = ObjectsView(theme, toast)
         self.empty = EmptyState(theme, "list-tree", "", "")
@@ -112,14 +113,14 @@ class InspectorBody(QWidget):
         bar.addWidget(self.finder, 1)
         bar.addWidget(self.compare)
         bar.addWidget(self.mode)
-        self.line = Separator(theme)
+        self.separator = Separator(theme)
         self.pages = QStackedWidget()
         for page in (self.empty, self.large, self.tree, self.bytes, self.objects):
             self.pages.addWidget(page)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget in (self.bar, self.line, self.query, self.strip, self.sentence):
+        for widget in (self.bar, self.separator, self.query, self.strip, self.error_label):
             column.addWidget(widget)
         column.addWidget(self.pages, 1)
         column.addWidget(self.history)
@@ -130,40 +131,40 @@ class InspectorBody(QWidget):
         """Index of the current page."""
         return self.pages.currentIndex()
 
-    def show_page(self, page: int, *, comparing: bool) -> None:
+    def show_page(self, page: int, *, is_comparing: bool) -> None:
         """Show a page and the widgets that belong to it.
 
         Args:
             page: `NOTHING`, `LARGE`, `TREE`, `RAW` or `TABLE`.
-            comparing: True if the tree shows the differences to another message.
+            is_comparing: True if the tree shows the differences to another message.
         """
-        text = self.sentence.text() if page == RAW else ""
-        self.sentence.setText(text)
-        self.sentence.setVisible(bool(text))
+        text = self.error_label.text() if page == RAW else ""
+        self.error_label.setText(text)
+        self.error_label.setVisible(bool(text))
         self.pages.setCurrentIndex(page)
-        for widget in (self.bar, self.line, self.foot):
+        for widget in (self.bar, self.separator, self.foot):
             widget.setVisible(page in MODES)
-        self.query.update_visibility(tree=page in {TREE, TABLE})
-        self.strip.setVisible(page == TREE and comparing)
+        self.query.update_visibility(can_show_results=page in {TREE, TABLE})
+        self.strip.setVisible(page == TREE and is_comparing)
         self.foot.legend.setVisible(page == TREE)
         if page in MODES:
             self.mode.set_value(MODES[page])
 
-    def show_waiting(self, topic: str, published: bool, doctor_action: EmptyAction) -> None:
+    def show_waiting(self, topic: str, has_publisher: bool, doctor_action: EmptyAction) -> None:
         """Show the empty state for a topic whose first message has not arrived yet.
 
         Args:
             topic: Name of the topic.
-            published: True if the topic has a publisher.
+            has_publisher: True if the topic has a publisher.
             doctor_action: Action that opens the connection doctor.
         """
-        if published:
+        if has_publisher:
             text = _("The next message on {topic} appears here.")
         else:
-            text = _("No publisher now. The next message on {topic} appears here.")
+            text = _("There is no publisher at the moment. The next message on {topic} appears here.")
         text = text.format(topic=topic)
-        if text != self._waiting:
-            self._waiting = text
+        if text != self._waiting_text:
+            self._waiting_text = text
             self.empty.set_texts(_("No message yet"), text)
             self.empty.set_actions([doctor_action])
 
@@ -176,8 +177,8 @@ class InspectorBody(QWidget):
             doctor_action: Action that opens the connection doctor.
         """
         text = _("{topic}: {reason}.").format(topic=topic, reason=reason)
-        if text != self._waiting:
-            self._waiting = text
+        if text != self._waiting_text:
+            self._waiting_text = text
             self.empty.set_texts(_("Can't decode the messages"), text)
             self.empty.set_actions([doctor_action])
 
@@ -189,9 +190,9 @@ class InspectorBody(QWidget):
             choose: Lets the user select a topic.
             doctor_action: Action that opens the connection doctor.
         """
-        self._waiting = ""
+        self._waiting_text = ""
         if topic:
-            self.show_waiting(topic, published=True, doctor_action=doctor_action)
+            self.show_waiting(topic, has_publisher=True, doctor_action=doctor_action)
         else:
             self.empty.set_texts(_("Nothing selected"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])

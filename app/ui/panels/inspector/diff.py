@@ -76,8 +76,8 @@ def child_diffs(
     """Return the first children of a value with their differences.
 
     Removed children follow the present ones, with their old values. All children of an added value count as
-    added, and all children of a removed value as removed. If an object became a list or vice versa, or was
-    no container before, all of its children count as added.
+    added, and all children of a removed value as removed. If an object became a list or vice versa, or
+    wasn't a container before, all of its children count as added.
 
     Args:
         value: Object or list.
@@ -118,10 +118,10 @@ def count_changes(value: object, base: object, max_values: int = MAX_COUNTED_VAL
         return counts, True
     is_complete = True
     waiting: list[tuple[object, object, Mark]] = [(value, base, mark_of(value, base))]
-    looked = 0
-    while waiting and looked < max_values:
+    compared_count = 0
+    while waiting and compared_count < max_values:
         current, before, mark = waiting.pop()
-        looked += 1
+        compared_count += 1
         if mark == "changed" and is_container(current) and is_container(before):
             parts, _total = child_diffs(current, before, mark, max_values, changes_only=True)
             is_complete = is_complete and max(size_of(current), size_of(before)) <= MAX_CHILDREN
@@ -187,14 +187,14 @@ def _are_equal(before: object, after: object) -> bool:
         return before == after
     if size_of(before) != size_of(after):
         return False
-    serialized = _serialized(before)
-    if serialized != _serialized(after):
+    serialized = _serialize(before)
+    if serialized != _serialize(after):
         return False
     may_have_nan = isinstance(serialized, bytes) and b"null" in serialized  # orjson serializes NaN as null
-    return not may_have_nan or _with_nan(before) == _with_nan(after)
+    return not may_have_nan or _dump_with_nan(before) == _dump_with_nan(after)
 
 
-def _with_nan(value: object) -> str:
+def _dump_with_nan(value: object) -> str:
     # JSON text with NaN; "" if keys of several types can't be sorted or the nesting is too deep.
     try:
         return json.dumps(value, sort_keys=True)
@@ -202,9 +202,9 @@ def _with_nan(value: object) -> str:
         return ""
 
 
-def _serialized(value: object) -> object:
-    # The serialized form compares as JSON does; values that JSON lacks (bytes in msgpack) are returned
-    # unchanged.
+def _serialize(value: object) -> object:
+    # Serialized values compare as JSON does: true isn't 1, and the order of keys is ignored. Values that
+    # JSON lacks (bytes in msgpack) are returned unchanged.
     try:
         return orjson.dumps(value, option=orjson.OPT_SORT_KEYS | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError):

@@ -77,9 +77,9 @@ class FindField(SearchField):
             painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        is_backward = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F3}:
-            self.step_requested.emit(-1 if back else 1)
+            self.step_requested.emit(-1 if is_backward else 1)
         elif event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
         elif event.key() == Qt.Key.Key_Down and has_no_modifiers(event):
@@ -99,32 +99,31 @@ class FindBar(QWidget):
 
     Signals:
         match_selected: Path of the selected match.
-        query_changed: The text if it begins with ``$``, else "".
+        query_changed: Query (a text that begins with ``$``), or "" if the text isn't a query.
     """
 
     match_selected = Signal(object)
     query_changed = Signal(str)
-    """Emitted with the query when the user typed one (a text that begins with ``$``), else with ""."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
         super().__init__()
         self._source = source
         self._matches: list[Path] | list[int] | None = None
         self._index: JsonIndex | None = None
-        self._more = False
+        self._has_more = False
         self._match_index = -1
         self.field = FindField(theme)
         self.field.textChanged.connect(self.search)
         self.field.step_requested.connect(self.step)
-        self.before = IconButton(theme, "chevron-up", _("Previous"), "Shift+Return", size=22)
-        self.after = IconButton(theme, "chevron-down", _("Next"), "Return", size=22)
-        self.before.clicked.connect(lambda: self.step(-1))
-        self.after.clicked.connect(lambda: self.step(1))
+        self.previous_button = IconButton(theme, "chevron-up", _("Previous"), "Shift+Return", size=22)
+        self.next_button = IconButton(theme, "chevron-down", _("Next"), "Return", size=22)
+        self.previous_button.clicked.connect(lambda: self.step(-1))
+        self.next_button.clicked.connect(lambda: self.step(1))
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(1)
         row.addWidget(self.field, 1)
-        for button in (self.before, self.after):
+        for button in (self.previous_button, self.next_button):
             row.addWidget(button)
             button.hide()
         self.setFocusProxy(self.field)
@@ -139,7 +138,7 @@ class FindBar(QWidget):
         self._match_index = -1
         self._matches = []
         is_query = self.is_query
-        for button in (self.before, self.after):
+        for button in (self.previous_button, self.next_button):
             button.setVisible(bool(text) and not is_query)
         if is_query:
             self.field.show_count("")
@@ -187,11 +186,11 @@ class FindBar(QWidget):
             matches = find_in_text(self._index, text, MAX_MATCHES + 1)
         else:
             matches = list(islice(search(value, text), MAX_MATCHES + 1))
-        self._more = len(matches) > MAX_MATCHES
+        self._has_more = len(matches) > MAX_MATCHES
         self._matches = matches[:MAX_MATCHES]
 
     def _update_count(self, *, is_invalid: bool) -> None:
-        total = f"{len(self.matches)}{'+' if self._more else ''}"
+        total = f"{len(self.matches)}{'+' if self._has_more else ''}"
         text = _("{place} of {total}") if self.matches else pgettext("found", "none")
         text = text.format(place=self._match_index + 1, total=total)
         self.field.show_count(text if self.field.text() else "")

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 _MIN_DISPLAYED_LATENCY_S = 0.0001
-"""Minimum uncertainty in s to show, because a smaller one would be displayed as zero."""
+"""Smallest uncertainty in s to display; smaller ones would be rounded to zero."""
 
 
 def message_info(
-    message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, recorded: bool = False
+    message: Message, since_ns: int = 0, network: NetworkKind | None = None, *, is_recorded: bool = False
 ) -> str:
     """Format the properties of a message, such as ``seq 18 204   412 B   latency 0.6 ms``.
 
@@ -37,15 +37,15 @@ def message_info(
         message: Message with the properties measured on arrival.
         since_ns: Start of the subscription in ns since 1970. A latched message that was sent before
             this time shows its age instead of a latency.
-        network: Kind of the topic's network; None for Studio's own network. The text mentions if
-            this network doesn't report sequence numbers or latency.
-        recorded: True to show the time of day instead of the latency.
+        network: Kind of the topic's network; None for Studio's own network. The text says so if this
+            network doesn't report sequence numbers or latency.
+        is_recorded: True to show the time of day instead of the latency.
     """
     parts = [size_text(message.size_bytes)]
     if message.seq is not None:
         parts.insert(0, _("seq {number}").format(number=group_digits(message.seq)))
     if message.stamp_ns is not None:
-        if recorded:
+        if is_recorded:
             parts.append(_("sent {clock}").format(clock=clock_text(min(message.stamp_ns, 2**62))))
         elif message.is_latched and message.stamp_ns < since_ns:
             age_s = (time.time_ns() - message.stamp_ns) / 1e9

@@ -49,27 +49,27 @@ class HexView(QAbstractScrollArea):
 
     def text(self) -> str:
         """Return all lines as text."""
-        count = self.per_line()
+        count = self.bytes_per_line()
         return "\n".join(
             "  ".join(hex_line(self._data, offset, count)) for offset in range(0, len(self._data), count)
         )
 
-    def per_line(self) -> int:
+    def bytes_per_line(self) -> int:
         """Return the number of bytes per line at the current width."""
-        sign = QFontMetricsF(self._theme.font("code")).horizontalAdvance("0")
+        char_width = QFontMetricsF(self._theme.font("code")).horizontalAdvance("0")
         return (
             WIDE_BYTES
-            if self.viewport().width() >= (6 + WIDE_BYTES * 4 + 3) * sign + 2 * MARGIN
+            if self.viewport().width() >= (6 + WIDE_BYTES * 4 + 3) * char_width + 2 * MARGIN
             else NARROW_BYTES
         )
 
-    def _height(self) -> int:
+    def _line_height(self) -> int:
         return round(self._theme.scaled(20))
 
     def _update_scroll_range(self) -> None:
-        lines = -(-len(self._data) // self.per_line())
+        lines = -(-len(self._data) // self.bytes_per_line())
         bar = self.verticalScrollBar()
-        bar.setPageStep(max(1, self.viewport().height() // self._height()))
+        bar.setPageStep(max(1, self.viewport().height() // self._line_height()))
         bar.setRange(0, max(0, lines - bar.pageStep()))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -84,10 +84,10 @@ class HexView(QAbstractScrollArea):
         painter.fillRect(self.viewport().rect(), self._theme.colour("panel"))
         font = self._theme.font("code")
         painter.setFont(font)
-        sign = QFontMetricsF(font).horizontalAdvance("0")
-        count, height = self.per_line(), self._height()
+        char_width = QFontMetricsF(font).horizontalAdvance("0")
+        count, height = self.bytes_per_line(), self._line_height()
         first = self.verticalScrollBar().value()
-        columns = (MARGIN, MARGIN + 6 * sign, MARGIN + (7 + count * 3) * sign)
+        columns = (MARGIN, MARGIN + 6 * char_width, MARGIN + (7 + count * 3) * char_width)
         for row in range(self.viewport().height() // height + 1):
             offset = (first + row) * count
             if offset >= len(self._data):

@@ -142,8 +142,8 @@ class HistoryStrip(QWidget):
         state = (messages.first, messages.end, self.selected_number)
         is_needed = len(messages) > 1 or self.selected_number is not None
         interval_ticks = UPDATE_TICKS if is_busy else 2 * UPDATE_TICKS
-        due = at_once or is_needed is self.isHidden() or self._ticks >= interval_ticks
-        if state == self._last_state or not due:
+        is_due = at_once or is_needed is self.isHidden() or self._ticks >= interval_ticks
+        if state == self._last_state or not is_due:
             return
         self._last_state, self._ticks = state, 0
         show_when(self, is_needed)
@@ -175,5 +175,5 @@ class HistoryStrip(QWidget):
         return text
 
     def _slider_moved(self, index: int) -> None:
-        last = index >= len(self.history) - 1
-        self.select(None if last else self.history.first + index)
+        is_last = index >= len(self.history) - 1
+        self.select(None if is_last else self.history.first + index)

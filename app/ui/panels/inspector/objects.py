@@ -61,7 +61,7 @@ class ObjectsView(QWidget):
         self._requested_steps: Steps = ()
         self._steps: Steps | None = None
         self._columns: tuple[Steps, ...] = ()
-        self._sorted_at = 0.0
+        self._sorted_at_s = 0.0
         self._row_height = 26
         self.table: TableView[ObjectRow] | None = None
         self.text_label = ElidedLabel("small", "textSecondary")
@@ -70,7 +70,10 @@ class ObjectsView(QWidget):
         self.copy = IconButton(theme, "copy", _("Copy the table as CSV"), size=24)
         self.copy.clicked.connect(self.copy_csv)
         self.empty = EmptyState(
-            theme, "table-2", _("No lists of objects"), _("A table shows lists whose values are objects.")
+            theme,
+            "table-2",
+            _("No lists of objects"),
+            _("The table shows lists whose elements are objects."),
         )
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 8, 3)
@@ -123,7 +126,7 @@ class ObjectsView(QWidget):
         steps = self._find_list(value)
         if steps != self._steps:
             self._steps = steps
-            self._sorted_at = 0.0
+            self._sorted_at_s = 0.0
         items = value_at(value, steps) if steps is not None else MISSING
         self._show(rows_of(items), size_of(items), path_text(steps) if steps else "", now)
         self.choose.setVisible(True)
@@ -177,8 +180,8 @@ class ObjectsView(QWidget):
         table = self.table
         if table is None:
             return
-        if now - self._sorted_at >= SORT_INTERVAL_S or now < self._sorted_at:
-            self._sorted_at = now
+        if now - self._sorted_at_s >= SORT_INTERVAL_S or now < self._sorted_at_s:
+            self._sorted_at_s = now
             rows = table.order.sort(rows)
         else:
             positions = {row.name: number for number, row in enumerate(self._model.rows())}
@@ -240,7 +243,7 @@ class ObjectsView(QWidget):
 
     def _list_selected(self, steps: Steps) -> None:
         self.select_list(steps)
-        self.show_message(self._value, self._sorted_at)
+        self.show_message(self._value, self._sorted_at_s)
 
     def _show_menu(self, key: str, position: QPoint) -> None:
         menu = Menu(self._theme, self)
@@ -300,5 +303,5 @@ def _role(value: object) -> str:
 
 def _column_width(header: str, cell_texts: Sequence[str]) -> int:
     # Computed from the header with its sort arrow and the first rows.
-    letters = max([len(header) + 2, *(len(each) for each in cell_texts[:20])])
-    return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, letters * CHAR_WIDTH + COLUMN_PADDING))
+    char_count = max([len(header) + 2, *(len(each) for each in cell_texts[:20])])
+    return min(MAX_COLUMN_WIDTH, max(MIN_COLUMN_WIDTH, char_count * CHAR_WIDTH + COLUMN_PADDING))

@@ -1,4 +1,4 @@
-"""Rate limit for display updates: some at once, then ten per second."""
+"""Rate limit for display updates: a short burst, then ten per second."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class UpdateLimiter:
         self._tokens, self._refilled_s = self._capacity, 0.0
 
     def try_acquire(self, now_s: float) -> bool:
-        """Take a token if an update is allowed, and return True if it is.
+        """Return True and take a token if an update is allowed.
 
         Args:
             now_s: Monotonic time in s.
         """
-        grown = max(0.0, now_s - self._refilled_s) * self._hz
-        self._tokens, self._refilled_s = min(self._capacity, self._tokens + grown), now_s
+        refill = max(0.0, now_s - self._refilled_s) * self._hz
+        self._tokens, self._refilled_s = min(self._capacity, self._tokens + refill), now_s
         if self._tokens < 1:
             return False
         self._tokens -= 1

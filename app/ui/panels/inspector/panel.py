@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 MAX_EXPANDED_ROWS = 24
 FADE_REPAINT_HZ = 7.0  # lower than the rate of message updates, which paint the marks too
-BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
+PREVIOUS_MESSAGE, PINNED_MESSAGE = lazy("Previous message"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
@@ -50,15 +50,15 @@ class InspectorPanel(PanelWidget):
         self._topic = ""
         self._watch: Watch | None = None
         self._shown_message: Message | None = None
-        self._allowed: Message | None = None  # large message that the user asked to decode
+        self._requested_large_message: Message | None = None  # large message that the user asked to decode
         self._reading: ReadResult | None = None  # decoded message in the tree
         self._is_raw_mode = self._is_table_mode = False
         self._since_ns = 0  # start of the subscription
-        self._pace, self._fades = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
+        self._update_limiter, self._fade_limiter = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_REPAINT_HZ)
         self._info_cache: tuple[Message | None, str] = (None, "")
         self._value: object = None
-        self._before: object = NO_BASE  # previous value of the topic, for comparison
-        self._pinned: object = NO_BASE
+        self._previous_value: object = NO_BASE  # previous value of the topic, for comparison
+        self._pinned_value: object = NO_BASE
         self._pinned_text = ""
         self.reader = MessageReader()
         self.body = InspectorBody(self.theme, self._search_source, context.show_toast)
@@ -85,14 +85,14 @@ class InspectorPanel(PanelWidget):
         self.query, self.history = body.query, body.history
         self.history.selection_changed.connect(self._history_selected)
         self.finder.query_changed.connect(self._query_changed)
-        self.own = InspectorActions(
+        self.inspector_actions = InspectorActions(
             self.theme, self, body, lambda: self._shown_message, self._full_value,
             find=self.focus_filter, toast=self.context.show_toast,
             plot=lambda path: self.context.plot(self._topic, path),
         )  # fmt: skip
-        self.foot.copy_value.clicked.connect(self.own.copy_value)
-        self.foot.copy_path.clicked.connect(self.own.copy_path)
-        self.foot.plot.clicked.connect(self.own.plot)
+        self.foot.copy_value.clicked.connect(self.inspector_actions.copy_value)
+        self.foot.copy_path.clicked.connect(self.inspector_actions.copy_path)
+        self.foot.plot.clicked.connect(self.inspector_actions.plot)
         self.tree.drag_started.connect(self._start_drag)
         body.objects.reveal_requested.connect(self._reveal)
         self.tree.selectionModel().currentChanged.connect(self._row_selected)
@@ -114,14 +114,14 @@ class InspectorPanel(PanelWidget):
         self._close_watch()
         self.history.reset()
         self._topic = name
-        self._shown_message = self._allowed = self._reading = None
-        self._value, self._before, self._pinned = None, NO_BASE, NO_BASE
+        self._shown_message = self._requested_large_message = self._reading = None
+        self._value, self._previous_value, self._pinned_value = None, NO_BASE, NO_BASE
         self._is_raw_mode = False
         self.model.clear()
         self.query.discard_pending()
         self.body.objects.reset()
         self.foot.clear()
-        self._pace.reset()
+        self._update_limiter.reset()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
         self.set_title(_("Inspector"), topic_label(name))
@@ -140,10 +140,10 @@ class InspectorPanel(PanelWidget):
     def refresh(self) -> None:
         if not self._topic:
             return
-        topic, recorded = self.session.topic(self._topic), self.session.replay is not None
+        topic, is_recorded = self.session.topic(self._topic), self.session.replay is not None
         self.history.clamp_selection()
-        earlier = self.history.selected_number is not None
-        self.live.set(*chip_state(topic, self.is_frozen, recorded=recorded, earlier=earlier))
+        is_earlier = self.history.selected_number is not None
+        self.live.set(*chip_state(topic, self.is_frozen, is_recorded=is_recorded, is_earlier=is_earlier))
         newest, is_shown = topic.newest if topic is not None and topic.gone_s is None else None, False
         if (
             topic is not None
@@ -151,10 +151,10 @@ class InspectorPanel(PanelWidget):
             and newest is not self._shown_message
             and not self.is_display_fixed
         ):
-            is_shown = self._pace.try_acquire(self.clock())
+            is_shown = self._update_limiter.try_acquire(self.clock())
             if is_shown:
                 self._show_message(newest)
-        elif recorded and newest is None and self._shown_message is not None and not self.is_display_fixed:
+        elif is_recorded and newest is None and self._shown_message is not None and not self.is_display_fixed:
             self._show_no_message()
         if self.body.page == NOTHING:
             self._show_waiting(topic)
@@ -170,39 +170,41 @@ class InspectorPanel(PanelWidget):
     def _repaint_fading(self, *, is_shown: bool) -> None:
         # A message that was just shown has painted its marks already.
         if is_shown:
-            self._fades.drain(self.clock())
-        elif self.body.page == TREE and self.tree.is_fading() and self._fades.try_acquire(self.clock()):
+            self._fade_limiter.drain(self.clock())
+        elif (
+            self.body.page == TREE and self.tree.is_fading() and self._fade_limiter.try_acquire(self.clock())
+        ):
             self.tree.viewport().update()
 
     def _refresh_now(self) -> None:
-        self._pace.reset()
+        self._update_limiter.reset()
         self.refresh()
 
     def _show_no_message(self) -> None:
         # The playhead is before the topic's first message.
         self.reader.clear()
-        self._shown_message = self._allowed = self._reading = None
-        self._value, self._before = None, NO_BASE
+        self._shown_message = self._requested_large_message = self._reading = None
+        self._value, self._previous_value = None, NO_BASE
         self.model.clear()
         self.query.discard_pending()
         self.foot.clear()
         self._show_page(NOTHING)
 
     def _show_waiting(self, topic: Topic | None) -> None:
-        unread = self.session.networks.read_problem(self._topic)
-        if unread:
-            self.body.show_undecodable(topic_label(self._topic), unread, self.doctor_action(self._topic))
+        problem = self.session.networks.read_problem(self._topic)
+        if problem:
+            self.body.show_undecodable(topic_label(self._topic), problem, self.doctor_action(self._topic))
         else:
-            published = topic is not None and topic.publishers > 0
-            self.body.show_waiting(topic_label(self._topic), published, self.doctor_action(self._topic))
+            has_publisher = topic is not None and topic.publishers > 0
+            self.body.show_waiting(topic_label(self._topic), has_publisher, self.doctor_action(self._topic))
 
     def _show_message(self, message: Message) -> None:
-        large = message.size_bytes > LARGE_BYTES and message.codec != "image"
+        is_large = message.size_bytes > LARGE_BYTES and message.codec != "image"
         if self._is_raw_mode:
             self._show_raw(message, "")
-        elif large and message.codec != "json" and message is not self._allowed:
+        elif is_large and message.codec != "json" and message is not self._requested_large_message:
             self._offer_large(message)
-        elif large:
+        elif is_large:
             self._decode_in_background(message)
         else:
             self._show_decoded(decode_now(message))
@@ -225,13 +227,13 @@ class InspectorPanel(PanelWidget):
         is_new = message is not self._shown_message
         self._shown_message, self._reading = message, reading
         if is_new:
-            self._before = self._value if self._value is not None else NO_BASE
+            self._previous_value = self._value if self._value is not None else NO_BASE
             topic = self.session.topic(self._topic)
             previous = topic.previous if topic is not None else None
             if self.history.selected_number is not None:
                 previous = self.history.previous_message()
             if message.size_bytes <= LARGE_BYTES and previous is not None:
-                self._before = payload_or_default(previous, self._before)
+                self._previous_value = payload_or_default(previous, self._previous_value)
             self.finder.invalidate_matches()
         self._value = reading.value
         self._show_value()
@@ -242,8 +244,8 @@ class InspectorPanel(PanelWidget):
         # Cached per message, because latency and age are those at its arrival.
         if message is not self._info_cache[0]:
             kind = find_kind(split_key(self._topic)[0])
-            recorded = self.session.replay is not None
-            self._info_cache = (message, message_info(message, self._since_ns, kind, recorded=recorded))
+            is_recorded = self.session.replay is not None
+            self._info_cache = (message, message_info(message, self._since_ns, kind, is_recorded=is_recorded))
         return self._info_cache[1]
 
     def _show_value(self) -> None:
@@ -257,25 +259,27 @@ class InspectorPanel(PanelWidget):
             self.strip.hide()
             self.body.objects.show_message(self._value, self.clock())
             return
-        first = not self.model.rowCount()
+        is_first = not self.model.rowCount()
         base: object = NO_BASE
         if self.is_comparing:
-            base = self._pinned if self.pin.isChecked() else self._before
-            compared_with = self._pinned_text if self.pin.isChecked() else _(BEFORE)
+            base = self._pinned_value if self.pin.isChecked() else self._previous_value
+            compared_with = self._pinned_text if self.pin.isChecked() else _(PREVIOUS_MESSAGE)
             self.strip.set_summary(compared_with, *count_changes(self._value, base))
         self.strip.setVisible(self.is_comparing and self.body.page == TREE)
-        only = self.is_comparing and base is not NO_BASE and self.strip.only.isChecked()
-        self.model.set_value(self._value, self.clock(), base, changes_only=only)
-        if first:
+        changes_only = (
+            self.is_comparing and base is not NO_BASE and self.strip.changes_only_button.isChecked()
+        )
+        self.model.set_value(self._value, self.clock(), base, changes_only=changes_only)
+        if is_first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_query_result(self, result: QueryResult) -> None:
         if self._is_table_mode:
             self.body.objects.show_query_objects(result.values.items(), self.clock())
             return
-        first = not self.model.rowCount()
+        is_first = not self.model.rowCount()
         self.model.set_value(result.values, self.clock())
-        if first:
+        if is_first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
     def _show_raw(self, message: Message, reason: str) -> None:
@@ -283,7 +287,7 @@ class InspectorPanel(PanelWidget):
         self.foot.show_info(self._message_info(message))
         self.bytes.show_bytes(message.data)
         text = _("Can't decode the message as {codec}: {reason}.").format(codec=message.codec, reason=reason)
-        self.body.sentence.setText(text if reason else "")
+        self.body.error_label.setText(text if reason else "")
         self._show_page(RAW)
 
     def _offer_large(self, message: Message) -> None:
@@ -297,14 +301,14 @@ class InspectorPanel(PanelWidget):
     def _decode_large(self) -> None:
         # Also freezes the panel, because the next message would replace this one.
         if self._shown_message is not None:
-            self._allowed = self._shown_message
+            self._requested_large_message = self._shown_message
             self.freeze.setChecked(True)
             self.reader.submit(self._shown_message)
             self.body.show_large(self._shown_message.size_bytes, _("Reading the message…"))
 
     def _show_page(self, page: int) -> None:
-        self.body.show_page(page, comparing=self.is_comparing)
-        self.own.set_enabled(page == TREE)
+        self.body.show_page(page, is_comparing=self.is_comparing)
+        self.inspector_actions.set_enabled(page == TREE)
 
     def _show_empty(self) -> None:
         choose = lambda: self.context.run("panel:topics")  # noqa: E731
@@ -342,13 +346,13 @@ class InspectorPanel(PanelWidget):
         self.history.select(None)
         self.freeze.setChecked(False)
 
-    def _pin(self, pinned: bool) -> None:
-        self._pinned = self._value if pinned and self._value is not None else NO_BASE
+    def _pin(self, is_pinned: bool) -> None:
+        self._pinned_value = self._value if is_pinned and self._value is not None else NO_BASE
         stamp_ns = self._shown_message.stamp_ns if self._shown_message is not None else None
-        self._pinned_text = _(PINNED)
+        self._pinned_text = _(PINNED_MESSAGE)
         if self.history.selected_number is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
             time_text = clock_text(stamp_ns)
-            self._pinned_text = _("{message} of {clock}").format(message=_(PINNED), clock=time_text)
+            self._pinned_text = _("{message} from {clock}").format(message=_(PINNED_MESSAGE), clock=time_text)
         self._show_value()
 
     def _history_selected(self) -> None:
@@ -406,7 +410,7 @@ class InspectorPanel(PanelWidget):
 
     def _show_menu(self, position: QPoint) -> None:
         menu = Menu(self.theme, self)
-        menu.addActions(self.own.menu_actions())
+        menu.addActions(self.inspector_actions.menu_actions())
         index = self.tree.currentIndex()
         if index.isValid() and self._topic and not split_key(self._topic)[0]:
             command = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
@@ -420,7 +424,7 @@ class InspectorPanel(PanelWidget):
         menu.popup(self.tree.viewport().mapToGlobal(position))
 
     def more_actions(self) -> list[QAction]:
-        return self.own.menu_actions()
+        return self.inspector_actions.menu_actions()
 
     def focus_filter(self) -> bool:
         if self.body.bar.isVisible():
@@ -437,7 +441,7 @@ class InspectorPanel(PanelWidget):
         return {
             "topic": self._topic,
             "compare": self.compare.isChecked(),
-            "changes_only": self.strip.only.isChecked(),
+            "changes_only": self.strip.changes_only_button.isChecked(),
             "table": self._is_table_mode,
             "query": self.finder.field.text() if self.finder.is_query else "",
         }
@@ -447,7 +451,7 @@ class InspectorPanel(PanelWidget):
         if isinstance(topic, str):
             self.show_topic(topic)
         self.compare.setChecked(state.get("compare") is True)
-        self.strip.only.setChecked(state.get("changes_only") is True)
+        self.strip.changes_only_button.setChecked(state.get("changes_only") is True)
         self._is_table_mode = state.get("table") is True
         query = state.get("query")
         if isinstance(query, str) and query.startswith("$"):
@@ -480,24 +484,24 @@ class InspectorPanel(PanelWidget):
 
 
 def chip_state(
-    topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
+    topic: Topic | None, is_frozen: bool, *, is_recorded: bool = False, is_earlier: bool = False
 ) -> tuple[str, str, str]:
     """Return the contents of the chip with the state of topic and panel.
 
     Args:
         topic: Topic shown; None if it no longer exists.
-        frozen: True while the display is frozen.
-        recorded: True if the message is from a recording.
-        earlier: True if an earlier message is selected.
+        is_frozen: True while the display is frozen.
+        is_recorded: True if the message is from a recording.
+        is_earlier: True if an earlier message is selected.
 
     Returns:
         Text, status and icon; an icon of "" stands for the default icon of the status.
     """
-    if frozen:
+    if is_frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
-    if earlier:
+    if is_earlier:
         return pgettext("message", "earlier"), "off", "history"
-    if recorded:
+    if is_recorded:
         return pgettext("message", "recorded"), "info", ""
     if topic is None:
         return pgettext("topic", "gone"), "off", ""

@@ -44,10 +44,10 @@ class QueryStrip(QWidget):
         super().__init__()
         self._worker = NewestJobWorker(_evaluate, "studio-query")
         self._query: JsonQuery | None = None
-        self._typed = ""
+        self._query_text = ""
         self._value: object = None
-        self._due = self._on_tree = False
-        self._not_before = 0.0
+        self._is_due = self._can_show_results = False
+        self._not_before_s = 0.0
         self.text_label = label("", "small", role="textSecondary", wrap=True)
         self.text_label.setMinimumWidth(0)
         row = QHBoxLayout(self)
@@ -58,13 +58,13 @@ class QueryStrip(QWidget):
     @property
     def has_query(self) -> bool:
         """True if there is a query, even one with invalid syntax."""
-        return bool(self._typed)
+        return bool(self._query_text)
 
     def set_query(self, text: str) -> bool:
         """Set the query; "" removes the query. Return False if the syntax is invalid."""
-        self._typed, self._query = text, None
+        self._query_text, self._query = text, None
         self._worker.clear()
-        self._not_before = 0.0
+        self._not_before_s = 0.0
         message = ""
         if text:
             try:
@@ -76,7 +76,7 @@ class QueryStrip(QWidget):
 
     def request_evaluation(self, value: object) -> None:
         """Queue a message for evaluation in place of the pending one; `pop_result` returns the result."""
-        self._value, self._due = value, True
+        self._value, self._is_due = value, True
 
     def pop_result(self, now: float) -> QueryResult | None:
         """Return a new result, or None. Each result is returned once.
@@ -88,27 +88,32 @@ class QueryStrip(QWidget):
         """
         outcome = self._worker.pop_result()
         if outcome is not None:
-            self._not_before = now + (LOAD_DIVISOR - 1) * outcome.duration_s
+            self._not_before_s = now + (LOAD_DIVISOR - 1) * outcome.duration_s
             self._set_status(result_text(outcome.result), is_error=False)
-        if self._due and self._query is not None and not self._worker.is_busy and now >= self._not_before:
-            self._due = False
+        if (
+            self._is_due
+            and self._query is not None
+            and not self._worker.is_busy
+            and now >= self._not_before_s
+        ):
+            self._is_due = False
             self._worker.submit(_QueryJob(self._query, self._value))
         return outcome.result if outcome is not None else None
 
     def discard_pending(self) -> None:
         """Discard pending evaluations; called before another topic is shown."""
         self._worker.clear()
-        self._value, self._due = None, False
+        self._value, self._is_due = None, False
         self._set_status("", is_error=False)
 
-    def update_visibility(self, *, tree: bool) -> None:
+    def update_visibility(self, *, can_show_results: bool) -> None:
         """Show or hide the strip. It is visible only if it has a text.
 
         Args:
-            tree: True if the current page can show the results of a query.
+            can_show_results: True if the current page can show the results of a query.
         """
-        self._on_tree = tree
-        show_when(self, tree and bool(self.text_label.text()))
+        self._can_show_results = can_show_results
+        show_when(self, can_show_results and bool(self.text_label.text()))
 
     def close_worker(self) -> None:
         """Stop the background thread."""
@@ -117,11 +122,11 @@ class QueryStrip(QWidget):
     def _set_status(self, text: str, *, is_error: bool) -> None:
         self.text_label.setText(text)
         set_role(self.text_label, "warn" if is_error else "textSecondary")
-        self.update_visibility(tree=self._on_tree)
+        self.update_visibility(can_show_results=self._can_show_results)
 
 
 def result_text(result: QueryResult) -> str:
     """Format the number of results, such as ``12 found``, and the reason if the results are incomplete."""
     count = len(result.values)
     text = ngettext("{count} found.", "{count} found.", count).format(count=count)
-    return f"{text} {result.cut}".rstrip()
+    return f"{text} {result.incomplete_reason}".rstrip()

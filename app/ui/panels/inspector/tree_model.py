@@ -96,8 +96,8 @@ class TreeModel(QAbstractItemModel):
         super().__init__()
         self._root = TreeNode("", {}, None, depth=-1, children=[])
         self.changed_at_s: float | None = None
-        self._changing = False
-        self._changes_only = False
+        self._is_changing = False
+        self._shows_changes_only = False
 
     # -- QAbstractItemModel -------------------------------------------------------------------------------
 
@@ -126,14 +126,14 @@ class TreeModel(QAbstractItemModel):
     def canFetchMore(self, parent: Index) -> bool:
         node = self.node(parent)
         # A view may call this while rows are being changed, and calls it again afterwards.
-        return parent.column() <= 0 and not self._changing and len(node.children or ()) < self._size(node)
+        return parent.column() <= 0 and not self._is_changing and len(node.children or ()) < self._size(node)
 
     def fetchMore(self, parent: Index) -> None:
-        if self._changing:
+        if self._is_changing:
             return
         node = self.node(parent)
-        have = len(node.children or ())
-        self._load(node, have + PAGE_SIZE)
+        loaded_count = len(node.children or ())
+        self._load(node, loaded_count + PAGE_SIZE)
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if not index.isValid():
@@ -189,16 +189,16 @@ class TreeModel(QAbstractItemModel):
             base: Message to compare with, or `NO_BASE`.
             changes_only: True to omit nodes that are equal in both messages.
         """
-        first = not self._root.children
+        is_first = not self._root.children
         container = _as_container(value)
-        self._changes_only = changes_only
-        self._changing = True
+        self._shows_changes_only = changes_only
+        self._is_changing = True
         try:
-            self._update(self._root, (0, container, _as_container(base), ""), None if first else now)
+            self._update(self._root, (0, container, _as_container(base), ""), None if is_first else now)
             if not self._root.children:
                 self._load(self._root, PAGE_SIZE)
         finally:
-            self._changing = False
+            self._is_changing = False
 
     def _size(self, node: TreeNode) -> int:
         # In a comparison, the count of an unloaded node is only known to be zero or not.
@@ -210,19 +210,19 @@ class TreeModel(QAbstractItemModel):
         if node.base is NO_BASE:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
             return [(key, value, NO_BASE, "") for key, value in pairs]
-        only = self._changes_only
-        parts, node.total = child_diffs(node.value, node.base, node.mark, count, changes_only=only)
+        changes_only = self._shows_changes_only
+        parts, node.total = child_diffs(node.value, node.base, node.mark, count, changes_only=changes_only)
         return parts
 
     def _update(self, node: TreeNode, part: ChildDiff, now: float | None) -> None:
         _key, value, base, mark = part
         before, node.value = node.value, value
-        marked, node.mark, node.base = node.mark != mark, mark, base
+        is_mark_changed, node.mark, node.base = node.mark != mark, mark, base
         loaded = node.children
         if loaded is None:
             if now is not None and not is_container(value) and differs(before, value):
                 node.changed_s = self.changed_at_s = now
-            if marked:
+            if is_mark_changed:
                 self._emit_changed(node, node)
             return
         parts = self._parts(node, max(len(loaded), PAGE_SIZE) if loaded or is_container(value) else 0)
@@ -253,10 +253,11 @@ class TreeModel(QAbstractItemModel):
         if len(parts) <= first:
             return
         new_nodes = [_make_node(node, row, parts[row]) for row in range(first, len(parts))]
-        before, self._changing = self._changing, True  # receivers of the signals must not load the same rows
+        # receivers of the signals must not load the same rows
+        was_changing, self._is_changing = self._is_changing, True
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(new_nodes)
-        self._changing = before
+        self._is_changing = was_changing
         self.endInsertRows()
 
     def _sync_children(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[ChildDiff]) -> None:
@@ -269,11 +270,11 @@ class TreeModel(QAbstractItemModel):
                 del loaded[row]
                 _renumber(loaded)
                 self.endRemoveRows()
-        have = {child.key for child in loaded}
-        if [key for key in keys if key in have] != [child.key for child in loaded]:
+        loaded_keys = {child.key for child in loaded}
+        if [key for key in keys if key in loaded_keys] != [child.key for child in loaded]:
             self._reorder(loaded, keys)
         for row, part in enumerate(parts):
-            if part[0] not in have:
+            if part[0] not in loaded_keys:
                 self.beginInsertRows(self.index_of(node), row, row)
                 loaded.insert(row, _make_node(node, row, part))
                 _renumber(loaded)

@@ -33,13 +33,13 @@ MARK_SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
-def blend(under: QColor, top: QColor, share: float) -> QColor:
-    """Blend `top` onto `under` with opacity `share` (0 to 1)."""
-    inverse = 1.0 - share
+def blend(under: QColor, top: QColor, opacity: float) -> QColor:
+    """Blend `top` onto `under` with an opacity of 0 to 1."""
+    inverse = 1.0 - opacity
     return QColor.fromRgbF(
-        under.redF() * inverse + top.redF() * share,
-        under.greenF() * inverse + top.greenF() * share,
-        under.blueF() * inverse + top.blueF() * share,
+        under.redF() * inverse + top.redF() * opacity,
+        under.greenF() * inverse + top.greenF() * opacity,
+        under.blueF() * inverse + top.blueF() * opacity,
     )
 
 
@@ -73,7 +73,7 @@ class TreeView(QTreeView):
         self._clock = clock
         self._tree = model
         self.row_height = theme.size("row", "tree")
-        self._keyboard = False
+        self._is_keyboard_navigation = False
         self._pressed_at: tuple[QPoint, TreeNode] | None = None
         self.setModel(model)
         self.setItemDelegate(_RowHeightDelegate(self))
@@ -88,7 +88,7 @@ class TreeView(QTreeView):
         self.setMouseTracking(True)
 
     def highlight_opacity(self, node: TreeNode) -> float:
-        """Return the intensity of a node's highlight: 1 at the time of a change, 0 after the fade.
+        """Return the opacity of a node's highlight: 1 at the time of a change, 0 after the fade.
 
         If there is a base message, the highlight doesn't fade: 1 for nodes that differ, 0 for all others.
         """
@@ -97,15 +97,15 @@ class TreeView(QTreeView):
         if node.changed_s is None or node.base is not NO_BASE:
             return 0.0
         fade_s = self.theme.duration("changedFade") / 1000
-        age = self._clock() - node.changed_s
+        age_s = self._clock() - node.changed_s
         if fade_s <= 0:  # reduced motion: highlighted for a second instead of fading
-            return 1.0 if age < 1.0 else 0.0
-        return max(0.0, 1.0 - age / fade_s)
+            return 1.0 if age_s < 1.0 else 0.0
+        return max(0.0, 1.0 - age_s / fade_s)
 
     def is_fading(self) -> bool:
         """Return True if the view must be repainted because a highlight may still be fading."""
-        changed = self._tree.changed_at_s
-        return changed is not None and self._clock() - changed < 1.2
+        changed_at_s = self._tree.changed_at_s
+        return changed_at_s is not None and self._clock() - changed_at_s < 1.2
 
     def expand_small(self, rows: int) -> None:
         """Expand objects and lists with few children, upper levels first.
@@ -120,8 +120,8 @@ class TreeView(QTreeView):
                 index = self._tree.index(row, 0, above)
                 node = self._tree.node(index)
                 size = size_of(node.value)
-                few = 0 < size <= (8 if isinstance(node.value, Mapping) else 1)
-                if few and node.depth < 3 and visible_rows + size <= rows:
+                is_small = 0 < size <= (8 if isinstance(node.value, Mapping) else 1)
+                if is_small and node.depth < 3 and visible_rows + size <= rows:
                     visible_rows += size
                     self._tree.fetchMore(index)
                     self.expand(index)
@@ -139,17 +139,17 @@ class TreeView(QTreeView):
         is_selected = index == self.currentIndex()
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        ground = self.theme.colour("selected" if is_selected else "panel")
+        background = self.theme.colour("selected" if is_selected else "panel")
         if is_selected:
-            painter.fillRect(rect, ground)
-        share = self.highlight_opacity(node)
-        if share > 0:
-            bar = blend(ground, self.theme.colour(BAR_ROLES[node.mark]), share)
+            painter.fillRect(rect, background)
+        opacity = self.highlight_opacity(node)
+        if opacity > 0:
+            bar = blend(background, self.theme.colour(BAR_ROLES[node.mark]), opacity)
             painter.fillRect(QRect(0, rect.top() + 4, BAR_WIDTH, rect.height() - 8), bar)
         key_end = self._paint_key(painter, rect, node, is_selected=is_selected)
         if not node.is_container:
-            self._paint_value(painter, rect, node, key_end, ground, share)
-        if is_selected and self._keyboard and self.hasFocus():
+            self._paint_value(painter, rect, node, key_end, background, opacity)
+        if is_selected and self._is_keyboard_navigation and self.hasFocus():
             painter.setPen(QPen(self.theme.colour("focus"), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(rect).adjusted(1, 1, -1, -1), 4, 4)
@@ -182,7 +182,13 @@ class TreeView(QTreeView):
         return x
 
     def _paint_value(
-        self, painter: QPainter, rect: QRect, node: TreeNode, key_end: float, ground: QColor, share: float
+        self,
+        painter: QPainter,
+        rect: QRect,
+        node: TreeNode,
+        key_end: float,
+        background: QColor,
+        opacity: float,
     ) -> None:
         theme = self.theme
         metrics = QFontMetricsF(theme.font("code"))
@@ -191,13 +197,13 @@ class TreeView(QTreeView):
         text = metrics.elidedText(value_text(node.value), Qt.TextElideMode.ElideRight, room)
         width = metrics.horizontalAdvance(text)
         colour = theme.colour(_role(node.value))
-        if share > 0 and node.mark not in MARK_SIGNS:
+        if opacity > 0 and node.mark not in MARK_SIGNS:
             painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(blend(ground, theme.colour("changedTint"), share))
+            painter.setBrush(blend(background, theme.colour("changedTint"), opacity))
             painter.drawRoundedRect(
                 QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
             )
-            colour = blend(colour, theme.colour("changed"), share)
+            colour = blend(colour, theme.colour("changed"), opacity)
         if node.mark in MARK_SIGNS:
             colour = theme.colour(BAR_ROLES[node.mark])
         painter.setFont(theme.font("code"))
@@ -217,7 +223,7 @@ class TreeView(QTreeView):
             painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._keyboard = False
+        self._is_keyboard_navigation = False
         index = self.indexAt(event.position().toPoint())
         node = index.data(NODE_ROLE) if index.isValid() else None
         if isinstance(node, TreeNode) and event.button() == Qt.MouseButton.LeftButton:
@@ -251,7 +257,7 @@ class TreeView(QTreeView):
             self.setExpanded(index, not self.isExpanded(index))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        self._keyboard = event.reason() != Qt.FocusReason.MouseFocusReason
+        self._is_keyboard_navigation = event.reason() != Qt.FocusReason.MouseFocusReason
         super().focusInEvent(event)
 
 

@@ -119,21 +119,21 @@ def decode_now(message: Message) -> ReadResult:
         return ReadResult(message, error=str(error))
 
 
-def payload_or_default(message: Message, otherwise: object) -> object:
+def payload_or_default(message: Message, default: object) -> object:
     """Decode a small message on the calling thread.
 
     Args:
         message: Message to decode.
-        otherwise: Returned for images, for large messages, and if decoding fails.
+        default: Returned for images, for large messages, and if decoding fails.
     """
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
-        return otherwise
+        return default
     decoded = read(message)
-    return otherwise if decoded.error is not None else decoded.value
+    return default if decoded.error is not None else decoded.value
 
 
 def image_summary(message: Message) -> Mapping[str, object]:
-    """Return encoding, shape and size of an image; its pixels are decoded only if it reports no shape.
+    """Return encoding, shape and size of an image; its pixels are decoded only if the message has no shape.
 
     Raises `NepError` if the pixels can't be decoded.
     """

@@ -54,7 +54,7 @@ class NodesPanel(NetworkTable[NodeRow]):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, TABLE_TEXTS, "network")
         self.table.selectionModel().currentChanged.connect(self._selection_changed)
-        self._about = ContentScrollArea(self.foot)
+        self._footer = ContentScrollArea(self.foot)
         session = self.session
         self._parameters = NodeParameters(
             session.watch, session.topic, session.parameters, lambda: session.master.kind == "connected"
@@ -69,14 +69,14 @@ class NodesPanel(NetworkTable[NodeRow]):
             (self.parameters, 1),
             (self.networks, 0),
             (self.line, 0),
-            (self._about, 0),
+            (self._footer, 0),
             (self.doctor, 0),
         )
         for widget, stretch in parts:
             column.addWidget(widget, stretch)
-        self._opened: set[str] = set()
+        self._expanded_keys: set[str] = set()
         self._last_snapshot: tuple[object, ...] = ()
-        self._values = -1
+        self._values_revision = -1
         self._ticks = 0
         self._has_gone_nodes = False
 
@@ -96,12 +96,14 @@ class NodesPanel(NetworkTable[NodeRow]):
     def refresh(self) -> None:
         self._ticks += 1
         order = self.table.order.column
-        due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
-        if due or self._snapshot() != self._last_snapshot:
+        is_sort_due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
+        if is_sort_due or self._snapshot() != self._last_snapshot:
             self.rebuild()
-        values = self.session.nodes.values_revision + self.session.networks.values_revision
-        if values != self._values or (self._has_gone_nodes and self._ticks % SORT_TICKS == 0):
-            self._values = values
+        values_revision = self.session.nodes.values_revision + self.session.networks.values_revision
+        if values_revision != self._values_revision or (
+            self._has_gone_nodes and self._ticks % SORT_TICKS == 0
+        ):
+            self._values_revision = values_revision
             self.table.refresh_visible()
         self.parameters.refresh()
 
@@ -110,7 +112,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         return session.nodes.revision, session.networks.revision, session.master.kind
 
     def source_changed(self) -> None:
-        self._last_snapshot, self._values = (), -1
+        self._last_snapshot, self._values_revision = (), -1
 
     def rebuild(self) -> None:
         nodes = [*self.session.nodes, *self.session.networks.nodes]
@@ -118,7 +120,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._has_gone_nodes = any(node.gone_s is not None for node in nodes)
         keywords = self.filter_words()
         matches = [node for node in nodes if all(keyword in _haystack(node) for keyword in keywords)]
-        self.model.set_rows(rows_of(matches, self._opened, self.table.order, self._rate_text))
+        self.model.set_rows(rows_of(matches, self._expanded_keys, self.table.order, self._rate_text))
         self.filter.setVisible(len(nodes) > 0)
         self.table.refresh_visible()
         self.show_table(bool(matches), bool(keywords))
@@ -147,7 +149,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._parameters.show(row.node if row is not None and is_table_visible else None)
         show_when(self.parameters, self._parameters.node is not None)
         self.foot.setText(f"{text}.\n{limits}" if limits else text)
-        self._about.setVisible(is_table_visible)
+        self._footer.setVisible(is_table_visible)
         self.line.setVisible(is_table_visible)
 
     def open_row(self, key: str) -> None:
@@ -162,7 +164,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         else:
             network = self.session.networks.get(row.node.network)
             (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
-            self._set_expanded(key, row.node.key not in self._opened)
+            self._set_expanded(key, row.node.key not in self._expanded_keys)
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         row = self.model.row_at(self.model.index_of(key))
@@ -172,19 +174,19 @@ class NodesPanel(NetworkTable[NodeRow]):
             return (copy_action(self.context, row.topic),)  # a pattern stands for many topics
         if row.topic:
             return topic_actions(self.context, row.topic_key)
-        shows = RowAction(_("Show topics"), "list-tree", lambda: self.open_row(key))
-        return (shows, *node_actions(self.context, row.node.network, row.node.name))
+        show_action = RowAction(_("Show topics"), "list-tree", lambda: self.open_row(key))
+        return (show_action, *node_actions(self.context, row.node.network, row.node.name))
 
-    def _set_expanded(self, key: str, opened: bool) -> None:
+    def _set_expanded(self, key: str, is_expanded: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))
-        if row is None or (opened and row.topic):
+        if row is None or (is_expanded and row.topic):
             return
-        (self._opened.add if opened else self._opened.discard)(row.node.key)
+        (self._expanded_keys.add if is_expanded else self._expanded_keys.discard)(row.node.key)
         self.rebuild()
         self.table.select_key(NodeRow(row.node).key)
 
     def suspendables(self) -> Iterable[Suspendable | None]:
-        return (self._parameters.watching,)
+        return (self._parameters.watch_handle,)
 
     def dispose(self) -> None:
         self._parameters.close()
@@ -206,7 +208,7 @@ class _NodeTable(TableView[NodeRow]):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.selected_key()
         if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
-            self.keyboard = True
+            self.is_keyboard_navigation = True
             self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         else:
             super().keyPressEvent(event)

@@ -61,8 +61,8 @@ class ParametersView(QWidget):
         self.theme, self.parameters = theme, parameters
         self.clock: Callable[[], float] = time.monotonic
         self._last_state: tuple[object, ...] = ()
-        self._edited = self._is_awaiting_reply = False
-        self._fades_until = 0.0
+        self._is_edited = self._is_awaiting_reply = False
+        self._highlight_end_s = 0.0
         self.title = ElidedLabel("small", "textSecondary")
         self.title.setContentsMargins(12, 5, 12, 3)
         self.model = TableModel(self._columns(), lambda each: each.name)
@@ -71,40 +71,40 @@ class ParametersView(QWidget):
         self.table.setMinimumHeight(3 * self.table.row_height)
         self.table.opened.connect(lambda _name: self._focus_editor())
         self.table.selectionModel().currentChanged.connect(self._selection_changed)
-        self.name = label("", "code")
-        self.name.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.name_label = label("", "code")
+        self.name_label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.field = ValueField(theme, self._submit, self._cancel_edit)
         self.field.textEdited.connect(self._mark_edited)
-        self.choice = ComboBox(theme)
-        self.choice.activated.connect(lambda _index: self._submit())
+        self.choice_field = ComboBox(theme)
+        self.choice_field.activated.connect(lambda _index: self._submit())
         self.editors = QStackedWidget()
         self.editors.addWidget(self.field)
-        self.editors.addWidget(self.choice)
+        self.editors.addWidget(self.choice_field)
         self.editors.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self.button = Button(theme, _("Set"), size="small")
-        self.button.clicked.connect(self._submit)
-        self.sentence = label("", "small", role="textTertiary", wrap=True)
-        self.sentence.setMinimumWidth(0)
-        self._strip = QWidget()
+        self.set_button = Button(theme, _("Set"), size="small")
+        self.set_button.clicked.connect(self._submit)
+        self.status_label = label("", "small", role="textTertiary", wrap=True)
+        self.status_label.setMinimumWidth(0)
+        self._editor_row = QWidget()
         self._lay_out()
 
     def _lay_out(self) -> None:
         edit = QHBoxLayout()
         edit.setSpacing(8)
-        edit.addWidget(self.name, 2)
+        edit.addWidget(self.name_label, 2)
         edit.addWidget(self.editors, 3)
-        edit.addWidget(self.button)
-        strip = QVBoxLayout(self._strip)
+        edit.addWidget(self.set_button)
+        strip = QVBoxLayout(self._editor_row)
         strip.setContentsMargins(12, 5, 10, 6)
         strip.setSpacing(3)
         strip.addLayout(edit)
-        strip.addWidget(self.sentence)
+        strip.addWidget(self.status_label)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         for widget, stretch in (
             (Separator(self.theme), 0), (self.title, 0), (self.table, 1), (Separator(self.theme), 0),
-            (self._strip, 0),
+            (self._editor_row, 0),
         ):  # fmt: skip
             column.addWidget(widget, stretch)
 
@@ -117,16 +117,16 @@ class ParametersView(QWidget):
 
     def _text_role(self, role: str) -> str:
         node = self.parameters.node
-        is_here = node is not None and node.gone_s is None and not node.is_stale
-        return role if is_here else "textDisabled"
+        is_current = node is not None and node.gone_s is None and not node.is_stale
+        return role if is_current else "textDisabled"
 
     def _name_cell(self, parameter: ReportedParameter) -> Cell:
         return Cell(parameter.name, role=self._text_role("text"), mono=True, elide_middle=True)
 
     def _value_cell(self, parameter: ReportedParameter) -> Cell:
         text = shortened(parameter.text, MAX_DISPLAYED_CHARS)
-        changed = self.parameters.changed.get(parameter.name)
-        if changed is not None and self.clock() - changed < CHANGE_HIGHLIGHT_S:
+        changed_s = self.parameters.change_times_s.get(parameter.name)
+        if changed_s is not None and self.clock() - changed_s < CHANGE_HIGHLIGHT_S:
             return Cell(text, role="changed", mono=True, tint="changedTint")
         return Cell(text, role=self._text_role("text"), mono=True)
 
@@ -141,15 +141,15 @@ class ParametersView(QWidget):
             return
         state = (parameters.revision, node.key, node.gone_s is None, node.can_set_parameters, node.is_stale)
         if state != self._last_state:
-            another = not self._last_state or state[1] != self._last_state[1]
+            is_other_node = not self._last_state or state[1] != self._last_state[1]
             self._last_state = state
-            if another:
-                self._edited = False
+            if is_other_node:
+                self._is_edited = False
             self.title.setText(self._title_text())
             self.model.set_rows(parameters.all)
             self._show_selected()
-            self._fades_until = self.clock() + 2 * CHANGE_HIGHLIGHT_S
-        if self.clock() < self._fades_until:  # repaint while highlights of changes fade
+            self._highlight_end_s = self.clock() + 2 * CHANGE_HIGHLIGHT_S
+        if self.clock() < self._highlight_end_s:  # repaint while highlights of changes fade
             self.table.refresh_visible()
 
     def _title_text(self) -> str:
@@ -166,54 +166,54 @@ class ParametersView(QWidget):
         return template.format(node=name)
 
     @property
-    def selected(self) -> ReportedParameter | None:
+    def selected_parameter(self) -> ReportedParameter | None:
         """Selected parameter, or None."""
         row = self.model.row_at(self.table.currentIndex())
         return self.parameters.find(row.name) if row is not None else None
 
     def _selection_changed(self, _now: QModelIndex, _before: QModelIndex) -> None:
-        self._edited = False
+        self._is_edited = False
         self.parameters.rejection_reason = ""
         self._show_selected()
 
     def _show_selected(self) -> None:
-        parameter, node = self.selected, self.parameters.node
+        parameter, node = self.selected_parameter, self.parameters.node
         is_visible = parameter is not None and node is not None
-        for widget in (self.name, self.editors, self.button):
+        for widget in (self.name_label, self.editors, self.set_button):
             paint.show_when(widget, is_visible)
         if parameter is None or node is None:
             self._set_status(_("Choose a parameter to change its value."))
             return
-        self.name.setText(parameter.name)
-        self.name.setToolTip(plain.tip(_tooltip(parameter)))
+        self.name_label.setText(parameter.name)
+        self.name_label.setToolTip(plain.tip(_tooltip(parameter)))
         disabled_reason = read_only_reason(node, parameter)
         options = [format_value(each) for each in parameter.choices]
         if parameter.kind == "bool" and not options:
             options = ["false", "true"]
-        is_pending = self.parameters.setting == parameter.name
-        if self._is_awaiting_reply and not self.parameters.setting:
+        is_pending = self.parameters.pending_name == parameter.name
+        if self._is_awaiting_reply and not self.parameters.pending_name:
             self._is_awaiting_reply = False
-            self._edited = bool(self.parameters.rejection_reason)
+            self._is_edited = bool(self.parameters.rejection_reason)
         self._show_editor(parameter, options)
         self.field.setEnabled(not disabled_reason)
-        self.choice.setEnabled(not disabled_reason)
-        self.button.setEnabled(not disabled_reason and not is_pending)
-        paint.show_when(self.button, not options)
+        self.choice_field.setEnabled(not disabled_reason)
+        self.set_button.setEnabled(not disabled_reason and not is_pending)
+        paint.show_when(self.set_button, not options)
         self._update_status(parameter, disabled_reason, is_pending=is_pending)
 
     def _show_editor(self, parameter: ReportedParameter, options: list[str]) -> None:
-        now = parameter.text
+        current_text = parameter.text
         self.editors.setCurrentIndex(CHOICE if options else LINE)
-        for widget in (self.field, self.choice):
+        for widget in (self.field, self.choice_field):
             widget.setAccessibleName(_("Value of {parameter}").format(parameter=parameter.name))
         if options:
-            if [self.choice.itemData(index) for index in range(self.choice.count())] != options:
-                self.choice.clear()
+            if [self.choice_field.itemData(index) for index in range(self.choice_field.count())] != options:
+                self.choice_field.clear()
                 for option in options:
-                    self.choice.addItem(shortened(option, MAX_DISPLAYED_CHARS), option)
-            self.choice.set_value(now)
-        elif not self._edited and self.field.text() != now:
-            self.field.setText(now[:MAX_TEXT_LENGTH])
+                    self.choice_field.addItem(shortened(option, MAX_DISPLAYED_CHARS), option)
+            self.choice_field.set_value(current_text)
+        elif not self._is_edited and self.field.text() != current_text:
+            self.field.setText(current_text[:MAX_TEXT_LENGTH])
 
     def _update_status(self, parameter: ReportedParameter, disabled_reason: str, *, is_pending: bool) -> None:
         rejection = self.parameters.rejection_reason
@@ -229,45 +229,47 @@ class ParametersView(QWidget):
             self._set_status("; ".join(filter(None, parts)))
 
     def _set_status(self, text: str, role: str = "textTertiary") -> None:
-        set_role(self.sentence, role)
-        if text != self.sentence.text():
-            self.sentence.setText(text)
+        set_role(self.status_label, role)
+        if text != self.status_label.text():
+            self.status_label.setText(text)
             if role == "error":
-                paint.announce(self.sentence, text)
+                paint.announce(self.status_label, text)
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def _mark_edited(self, _text: str) -> None:
-        self._edited = True
+        self._is_edited = True
 
     def _focus_editor(self) -> None:
-        editor = self.choice if self.editors.currentIndex() == CHOICE else self.field
+        editor = self.choice_field if self.editors.currentIndex() == CHOICE else self.field
         if editor.isEnabled():
             editor.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _cancel_edit(self) -> None:
-        self._edited = False
+        self._is_edited = False
         self.parameters.rejection_reason = ""
         self._show_selected()
         self.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _submit(self) -> None:
-        parameter = self.selected
+        parameter = self.selected_parameter
         if parameter is None:
             return
-        by_choice = self.editors.currentIndex() == CHOICE
-        self.parameters.set(parameter.name, self.choice.value if by_choice else self.field.text())
-        self._edited = True  # keep the typed text until the node has confirmed it
-        self._is_awaiting_reply = bool(self.parameters.setting)
+        is_choice = self.editors.currentIndex() == CHOICE
+        self.parameters.set(parameter.name, self.choice_field.value if is_choice else self.field.text())
+        self._is_edited = True  # keep the typed text until the node has confirmed it
+        self._is_awaiting_reply = bool(self.parameters.pending_name)
         self._show_selected()
 
 
 class ValueField(QLineEdit):
     """Text field for the value of a parameter. Return sets the value, Esc restores the current one."""
 
-    def __init__(self, theme: Theme, on_submit: Callable[[], object], leave: Callable[[], object]) -> None:
+    def __init__(
+        self, theme: Theme, on_submit: Callable[[], object], on_cancel: Callable[[], object]
+    ) -> None:
         super().__init__()
-        self._on_submit, self._leave = on_submit, leave
+        self._on_submit, self._on_cancel = on_submit, on_cancel
         self.setProperty("focusRadius", theme.radius("control"))
         self.setMinimumWidth(60)
         FieldContextMenu(theme, self)
@@ -287,7 +289,7 @@ class ValueField(QLineEdit):
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._on_submit()
         elif event.key() == Qt.Key.Key_Escape:
-            self._leave()
+            self._on_cancel()
         else:
             super().keyPressEvent(event)
 

@@ -28,7 +28,7 @@ ORIGINAL_LIMITS_TEXT = lazy(
     "message ages are unknown."
 )
 NETWORK_LIMITS_TEXT = lazy(
-    "A node of {network}. This network doesn't report its process, start time or processor load."
+    "A node of {network}. This network doesn't report the process, start time and CPU use of nodes."
 )
 ORIGINAL_TEXT = lazy("original NEP")
 BRIDGE_TEXT = lazy(
@@ -74,7 +74,7 @@ class NodeRow:
 
 def rows_of(
     nodes: Iterable[NodeEntry],
-    opened: Collection[str],
+    expanded_keys: Collection[str],
     order: Order[NodeRow],
     rate: Callable[[str], str],
 ) -> list[NodeRow]:
@@ -82,12 +82,12 @@ def rows_of(
 
     Args:
         nodes: Nodes to show.
-        opened: Keys of expanded nodes, which are followed by the rows of their topics.
+        expanded_keys: Keys of expanded nodes, which are followed by the rows of their topics.
         order: Sort order of the nodes.
         rate: Returns the formatted rate of a topic by key.
     """
     rows: list[NodeRow] = []
-    for row in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
+    for row in order.sort([NodeRow(node, node.key in expanded_keys) for node in nodes]):
         rows.append(row)
         if row.is_expanded:
             node = row.node
@@ -148,7 +148,7 @@ def details_text(node: NodeEntry) -> str:
         parts.append(node.language)
     if node.since_ns:
         clock = time.strftime("%H:%M:%S", time.localtime(node.since_ns / 1e9))
-        parts.append(_("connected since {clock}").format(clock=clock))
+        parts.append(_("running since {clock}").format(clock=clock))
     return ", ".join(parts)
 
 

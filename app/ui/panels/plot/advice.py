@@ -29,14 +29,14 @@ class PlotAdvice(QWidget):
         """Topic without data, or ""."""
         self._label = label("", "small", role="warn", wrap=True)
         self._label.setMinimumWidth(0)
-        self.why = LinkButton(theme, _("Why is nothing shown?"))
-        self.why.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.why.clicked.connect(lambda: on_click(self.topic))
+        self.doctor_link = LinkButton(theme, _("Why is nothing shown?"))
+        self.doctor_link.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        self.doctor_link.clicked.connect(lambda: on_click(self.topic))
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 2, 12, 2)
         row.setSpacing(8)
         row.addWidget(self._label, 1)
-        row.addWidget(self.why, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.doctor_link, 0, Qt.AlignmentFlag.AlignTop)
 
     def text(self) -> str:
         """Return the text of the hint, or ""."""
@@ -58,7 +58,7 @@ class PlotAdvice(QWidget):
         if self.topic:
             message = _("No values that can be plotted yet.")
         self._label.setText(message)
-        show_when(self.why, bool(self.topic))
+        show_when(self.doctor_link, bool(self.topic))
         show_when(self, bool(message))
 
 

@@ -47,12 +47,13 @@ ZOOM_STEP = 1.2
 MIN_WINDOW_S, MAX_WINDOW_S = 1e-4, 1e9
 MAX_ANTIALIASED_POINTS = 3000
 """Number of points above which antialiasing is disabled, because it is slow and no longer visible."""
-DENSE_LINE_MARKS, DENSE_TRAVEL_RATIO = 5, 5.0
+DENSE_LINE_MARK_COUNT = 5
+DENSE_TRAVEL_RATIO = 5.0  # vertical travel of a line relative to the plot's width, above which it is dense
 TICK_SPACING_X, TICK_SPACING_Y = 84, 34  # minimum distance of ticks in px
-LABEL_OVERHANG = 60
+LABEL_OVERHANG_PX = 60
 MAX_ABS_VALUE = 1e300
 """Maximum absolute value; larger values are clipped, because axis calculations would overflow."""
-HIT_WIDTH_PX = 10  # px
+HIT_WIDTH_PX = 10
 CURSOR_RANGE_ALPHA = 0.045
 
 
@@ -87,8 +88,8 @@ class ValueRange:
         is_within = self.low <= low and high <= self.high and not self.is_new
         if is_within and span >= 0.5 * (self.high - self.low):
             return False
-        room = span * 0.08 or abs(high) * 0.1 or 1.0
-        self.low, self.high = max(-MAX_ABS_VALUE, low - room), min(MAX_ABS_VALUE, high + room)
+        margin = span * 0.08 or abs(high) * 0.1 or 1.0
+        self.low, self.high = max(-MAX_ABS_VALUE, low - margin), min(MAX_ABS_VALUE, high + margin)
         self.is_new = False
         return True
 
@@ -102,7 +103,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
 
     def boundingRect(self) -> QRectF:
         # pyqtgraph omits labels that exceed the bounding rectangle, such as the time of day at the edge.
-        return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG, 0, LABEL_OVERHANG, 0)
+        return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG_PX, 0, LABEL_OVERHANG_PX, 0)
 
     def tickSpacing(self, min_value: float, max_value: float, size: float) -> list[tuple[float, float]]:
         return readable_levels(
@@ -117,9 +118,9 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
     """Axis of numbers; the labels have as many decimals as the tick spacing requires."""
 
     def tickSpacing(self, min_value: float, max_value: float, size: float) -> list[tuple[float, float]]:
-        apart = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
+        min_spacing_px = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
         return readable_levels(
-            super().tickSpacing(min_value, max_value, size), max_value - min_value, size, apart
+            super().tickSpacing(min_value, max_value, size), max_value - min_value, size, min_spacing_px
         )
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
@@ -127,7 +128,7 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
 
 
 def readable_levels(
-    levels: list[tuple[float, float]], span: float, size: float, apart: float
+    levels: list[tuple[float, float]], span: float, size: float, min_spacing_px: float
 ) -> list[tuple[float, float]]:
     """Return the finest tick level whose labels do not overlap, in a list.
 
@@ -137,9 +138,9 @@ def readable_levels(
         levels: Tick levels of pyqtgraph (spacing and offset), coarsest first.
         span: Length of the range.
         size: Length of the axis in px.
-        apart: Minimum distance of labels in px.
+        min_spacing_px: Minimum distance of labels in px.
     """
-    readable = [level for level in levels if span > 0 and level[0] / span * size >= apart]
+    readable = [level for level in levels if span > 0 and level[0] / span * size >= min_spacing_px]
     return readable[-1:] or levels[:1]
 
 
@@ -179,7 +180,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         end_s: End of the visible range, in the time base of the series.
         anchor_s: Time at which the time axis has its origin.
         cursors: Times of the cursors "A" and "B".
-        painted_s: Accumulated processor time of painting in s.
+        paint_time_s: Accumulated processor time of painting in s.
 
     Signals:
         zoomed: Zoom factor, and time at the mouse pointer in s.
@@ -205,7 +206,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         # (curve, time, value) of the marks that identify dense lines
         self.marks: list[tuple[PlotCurve, float, float]] = []
         self.mouse_s: float | None = None
-        self.painted_s = 0.0  # accumulated processor time of painting
+        self.paint_time_s = 0.0  # accumulated processor time of painting
         # like `marks`, at fixed times on dense lines, which have no dashes
         self.line_marks: list[tuple[PlotCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
@@ -254,7 +255,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     def restyle(self) -> None:
         """Apply the theme's colours, fonts and sizes to the canvas."""
         theme = self.theme
-        grid = theme.colour("controlBorder" if theme.high_contrast else "grid")
+        grid = theme.colour("controlBorder" if theme.is_high_contrast else "grid")
         for name in ("bottom", "left", "right"):
             axis = self.plot.getAxis(name)
             axis.setTickFont(self.axis_font())
@@ -294,8 +295,8 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     def time_at(self, x: float) -> float:
         """Return the time at an x coordinate."""
         area = self.area
-        share = (x - area.left()) / max(1.0, area.width())
-        return self.begin_s + share * (self.end_s - self.begin_s)
+        fraction = (x - area.left()) / max(1.0, area.width())
+        return self.begin_s + fraction * (self.end_s - self.begin_s)
 
     def y_of(self, value: float, *, right: bool, area: QRectF | None = None) -> float:
         """Return the y coordinate of a value.
@@ -326,7 +327,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.line_marks = []
         for index, (curve, line) in enumerate(lines):
             self._show_line(curve, line)
-            if len(lines) > 1 and self._is_dense(line, right=curve.right):
+            if len(lines) > 1 and self._is_dense(line, right=curve.is_on_right_axis):
                 self._add_marks(curve, index / len(lines))
         self._show_clock(clock_s)
         self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
@@ -334,7 +335,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _show_line(self, curve: PlotCurve, line: Polyline) -> None:
         item = self._lines.get(curve.name)
-        view = self.right_view if curve.right else self.view
+        view = self.right_view if curve.is_on_right_axis else self.view
         if item is None:
             item = self._lines[curve.name] = pg.PlotCurveItem(connect="finite")
             view.addItem(item, ignoreBounds=True)
@@ -342,12 +343,12 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             item.getViewBox().removeItem(item)
             view.addItem(item, ignoreBounds=True)
         # dashes and antialiasing are invisible on dense lines but would dominate the cost
-        dense = self._is_dense(line, right=curve.right)
+        is_dense = self._is_dense(line, right=curve.is_on_right_axis)
         item.setData(
             line.times - self.anchor_s,
             np.clip(line.values, -MAX_ABS_VALUE, MAX_ABS_VALUE),
-            pen=curve.style.pen(self.theme, is_dense=dense),
-            antialias=not dense,
+            pen=curve.style.pen(self.theme, is_dense=is_dense),
+            antialias=not is_dense,
         )
 
     def _is_dense(self, line: Polyline, *, right: bool) -> bool:
@@ -361,9 +362,9 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _add_marks(self, curve: PlotCurve, shift: float) -> None:
         # Dense lines have no dashes; marks at fixed times identify them instead.
-        step_s = (self.end_s - self.begin_s) / DENSE_LINE_MARKS
+        step_s = (self.end_s - self.begin_s) / DENSE_LINE_MARK_COUNT
         first = math.floor(self.begin_s / step_s) + shift
-        for index in range(DENSE_LINE_MARKS + 1):
+        for index in range(DENSE_LINE_MARK_COUNT + 1):
             time_s = (first + index) * step_s
             sample = curve.curve.samples.at(time_s)
             if sample is not None and self.begin_s <= time_s <= self.end_s:
@@ -371,7 +372,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _show_axes(self, curves: Sequence[PlotCurve]) -> None:
         for name, right in (("left", False), ("right", True)):
-            axis_curves = [curve for curve in curves if curve.right is right]
+            axis_curves = [curve for curve in curves if curve.is_on_right_axis is right]
             axis = self.plot.getAxis(name)
             colour = (
                 axis_curves[0].style.line_colour(self.theme)
@@ -384,7 +385,9 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     def _fit_values(self, lines: Sequence[tuple[PlotCurve, Polyline]]) -> None:
         for name, right, view in (("left", False, self.view), ("right", True, self.right_view)):
             value_range = self.ranges[name]
-            arrays = [line.values for curve, line in lines if curve.right is right and len(line.values)]
+            arrays = [
+                line.values for curve, line in lines if curve.is_on_right_axis is right and len(line.values)
+            ]
             finite = [each[np.isfinite(each)] for each in arrays]
             finite = [each for each in finite if len(each)]
             if finite:
@@ -395,7 +398,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def _show_clock(self, clock_s: float) -> None:
         try:
-            text = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  local time, as on the person's clock
+            text = f"{datetime.fromtimestamp(clock_s):%H:%M:%S}"  # noqa: DTZ006  local time, as on the user's clock
         except (OverflowError, ValueError, OSError):
             text = "0 s"
         if text != self.time_axis.clock:
@@ -434,7 +437,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         painter = QPainter(self.viewport())
         self.paint_cursors(painter)
         painter.end()
-        self.painted_s += time.thread_time() - start_s
+        self.paint_time_s += time.thread_time() - start_s
 
     def paint_cursors(self, painter: QPainter) -> None:
         """Paint the cursors A and B, and the marks of curves, over the curves."""
@@ -453,7 +456,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             painter.setPen(pen)
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
         for curve, time_s, value in (*self.line_marks, *self.marks):
-            x, y = self.x_of(time_s, area), self.y_of(value, right=curve.right, area=area)
+            x, y = self.x_of(time_s, area), self.y_of(value, right=curve.is_on_right_axis, area=area)
             if area.left() <= x <= area.right() and area.top() - 1 <= y <= area.bottom() + 1:
                 curve.style.paint_mark(painter, theme, QPointF(x, y), 9)
         self._paint_distance(painter, positions)
@@ -513,13 +516,13 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             is_over_cursor = self._cursor_at(position) is not None
             self.setCursor(Qt.CursorShape.SizeHorCursor if is_over_cursor else Qt.CursorShape.ArrowCursor)
             return
-        name, before = self._drag_state
+        name, last_position = self._drag_state
         if name:
             self.cursor_moved.emit(name, self.time_at(position.x()))
         else:
-            self.moved.emit(self.time_at(before.x()) - self.time_at(position.x()))
+            self.moved.emit(self.time_at(last_position.x()) - self.time_at(position.x()))
             if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-                self.scale_values(shift=(position.y() - before.y()) / max(1.0, self.area.height()))
+                self.scale_values(shift=(position.y() - last_position.y()) / max(1.0, self.area.height()))
         self._drag_state = (name, position)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

@@ -70,17 +70,17 @@ class CurveStyle:
                 painter.drawRect(QRectF(centre.x() - half, centre.y() - half, size, size))
             case 2:
                 extent = half + 0.5
-                around = [(0.0, -extent), (extent, half), (-extent, half)]
-                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
+                offsets = [(0.0, -extent), (extent, half), (-extent, half)]
+                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in offsets]))
             case _:
                 extent = half + 1
-                around = [(0.0, -extent), (extent, 0.0), (0.0, extent), (-extent, 0.0)]
-                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in around]))
+                offsets = [(0.0, -extent), (extent, 0.0), (0.0, extent), (-extent, 0.0)]
+                painter.drawPolygon(QPolygonF([centre + QPointF(x, y) for x, y in offsets]))
 
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """Table cell with a sample of a curve's style.
+    """Sample of a curve's style in a table cell.
 
     Attributes:
         style: Style of the curve.
@@ -118,5 +118,5 @@ def paint_state(painter: QPainter, theme: Theme, box: QRectF, style: CurveStyle)
     """
     fill, edge = style.line_colour(theme), style.line_colour(theme)
     fill.setAlphaF(LANE_FILL_ALPHA)
-    edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)
+    edge.setAlphaF(1.0 if theme.is_high_contrast else LANE_EDGE_ALPHA)
     paint.box(painter, box, theme.radius("key"), fill, edge)

@@ -68,11 +68,11 @@ class CsvWriter:
             yield lines.encode()
 
     def result(self) -> str | None:
-        """Return None while the thread is writing, "" on success, or the reason of the failure."""
+        """Return None while the thread is writing, "" on success, or the reason for the failure."""
         return self._result
 
     def close(self) -> None:
-        """Wait some seconds for the thread to finish, then cancel it and remove the partial file."""
+        """Wait a few seconds for the thread to finish, then cancel it and remove the partial file."""
         self._thread.join(CLOSE_TIMEOUT_S)
         self._cancelled.set()
         self._thread.join(CLOSE_TIMEOUT_S)
@@ -102,27 +102,27 @@ class PlotPicture:
     @property
     def size(self) -> QSize:
         """Size in px."""
-        row = round(self._theme.scaled(LEGEND_ROW_HEIGHT))
-        height = sum(size.height() for size, _paint in self._parts) + row * len(self._curves) + 8
+        row_height = round(self._theme.scaled(LEGEND_ROW_HEIGHT))
+        height = sum(size.height() for size, _paint in self._parts) + row_height * len(self._curves) + 8
         return QSize(max(size.width() for size, _paint in self._parts), height)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the image with its top left corner at the origin."""
         painter.fillRect(QRect(0, 0, self.size.width(), self.size.height()), self._theme.colour("panel"))
         top = 0.0
-        for size, painted in self._parts:
+        for size, paint_part in self._parts:
             painter.save()
             painter.translate(0, top)
-            painted(painter, QRectF(0, 0, size.width(), size.height()))
+            paint_part(painter, QRectF(0, 0, size.width(), size.height()))
             painter.restore()
             top += size.height()
-        row = self._theme.scaled(LEGEND_ROW_HEIGHT)
+        row_height = self._theme.scaled(LEGEND_ROW_HEIGHT)
         for curve in self._curves:
-            box = QRectF(12, top + 4, self.size.width() - 24, row)
+            box = QRectF(12, top + 4, self.size.width() - 24, row_height)
             Stroke(curve.style, curve.curve.is_state, is_hidden=False).paint(painter, box, self._theme)
             font = self._theme.font("code")
             paint.text_line(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
-            top += row
+            top += row_height
 
     def encode_png(self) -> bytes:
         """Return the image as PNG in double resolution. Raises `OSError` if there is not enough memory."""
@@ -216,13 +216,13 @@ class PlotExport:
 
     def poll(self) -> None:
         """Report the result of a CSV export once it has finished; call on every tick."""
-        if self._writer is not None and (failed := self._writer.result()) is not None:
-            self._report(self._writer.path, failed)
+        if self._writer is not None and (error_text := self._writer.result()) is not None:
+            self._report(self._writer.path, error_text)
             self._writer = None
 
     def _report(self, path: Path, reason: str) -> None:
         if reason:
-            message = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
+            message = _("Can't export {file}: {reason}").format(file=path.name, reason=reason)
         else:
             message = _("Exported {file}").format(file=path.name)
         self._context.show_toast(message)

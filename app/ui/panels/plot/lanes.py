@@ -63,15 +63,15 @@ class StateLanes(QWidget):
             if states is None or curve.is_hidden:
                 continue
             top = row * self._lane_height()
-            is_yes_or_no = states.values_in(canvas.begin_s, canvas.end_s) <= {"true", "false"}
-            without = ("false",) if is_yes_or_no else ()
+            is_boolean = states.values_in(canvas.begin_s, canvas.end_s) <= {"true", "false"}
+            without = ("false",) if is_boolean else ()
             pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
-            painted = -1.0  # right edge of the last box: one box per pixel is enough
-            for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, without=without):
+            last_right = -1.0  # right edge of the last box; one box per pixel is enough
+            for run in states.runs(canvas.begin_s, canvas.end_s, step_s=pixel_s / 2, excluded_values=without):
                 left = max(area.left(), canvas.x_of(run.start_s))
                 right = min(area.right(), canvas.x_of(run.end_s))
-                if right >= left and max(right, left + MIN_BOX_WIDTH) > painted + 0.5:
-                    painted = max(right, left + MIN_BOX_WIDTH)
+                if right >= left and max(right, left + MIN_BOX_WIDTH) > last_right + 0.5:
+                    last_right = max(right, left + MIN_BOX_WIDTH)
                     yield (
                         curve,
                         run,
@@ -89,9 +89,11 @@ class StateLanes(QWidget):
         font = theme.font("code")
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for row, curve in enumerate(self.curves):
-            ground = QRectF(area.left(), row * self._lane_height() + 1, area.width(), self._lane_height() - 1)
-            painter.fillRect(ground, theme.colour("sunken"))
-            name = QRectF(4, ground.top(), area.left() - 10, ground.height())
+            background_rect = QRectF(
+                area.left(), row * self._lane_height() + 1, area.width(), self._lane_height() - 1
+            )
+            painter.fillRect(background_rect, theme.colour("sunken"))
+            name = QRectF(4, background_rect.top(), area.left() - 10, background_rect.height())
             role = "textDisabled" if curve.is_hidden else "textSecondary"
             paint.text_line(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
         for curve, run, box in self.boxes():

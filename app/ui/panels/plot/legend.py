@@ -102,7 +102,7 @@ class _CellFactory:
         if plot_curve.curve.is_state:
             text = _("yes or no") if isinstance(plot_curve.curve.last, bool) else _("text")
         else:
-            text = pgettext("axis", "right") if plot_curve.right else pgettext("axis", "left")
+            text = pgettext("axis", "right") if plot_curve.is_on_right_axis else pgettext("axis", "left")
         return Cell(text, role="textSecondary" if not plot_curve.is_hidden else "textDisabled")
 
     def last(self, plot_curve: PlotCurve) -> Cell:
@@ -121,8 +121,8 @@ class _CellFactory:
         if plot_curve.curve.is_state and plot_curve.curve.states is not None:
             begin_s, end_s = sorted(stats.cursors)
             if isinstance(plot_curve.curve.last, bool):
-                lasted = seconds_text(plot_curve.curve.states.duration_s("true", begin_s, end_s))
-                text = _("true for {seconds}").format(seconds=lasted)
+                duration = seconds_text(plot_curve.curve.states.duration_s("true", begin_s, end_s))
+                text = _("true for {seconds}").format(seconds=duration)
             else:
                 count = plot_curve.curve.states.change_count(begin_s, end_s)
                 text = ngettext("{count} change", "{count} changes", count).format(count=count)
@@ -183,12 +183,12 @@ class LegendTable(TableView[PlotCurve]):
     def __init__(self, theme: Theme, model: TableModel[PlotCurve]) -> None:
         super().__init__(theme, model)
         self.setAccessibleName(_("Curves and their values"))
-        self.clicked.connect(self._press)
+        self.clicked.connect(self._handle_click)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._show_menu)
         self.opened.connect(self._handle_enter)
 
-    def _press(self, index: QModelIndex) -> None:
+    def _handle_click(self, index: QModelIndex) -> None:
         plot_curve = self._model.row_at(index)
         column = self.columns[index.column()].name
         if plot_curve is None:
@@ -200,7 +200,7 @@ class LegendTable(TableView[PlotCurve]):
 
     def _handle_enter(self, key: str) -> None:
         # Enter opens the menu; a click does so only on the sample of the line.
-        if self.keyboard:
+        if self.is_keyboard_navigation:
             index = self._model.index_of(key)
             plot_curve = self._model.row_at(index)
             if plot_curve is not None:
@@ -240,7 +240,7 @@ class LegendTable(TableView[PlotCurve]):
             for right, text in ((False, _("Left axis")), (True, _("Right axis"))):
                 action = menu.addAction(text)
                 action.setCheckable(True)
-                action.setChecked(plot_curve.right is right)
+                action.setChecked(plot_curve.is_on_right_axis is right)
                 action.triggered.connect(
                     lambda _on=False, right=right: self._set_axis(plot_curve, right=right)
                 )
@@ -263,7 +263,7 @@ class LegendTable(TableView[PlotCurve]):
         return menu
 
     def _set_axis(self, plot_curve: PlotCurve, *, right: bool) -> None:
-        plot_curve.right = right
+        plot_curve.is_on_right_axis = right
         self.changed.emit()
 
     def _set_colour(self, plot_curve: PlotCurve, number: int) -> None:
@@ -288,12 +288,19 @@ def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -
         has_cursors: True if the statistics are limited to the range between the cursors.
         distance: Distance of the cursors in a plot of curves against each other, or None.
     """
-    about = _("Min, max and mean between A and B")
-    parts = [about if has_cursors else _("Min, max and mean of the visible range")]
+    range_text = _("Min, max and mean between A and B")
+    parts = [range_text if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:
         parts.append(_("A to B: {distance}").format(distance=number_text(distance)))
     for count, template in (
-        (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
+        (
+            curves.lost,
+            ngettext(
+                "{count} message lost (gap in the curve)",
+                "{count} messages lost (gaps in the curve)",
+                curves.lost,
+            ),
+        ),
         (
             curves.skipped_count,
             ngettext(

@@ -22,30 +22,30 @@ class TimedWidget(Protocol):
     """Widget that is painted some time after each drawing.
 
     Attributes:
-        painted_s: Accumulated processor time of painting in s.
+        paint_time_s: Accumulated processor time of painting in s.
     """
 
-    painted_s: float
+    paint_time_s: float
 
 
 class DrawThrottle:
     """Controller of the interval between drawings, which depends on their measured cost.
 
     Attributes:
-        drawing_s: Moving average of the cost of a drawing, as processor time in s.
+        draw_time_s: Moving average of the cost of a drawing, as processor time in s.
     """
 
     def __init__(self) -> None:
-        self.drawing_s = 0.0
-        self._painted_s = 0.0
+        self.draw_time_s = 0.0
+        self._last_paint_time_s = 0.0
 
     @contextmanager
-    def measure(self, painted: TimedWidget) -> Iterator[None]:
+    def measure(self, widget: TimedWidget) -> Iterator[None]:
         """Measure one drawing within a ``with`` block, and the painting since the previous drawing."""
         start_s = time.thread_time()
         yield
-        self.add_sample(time.thread_time() - start_s + painted.painted_s - self._painted_s)
-        self._painted_s = painted.painted_s
+        self.add_sample(time.thread_time() - start_s + widget.paint_time_s - self._last_paint_time_s)
+        self._last_paint_time_s = widget.paint_time_s
 
     def add_sample(self, seconds: float) -> None:
         """Add a measured cost to the moving average.
@@ -53,7 +53,7 @@ class DrawThrottle:
         Args:
             seconds: Processor time of drawing and painting in s.
         """
-        self.drawing_s += AVERAGE_WEIGHT * (seconds - self.drawing_s)
+        self.draw_time_s += AVERAGE_WEIGHT * (seconds - self.draw_time_s)
 
     def interval_ticks(self, pixel_s: float) -> int:
         """Return the interval until the next drawing, in ticks at 30 Hz.
@@ -64,4 +64,4 @@ class DrawThrottle:
             pixel_s: Time in s in which the data moves by one pixel, which is the minimum interval.
         """
         min_ticks, max_ticks = DRAW_INTERVAL_TICKS
-        return round(min(max_ticks, max(min_ticks, pixel_s * 30, self.drawing_s / MAX_CPU_SHARE * 30)))
+        return round(min(max_ticks, max(min_ticks, pixel_s * 30, self.draw_time_s / MAX_CPU_SHARE * 30)))

@@ -65,10 +65,10 @@ class PlotPanel(PanelWidget):
         self.view = TimeView()
         self.stats = LegendStats()
         self._ticks = 0
-        self._due = True
+        self._is_redraw_due = True
         self._ticks_since_stats = IDLE_STATS_UPDATE_TICKS
         self._pace = DrawThrottle()
-        self._points = (0, True)
+        self._drawn_points = (0, True)  # number of points, and True if no points are omitted
         self._last_cursor = "A"
         self.exporter = PlotExport(
             context, self._picture_parts, lambda: self.shown, lambda: (self.canvas.begin_s, self.canvas.end_s)
@@ -82,22 +82,22 @@ class PlotPanel(PanelWidget):
     # -- construction -------------------------------------------------------------------------------------
 
     def _make_header(self) -> None:
-        self.paused = Chip(self.theme, "", "off", "pause")
+        self.paused_chip = Chip(self.theme, "", "off", "pause")
         self.freeze = Button(self.theme, _("Pause"), "pause", size="small")
         self.freeze.setCheckable(True)
         self.freeze.toggled.connect(self._set_paused)
-        self.chips, self.header = [self.paused], [self.freeze]
+        self.chips, self.header = [self.paused_chip], [self.freeze]
 
     def _make_tools(self) -> None:
         self.tools = PlotTools(self.theme, self.session, lambda: [each.name for each in self.shown])
         self.add, self.span, self.cursors = self.tools.add, self.tools.span, self.tools.cursors
-        self.states, self.across, self.export = self.tools.states, self.tools.across, self.tools.export
+        self.states, self.xy_toggle, self.export = self.tools.states, self.tools.xy_toggle, self.tools.export
         self.add.add_requested.connect(self._add_typed)
         self.add.exited.connect(lambda: self.canvas.setFocus(Qt.FocusReason.OtherFocusReason))
         self.span.changed.connect(self._set_span)
         self.cursors.toggled.connect(self._show_cursors)
         self.states.toggled.connect(lambda _on: self._curves_changed())
-        self.across.toggled.connect(lambda _on: self._curves_changed())
+        self.xy_toggle.toggled.connect(lambda _on: self._curves_changed())
         self.export.clicked.connect(lambda: open_below(self.exporter.menu(self), self.export))
 
     def _make_body(self) -> None:
@@ -113,7 +113,7 @@ class PlotPanel(PanelWidget):
         self.table.removed.connect(self.remove)
         self.table.copy_requested.connect(self._copy_path)
         self._connect_canvas()
-        body = self._make_lower()
+        body = self._make_plot_page()
         self.empty = EmptyState(
             theme,
             "chart-line",
@@ -131,20 +131,20 @@ class PlotPanel(PanelWidget):
         layout.addWidget(self.pages, 1)
         self.setFocusProxy(self.canvas)
 
-    def _make_lower(self) -> QWidget:
-        # The part below the toolbar, shown if there is at least one curve.
+    def _make_plot_page(self) -> QWidget:
+        # Page with canvas, lanes and legend, shown if there is at least one curve.
         self.drawings = QStackedWidget()
         self.drawings.addWidget(self.canvas)
         self.drawings.addWidget(self.xy)
         self.drawings.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.about, self.points = (
+        self.caption, self.points = (
             ElidedLabel("small", "textTertiary"),
             label("", "small", role="textTertiary"),
         )
-        self.about.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.caption.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         footer = QHBoxLayout()
         footer.setContentsMargins(12, 4, 12, 5)
-        footer.addWidget(self.about, 1)
+        footer.addWidget(self.caption, 1)
         footer.addWidget(self.points)
         self.advice = PlotAdvice(self.theme, lambda topic: self.context.open_doctor(self, topic))
         body = QWidget()
@@ -255,22 +255,22 @@ class PlotPanel(PanelWidget):
         if not self.shown:
             return
         pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
-        drawn = self._due or (
+        is_drawn = self._is_redraw_due or (
             self.view.is_following and self._ticks % self._pace.interval_ticks(pixel_s) == 0
         )
-        if drawn:
-            self._due = False
+        if is_drawn:
+            self._is_redraw_due = False
             with self._pace.measure(self.canvas):
                 self._draw()
         self._ticks_since_stats += 1
         if self._ticks_since_stats >= (
-            STATS_UPDATE_TICKS if drawn else IDLE_STATS_UPDATE_TICKS
+            STATS_UPDATE_TICKS if is_drawn else IDLE_STATS_UPDATE_TICKS
         ):  # in the same repaint as the curves
             self._update_stats()
 
     def _schedule_redraw(self) -> None:
-        # Called to redraw while paused, too.
-        self._due = True
+        # Needed while paused, when `refresh` doesn't redraw by itself.
+        self._is_redraw_due = True
 
     def _visible_range(self) -> tuple[float, float]:
         newest = self.curves.newest_s
@@ -289,7 +289,7 @@ class PlotPanel(PanelWidget):
             for each in self.shown
             if not each.is_hidden and not each.curve.is_state
         ]
-        self._points = (
+        self._drawn_points = (
             sum(line.sample_count for _c, line in lines),
             all(line.is_complete for _c, line in lines),
         )
@@ -309,7 +309,7 @@ class PlotPanel(PanelWidget):
     @property
     def is_xy(self) -> bool:
         """True if curves are drawn against each other instead of over time."""
-        return self.across.isChecked() and self._numeric_count() > 1
+        return self.xy_toggle.isChecked() and self._numeric_count() > 1
 
     def _pairs(self) -> list[tuple[PlotCurve, PlotCurve]]:
         visible = [each for each in self.shown if not each.is_hidden and not each.curve.is_state]
@@ -332,8 +332,8 @@ class PlotPanel(PanelWidget):
         self.stats.set_range(begin_s, end_s, both)
         self.table.refresh_visible()
         distance = self.xy.distance() if self.is_xy else None
-        self.about.setText(caption_text(self.curves, has_cursors=both is not None, distance=distance))
-        count, is_complete = self._points
+        self.caption.setText(caption_text(self.curves, has_cursors=both is not None, distance=distance))
+        count, is_complete = self._drawn_points
         points = ngettext("{count} point", "{count} points", count).format(count=group_digits(count))
         text = _("{points}, all shown") if is_complete else _("{points}, downsampled to 2 per pixel")
         self.points.setText(text.format(points=points))
@@ -361,19 +361,19 @@ class PlotPanel(PanelWidget):
 
     # -- time range ---------------------------------------------------------------------------------------
 
-    def _set_paused(self, paused: bool) -> None:
-        if paused:
+    def _set_paused(self, is_paused: bool) -> None:
+        if is_paused:
             self.view.pause((self.canvas.begin_s, self.canvas.end_s))
         else:
             self.view.resume()
-        self.freeze.set_label(_("Resume") if paused else _("Pause"), "play" if paused else "pause")
-        self.paused.set(_("paused; data is still recorded") if paused else "", "off", "pause")
+        self.freeze.set_label(_("Resume") if is_paused else _("Pause"), "play" if is_paused else "pause")
+        self.paused_chip.set(_("paused; still collecting data") if is_paused else "", "off", "pause")
         self._update_span()
         self._schedule_redraw()
 
     def blockers(self) -> list[Blocker]:
-        go_on = lambda: self.freeze.setChecked(False)  # noqa: E731
-        return [paused_blocker(self.title(), go_on)] if self.freeze.isChecked() else []
+        resume = lambda: self.freeze.setChecked(False)  # noqa: E731
+        return [paused_blocker(self.title(), resume)] if self.freeze.isChecked() else []
 
     def _zoom(self, factor: float, at_s: float) -> None:
         self.view.zoom(factor, at_s, (self.canvas.begin_s, self.canvas.end_s))
@@ -514,7 +514,7 @@ class PlotPanel(PanelWidget):
         )
         for text, icon, callback in rows:
             action = QAction(self.theme.icon(icon), text, self)
-            action.triggered.connect(lambda _on=False, does=callback: does())
+            action.triggered.connect(lambda _on=False, callback=callback: callback())
             action.setEnabled(bool(self.shown) or callback == self.focus_filter)
             actions.append(action)
         for old in self._menu_actions:
@@ -553,7 +553,7 @@ class PlotPanel(PanelWidget):
             ],
             "span": 0.0 if self.view.is_all else self.view.span_s,
             "states": self.states.isChecked(),
-            "across": self.across.isChecked(),
+            "across": self.xy_toggle.isChecked(),
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -566,7 +566,7 @@ class PlotPanel(PanelWidget):
             self.view.set_span(float(span))
             self._update_span()
         self.states.setChecked(state.get("states") is not False)
-        self.across.setChecked(state.get("across") is True)
+        self.xy_toggle.setChecked(state.get("across") is True)
         self._curves_changed()
 
     def _restore_curve(self, saved: Mapping[str, object]) -> None:
@@ -581,7 +581,8 @@ class PlotPanel(PanelWidget):
             return
         for curve in curves:
             plot_curve = PlotCurve(curve, parse_style(saved, next_style(self.shown)))
-            plot_curve.right, plot_curve.is_hidden = saved.get("right") is True, saved.get("hidden") is True
+            plot_curve.is_on_right_axis = saved.get("right") is True
+            plot_curve.is_hidden = saved.get("hidden") is True
             self.shown.append(plot_curve)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

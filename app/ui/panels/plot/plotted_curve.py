@@ -23,13 +23,13 @@ class PlotCurve:
     Attributes:
         curve: Curve with its data.
         style: Style.
-        right: True for the right axis, False for the left one.
+        is_on_right_axis: True for the right axis, False for the left one.
         is_hidden: True if the user has hidden the curve.
     """
 
     curve: Curve
     style: CurveStyle
-    right: bool = False
+    is_on_right_axis: bool = False
     is_hidden: bool = False
 
     @property
@@ -42,7 +42,7 @@ class PlotCurve:
         source = self.curve.source
         state: dict[str, object] = {
             "text": self.name,
-            "right": self.right,
+            "right": self.is_on_right_axis,
             "hidden": self.is_hidden,
             "colour": self.style.colour,
             "pattern": self.style.pattern,
@@ -52,17 +52,17 @@ class PlotCurve:
         return state
 
 
-def parse_style(saved: Mapping[str, object], otherwise: CurveStyle) -> CurveStyle:
+def parse_style(saved: Mapping[str, object], default: CurveStyle) -> CurveStyle:
     """Return the style from a saved state.
 
     Args:
         saved: State from the layout.
-        otherwise: Style whose colour or pattern replaces an invalid entry.
+        default: Style whose colour or pattern replaces an invalid entry.
     """
     colour, pattern = saved.get("colour"), saved.get("pattern")
     return CurveStyle(
-        colour % 6 if isinstance(colour, int) else otherwise.colour,
-        pattern % 4 if isinstance(pattern, int) else otherwise.pattern,
+        colour % 6 if isinstance(colour, int) else default.colour,
+        pattern % 4 if isinstance(pattern, int) else default.pattern,
     )
 
 

@@ -76,10 +76,10 @@ class TimeView:
             visible_range: Start and end of the visible range in s.
         """
         span_s = _clamp_span((visible_range[1] - visible_range[0]) * factor)
-        share = (visible_range[1] - at_s) / max(MIN_SPAN_S, visible_range[1] - visible_range[0])
+        fraction = (visible_range[1] - at_s) / max(MIN_SPAN_S, visible_range[1] - visible_range[0])
         self.span_s, self.is_all = span_s, False
         if self.paused_end_s is not None:
-            self.paused_end_s = at_s + share * span_s
+            self.paused_end_s = at_s + fraction * span_s
 
     def move(self, by_s: float, visible_range: tuple[float, float]) -> None:
         """Shift the range and fix it.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 MATCHES_WIDTH, MATCHES_HEIGHT = 470, 300
 MAX_TOPICS, MAX_BYTES_PER_S = 40, 2e6
-MAX_SHOWN, MAX_FIELDS = 60, 4000
+MAX_MATCHES, MAX_FIELDS = 60, 4000
 REFRESH_MS = 250
 ICONS = {"number": "hash", "state": "toggle-left", "list": "brackets"}
 EXAMPLE_EXPRESSIONS = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
@@ -78,7 +78,7 @@ class FieldCatalog:
         ]
 
     def fields(self) -> Iterable[tuple[str, PlottableField]]:
-        """Yield the fields that can be plotted, each as the expression that plots it and the field."""
+        """Yield each field that can be plotted, after the expression that plots it."""
         count = 0
         for key in self._watches:
             topic = self._session.topic(key)
@@ -100,13 +100,13 @@ class _MatchPopup(QWidget):
         super().__init__(parent)
         self._theme = theme
         self.list = EntryList(theme, _("Matching fields"))
-        self.foot = label("", "small", role="textTertiary")
-        self.foot.setContentsMargins(14, 2, 10, 5)
+        self.footer = label("", "small", role="textTertiary")
+        self.footer.setContentsMargins(14, 2, 10, 5)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 5, 1, 1)
         column.setSpacing(2)
         column.addWidget(self.list, 1)
-        column.addWidget(self.foot)
+        column.addWidget(self.footer)
         self.hide()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -121,7 +121,7 @@ class AddCurveField(SearchField):
 
     Args:
         session: Session with the topics.
-        plotted: Returns the expressions of existing curves, which can be used in formulas.
+        plotted_expressions: Returns the expressions of existing curves, which can be used in formulas.
 
     Signals:
         add_requested: Expression of the curve to add, and True for the right axis.
@@ -132,10 +132,12 @@ class AddCurveField(SearchField):
     add_requested = Signal(str, bool)
     exited = Signal()
 
-    def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
+    def __init__(
+        self, theme: Theme, session: Session, plotted_expressions: Callable[[], Iterable[str]]
+    ) -> None:
         super().__init__(theme, _("Add a curve"), "C")
         self.setMinimumWidth(round(theme.scaled(150)))
-        self._plotted = plotted
+        self._plotted_expressions = plotted_expressions
         self.catalog = FieldCatalog(session)
         self.error_message = ""
         self._matches: _MatchPopup | None = None
@@ -190,7 +192,7 @@ class AddCurveField(SearchField):
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if text.endswith("."):
-            self.end(False)  # the focus selected everything; typing would replace it
+            self.end(False)  # setting the focus selected the text, so that typing would replace it
         self._search()
 
     def show_error(self, message: str) -> None:
@@ -208,7 +210,6 @@ class AddCurveField(SearchField):
     # -- matches ------------------------------------------------------------------------------------------
 
     def _refresh_fields(self) -> None:
-        # Refreshes fields and values.
         self.catalog.open()
         before = len(self._offered_fields)
         self._read_fields()
@@ -216,7 +217,7 @@ class AddCurveField(SearchField):
             self._search(keep_selection=True)
             return
         match_list = self.matches.list
-        for line in list(match_list.lines.lines):
+        for line in list(match_list.line_model.lines):
             field = None if isinstance(line, Heading) else self._offered_fields.get(line.entry.text)
             if field is not None and not isinstance(line, Heading):
                 match_list.update_entry(line.entry.id, _value_note(field))
@@ -245,12 +246,12 @@ class AddCurveField(SearchField):
             for text, field in self._offered_fields.items()
         ]
         if typed:
-            matches, count = Finder(fields).find(typed, MAX_SHOWN)
+            matches, count = Finder(fields).find(typed, MAX_MATCHES)
         else:
-            matches, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
+            matches, count = [Match(entry) for entry in fields[:MAX_MATCHES]], len(fields)
         lines: list[Line] = [Heading(_("Fields")), *matches] if matches else []
         names = [example.split("(")[0] for example in EXAMPLE_EXPRESSIONS]
-        example_field = next(iter(self._plotted()), None) or (
+        example_field = next(iter(self._plotted_expressions()), None) or (
             matches[0].entry.text if matches else "/odom.speed"
         )
         calculated = [
@@ -266,11 +267,11 @@ class AddCurveField(SearchField):
         if self._matches is None:
             return
         hint = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
-        fit = ngettext("{count} field", "{count} fields", count).format(count=count)
-        self._matches.foot.setText(self.error_message or f"{hint} · {fit}")
-        self._matches.foot.setProperty("role", "error" if self.error_message else "textTertiary")
-        self._matches.foot.style().unpolish(self._matches.foot)
-        self._matches.foot.style().polish(self._matches.foot)
+        count_text = ngettext("{count} field", "{count} fields", count).format(count=count)
+        self._matches.footer.setText(self.error_message or f"{hint} · {count_text}")
+        self._matches.footer.setProperty("role", "error" if self.error_message else "textTertiary")
+        self._matches.footer.style().unpolish(self._matches.footer)
+        self._matches.footer.style().polish(self._matches.footer)
 
     def _position_matches(self, has_lines: bool) -> None:
         matches = self.matches
@@ -279,7 +280,7 @@ class AddCurveField(SearchField):
             return
         window = self.window()
         position = self.mapTo(window, QPoint(0, self.height() + 4))
-        footer_size = matches.foot.sizeHint()
+        footer_size = matches.footer.sizeHint()
         width = min(
             max(round(self._theme.scaled(MATCHES_WIDTH)), footer_size.width() + 4), window.width() - 8
         )
@@ -303,9 +304,9 @@ class AddCurveField(SearchField):
             and event.type() == QEvent.Type.KeyPress
             and event.key() == Qt.Key.Key_Tab
         ):
-            longer = self._completed_text()
-            if longer != self.text():
-                self.setText(longer)
+            completed = self._completed_text()
+            if completed != self.text():
+                self.setText(completed)
                 self._search()
                 return True
         return super().event(event)
@@ -321,12 +322,12 @@ class AddCurveField(SearchField):
             *self.catalog.topic_keys(),
             *(f"{name}(" for name in (*FUNCTIONS, *WINDOW_FUNCTIONS)),
         ]
-        longer = complete(last, candidates) if last else last
-        if longer == last and self._matches is not None and not start:
+        completed = complete(last, candidates) if last else last
+        if completed == last and self._matches is not None and not start:
             entry = self._matches.list.entry
             if entry is not None and last and entry.text != last and match(last, entry.text) is not None:
                 return entry.text
-        return before + longer
+        return before + completed
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key()
@@ -349,8 +350,8 @@ class AddCurveField(SearchField):
         # A complete expression takes precedence over the selected match.
         typed = self.text().strip()
         entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None
-        is_whole = typed in self._offered_fields or any(sign in typed for sign in "(+*") or " " in typed
-        text = typed if is_whole or entry is None else entry.text
+        is_expression = typed in self._offered_fields or any(sign in typed for sign in "(+*") or " " in typed
+        text = typed if is_expression or entry is None else entry.text
         if text:
             self.add_requested.emit(text, right)
 
@@ -369,12 +370,14 @@ class PlotTools(QWidget):
 
     Args:
         session: Session with the topics.
-        plotted: Returns the expressions of existing curves.
+        plotted_expressions: Returns the expressions of existing curves.
     """
 
-    def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
+    def __init__(
+        self, theme: Theme, session: Session, plotted_expressions: Callable[[], Iterable[str]]
+    ) -> None:
         super().__init__()
-        self.add = AddCurveField(theme, session, plotted)
+        self.add = AddCurveField(theme, session, plotted_expressions)
         self.span = Segments(
             theme,
             [(value, _(SPAN_LABELS[value]), None) for value, _s in SPANS],
@@ -382,29 +385,29 @@ class PlotTools(QWidget):
             size="small",
             name=_("Time range shown"),
         )
-        self.cursors = ToggleButton(theme, _("A and B"), "ruler")
+        self.cursors = ToggleButton(theme, _("Cursors"), "ruler")
         self.states = ToggleButton(theme, _("States"), "rows-3")
         self.states.setChecked(True)
-        self.across = ToggleButton(theme, _("X and Y"), "chart-spline")
-        self.across.setToolTip(plain.tip(_("Plot the second curve against the first")))
-        self.across.setProperty("tip", True)
+        self.xy_toggle = ToggleButton(theme, _("X and Y"), "chart-spline")
+        self.xy_toggle.setToolTip(plain.tip(_("Plot the second curve against the first")))
+        self.xy_toggle.setProperty("tip", True)
         self.export = MenuButton(theme, _("Export"), "download", size="small")
         row = Flow(self, gap=8, row_gap=6)
         row.setContentsMargins(10, 6, 10, 6)
-        row.add_elastic(self.add, greedy=True)
+        row.add_elastic(self.add, is_greedy=True)
         row.push()
-        self._curve_tools = (self.span, self.cursors, self.states, self.across, self.export)
+        self._curve_tools = (self.span, self.cursors, self.states, self.xy_toggle, self.export)
         for widget in self._curve_tools:
             row.addWidget(widget)
 
-    def update_tools(self, curves: int, numbers: int) -> None:
+    def update_tools(self, curve_count: int, numeric_count: int) -> None:
         """Show the tools that apply to the current curves.
 
         Args:
-            curves: Number of curves.
-            numbers: Number of curves with numeric values.
+            curve_count: Number of curves.
+            numeric_count: Number of curves with numeric values.
         """
         for widget in self._curve_tools:
-            paint.show_when(widget, curves > 0)
-        paint.show_when(self.states, curves > numbers)
-        paint.show_when(self.across, numbers > 1)
+            paint.show_when(widget, curve_count > 0)
+        paint.show_when(self.states, curve_count > numeric_count)
+        paint.show_when(self.xy_toggle, numeric_count > 1)

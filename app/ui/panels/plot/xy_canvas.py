@@ -29,7 +29,7 @@ Path = tuple[PlotCurve, PlotCurve, Floats, Floats, Floats]
 def path_of(
     x_curve: PlotCurve, y_curve: PlotCurve, begin_s: float, end_s: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the points of one curve against another.
+    """Return the points of one curve plotted against another.
 
     Args:
         x_curve: Curve with the x coordinates; its times are used.
@@ -53,7 +53,7 @@ def path_of(
 
 
 class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
-    """XY plot of pairs of curves: the first against the second, the third against the fourth, and so on."""
+    """XY plot of pairs of curves: the second against the first, the fourth against the third, and so on."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(background=None)
@@ -86,7 +86,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             axis.setStyle(tickLength=0, autoExpandTextSpace=False, autoReduceTextSpace=False)
             axis.setTickFont(theme.font("caption"))
             axis.setPen(pg.mkPen(theme.colour("border")))
-            axis.setTickPen(pg.mkPen(theme.colour("controlBorder" if theme.high_contrast else "grid")))
+            axis.setTickPen(pg.mkPen(theme.colour("controlBorder" if theme.is_high_contrast else "grid")))
             axis.setTextPen(theme.colour("textSecondary"))
         self.setBackground(theme.colour("panel"))
         self.plot.getAxis("bottom").setHeight(round(theme.scaled(24)))
@@ -128,7 +128,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
     def _fit(self) -> None:
         points = [
             (xs[finite], ys[finite])
-            for _a, _u, _t, xs, ys in self._paths
+            for _x_curve, _y_curve, _times, xs, ys in self._paths
             if (finite := _finite_mask(xs, ys)).any()
         ]
         if not points:
@@ -158,8 +158,8 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
 
     @staticmethod
     def _point_at(path: Path, time_s: float) -> tuple[float, float] | None:
-        x_sample, y_curve = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
-        return (x_sample[1], y_curve[1]) if x_sample is not None and y_curve is not None else None
+        x_sample, y_sample = path[0].curve.samples.at(time_s), path[1].curve.samples.at(time_s)
+        return (x_sample[1], y_sample[1]) if x_sample is not None and y_sample is not None else None
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -183,12 +183,12 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
                 paint.text_line(painter, flag, name, font, self.theme.colour("tooltipText"), paint.CENTRE)
 
     def _paint_arrow(self, painter: QPainter, path: Path) -> None:
-        _across, y_curve, _times, xs, ys = path
+        _x_curve, y_curve, _times, xs, ys = path
         (finite,) = np.nonzero(_finite_mask(xs, ys))
         if len(finite) < 2:
             return
         tip = self.position_of(float(xs[finite[-1]]), float(ys[finite[-1]]))
-        before = next(
+        tail = next(
             (
                 position
                 for index in reversed(finite[-60:-1].tolist())
@@ -197,9 +197,9 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
             ),
             None,
         )
-        if before is None:
+        if tail is None:
             return
-        angle = math.atan2(tip.y() - before.y(), tip.x() - before.x())
+        angle = math.atan2(tip.y() - tail.y(), tip.x() - tail.x())
         corners = [
             tip + QPointF(length * math.cos(angle + rotation), length * math.sin(angle + rotation))
             for length, rotation in (

@@ -48,8 +48,8 @@ class TopicEdit(QLineEdit):
         self.setPlaceholderText("/topic")
         self.setProperty("focusRadius", theme.radius("control"))
         FieldContextMenu(theme, self)
-        self._offered = QStringListModel(self)
-        completer = QCompleter(self._offered, self)
+        self._completion_model = QStringListModel(self)
+        completer = QCompleter(self._completion_model, self)
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
         completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
         completer.setMaxVisibleItems(10)
@@ -62,8 +62,8 @@ class TopicEdit(QLineEdit):
     def set_completions(self, names: Sequence[str]) -> None:
         """Set the names offered as completions."""
         completions = list(names[:MAX_COMPLETIONS])
-        if completions != self._offered.stringList():
-            self._offered.setStringList(completions)
+        if completions != self._completion_model.stringList():
+            self._completion_model.setStringList(completions)
 
 
 class MessageForm(QWidget):
@@ -75,7 +75,7 @@ class MessageForm(QWidget):
         type_of: Returns the message type of an existing topic, or "".
     """
 
-    changed = Signal(object)  # KeptMessage
+    changed = Signal(object)  # SavedMessage
     send_requested = Signal()
     repeat_requested = Signal()
     template_requested = Signal()
@@ -95,59 +95,61 @@ class MessageForm(QWidget):
 
     def _make_fields(self) -> None:
         theme = self._theme
-        self.name = QLineEdit()
-        self.name.setAccessibleName(_("Message name"))
-        self.name.setMaxLength(MAX_NAME_LENGTH)
-        FieldContextMenu(theme, self.name)
-        self.topic = TopicEdit(theme)
-        self.kind = QLineEdit()
-        self.kind.setAccessibleName(_("Message type"))
-        self.kind.setPlaceholderText("json")
-        FieldContextMenu(theme, self.kind)
-        for field in (self.name, self.kind):
+        self.name_field = QLineEdit()
+        self.name_field.setAccessibleName(_("Message name"))
+        self.name_field.setMaxLength(MAX_NAME_LENGTH)
+        FieldContextMenu(theme, self.name_field)
+        self.topic_field = TopicEdit(theme)
+        self.type_field = QLineEdit()
+        self.type_field.setAccessibleName(_("Message type"))
+        self.type_field.setPlaceholderText("json")
+        FieldContextMenu(theme, self.type_field)
+        for field in (self.name_field, self.type_field):
             field.setProperty("focusRadius", theme.radius("control"))
-        self.values = ValueFields(theme)
-        self.name.textEdited.connect(lambda text: self._update_message(name=text))
-        self.topic.textChanged.connect(self._topic_typed)
-        self.kind.textEdited.connect(lambda text: self._update_message(msg_type=text.strip() or "json"))
-        self.values.typed.connect(self._value_typed)
+        self.value_fields = ValueFields(theme)
+        self.name_field.textEdited.connect(lambda text: self._update_message(name=text))
+        self.topic_field.textChanged.connect(self._topic_typed)
+        self.type_field.textEdited.connect(lambda text: self._update_message(msg_type=text.strip() or "json"))
+        self.value_fields.typed.connect(self._value_typed)
 
     def _make_text(self) -> None:
         theme = self._theme
-        self.template = Button(theme, _("Use the last message"), "history", kind="ghost", size="small")
-        self.template.setToolTip(plain.tip(_("Copies the topic's last message, or the fields of its type")))
-        self.tidy = Button(theme, _("Format"), "wand-sparkles", kind="ghost", size="small")
-        self.tidy.setToolTip(plain.tip(_("Puts each field on its own line")))
-        for button in (self.template, self.tidy):
+        self.template_button = Button(theme, _("Use the last message"), "history", kind="ghost", size="small")
+        self.template_button.setToolTip(
+            plain.tip(_("Copies the topic's last message, or the fields of its type"))
+        )
+        self.format_button = Button(theme, _("Format"), "wand-sparkles", kind="ghost", size="small")
+        self.format_button.setToolTip(plain.tip(_("Puts each field on its own line")))
+        for button in (self.template_button, self.format_button):
             button.allow_shrinking()
         self.edit = JsonEdit(theme, _("Message"))
         self.fault_icon = StatusIcon(theme, "error", height=20)
-        self.sentence = label("", "small", role="error", wrap=True)
-        self.sentence.setMinimumWidth(0)
-        self.fix = Button(theme, _("Fix it"), "wrench", size="small")
-        self.template.clicked.connect(self.template_requested)
-        self.tidy.clicked.connect(self.format_json)
-        self.fix.clicked.connect(self.apply_fix)
+        self.problem_label = label("", "small", role="error", wrap=True)
+        self.problem_label.setMinimumWidth(0)
+        self.fix_button = Button(theme, _("Fix it"), "wrench", size="small")
+        self.template_button.clicked.connect(self.template_requested)
+        self.format_button.clicked.connect(self.format_json)
+        self.fix_button.clicked.connect(self.apply_fix)
         self.edit.changed.connect(self._text_typed)
         self.edit.submitted.connect(self.send_requested)
 
     def _make_buttons(self) -> None:
         theme = self._theme
-        self.send = Button(theme, _("Send"), "send", kind="primary")
-        self.send.setToolTip(plain.tip(tip_with_key(_("Sends the message once"), "Ctrl+Enter")))
-        self.last = ElidedLabel("small", "textSecondary")
-        self.repeat = Button(theme, _("Start sending"), "repeat")
-        self.rate = NumberEdit(theme, MIN_HZ, MAX_HZ, _("/s"), 1)
-        self.rate.setAccessibleName(_("Messages per second"))
-        self.rate.setFixedWidth(round(theme.scaled(RATE_WIDTH_PX)))
-        self.rate.number.connect(lambda value: self._update_message(rate_hz=value))
-        self.count = ElidedLabel("small", "textSecondary")
+        self.send_button = Button(theme, _("Send"), "send", kind="primary")
+        self.send_button.setToolTip(plain.tip(tip_with_key(_("Sends the message once"), "Ctrl+Enter")))
+        self.last_result_label = ElidedLabel("small", "textSecondary")
+        self.repeat_button = Button(theme, _("Start sending"), "repeat")
+        self.rate_field = NumberEdit(theme, MIN_HZ, MAX_HZ, _("/s"), 1)
+        self.rate_field.setAccessibleName(_("Messages per second"))
+        self.rate_field.setFixedWidth(round(theme.scaled(RATE_WIDTH_PX)))
+        self.rate_field.number_entered.connect(lambda value: self._update_message(rate_hz=value))
+        self.count_label = ElidedLabel("small", "textSecondary")
         self.rate_hint = label("", "small", role="textTertiary", wrap=True)
         self.rate_hint.setMinimumWidth(0)
-        self.rate.problem_changed.connect(self._update_rate_hint)
+        self.rate_field.problem_changed.connect(self._update_rate_hint)
         self._update_rate_hint("")
-        self.send.clicked.connect(self.send_requested)
-        self.repeat.clicked.connect(self.repeat_requested)
+        self.send_button.clicked.connect(self.send_requested)
+        self.repeat_button.clicked.connect(self.repeat_requested)
 
     def _update_rate_hint(self, problem: str) -> None:
         hint = _("0.1 to 50 per second; stops when disarmed")
@@ -161,11 +163,11 @@ class MessageForm(QWidget):
         fields.setColumnStretch(1, 1)
         self._values_label = _make_name_label(_("Values"))
         rows = (
-            (_make_name_label(_("Name")), self.name),
-            (_make_name_label(_("Topic")), self.topic),
-            (_make_name_label(_("Type")), self.kind),
+            (_make_name_label(_("Name")), self.name_field),
+            (_make_name_label(_("Topic")), self.topic_field),
+            (_make_name_label(_("Type")), self.type_field),
         )
-        for index, (name_label, field) in enumerate((*rows, (self._values_label, self.values))):
+        for index, (name_label, field) in enumerate((*rows, (self._values_label, self.value_fields))):
             if isinstance(field, QLineEdit):
                 name_label.setBuddy(field)
             fields.addWidget(name_label, index, 0, Qt.AlignmentFlag.AlignTop)
@@ -174,13 +176,13 @@ class MessageForm(QWidget):
         header.setSpacing(4)
         header.addWidget(label(_("Message"), "small", role="textSecondary"))
         header.addStretch(1)
-        header.addWidget(self.template)
-        header.addWidget(self.tidy)
+        header.addWidget(self.template_button)
+        header.addWidget(self.format_button)
         fault = QHBoxLayout()
         fault.setSpacing(6)
         fault.addWidget(self.fault_icon, 0, Qt.AlignmentFlag.AlignTop)
-        fault.addWidget(self.sentence, 1)
-        fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
+        fault.addWidget(self.problem_label, 1)
+        fault.addWidget(self.fix_button, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
@@ -194,13 +196,13 @@ class MessageForm(QWidget):
     def _sending_rows(self) -> QVBoxLayout:
         send_row, repeat_row = QHBoxLayout(), QHBoxLayout()
         for row, parts in (
-            (send_row, (self.send, self.last)),
-            (repeat_row, (self.repeat, self.rate, self.count)),
+            (send_row, (self.send_button, self.last_result_label)),
+            (repeat_row, (self.repeat_button, self.rate_field, self.count_label)),
         ):
             row.setSpacing(10)
             for part in parts:
                 row.addWidget(part, 1 if isinstance(part, ElidedLabel) else 0)
-        for status_label in (self.last, self.count):
+        for status_label in (self.last_result_label, self.count_label):
             status_label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         rows = QVBoxLayout()
         rows.setSpacing(8)
@@ -213,21 +215,21 @@ class MessageForm(QWidget):
 
     def show_message(self, message: SavedMessage) -> None:
         """Show a message. Fields with an equivalent value are not changed, so as not to disturb typing."""
-        other = self.message is None or self.message.id != message.id
+        is_other_message = self.message is None or self.message.id != message.id
         if message == self.message:
             return
         self._is_showing = True
         self.message = message
         for field, text in (
-            (self.name, message.name),
-            (self.topic, message.topic),
-            (self.kind, message.msg_type),
+            (self.name_field, message.name),
+            (self.topic_field, message.topic),
+            (self.type_field, message.msg_type),
         ):
-            if other or (field.text().strip() or "json") != (text or "json"):
+            if is_other_message or (field.text().strip() or "json") != (text or "json"):
                 field.setText(text)
         self.edit.set_text(message.text)
-        if other or not self.rate.hasFocus():
-            self.rate.show_number(message.rate_hz)
+        if is_other_message or not self.rate_field.hasFocus():
+            self.rate_field.show_number(message.rate_hz)
         self._is_showing = False
         self._validate()
 
@@ -241,20 +243,20 @@ class MessageForm(QWidget):
         self.edit.set_highlighting(is_json)
         fault = self.parsed.fault
         self.edit.mark_line(fault.line if fault is not None else 0)
-        self.tidy.setEnabled(is_json and fault is None and not self.parsed.placeholders)
-        self.values.show_fields(self.parsed.manual_placeholders, dict(message.values))
-        for widget in (self._values_label, self.values):
+        self.format_button.setEnabled(is_json and fault is None and not self.parsed.placeholders)
+        self.value_fields.show_fields(self.parsed.manual_placeholders, dict(message.values))
+        for widget in (self._values_label, self.value_fields):
             widget.setVisible(bool(self.parsed.manual_placeholders))
 
     def show_problem(self, problem: str) -> None:
         """Show the reason why the message can't be sent; "" hides the reason."""
         fault = self.parsed.fault
         message = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
-        if message != self.sentence.text():
-            self.sentence.setText(message)
+        if message != self.problem_label.text():
+            self.problem_label.setText(message)
         self.fault_icon.setVisible(bool(problem))
-        self.sentence.setVisible(bool(problem))
-        self.fix.setVisible(fault is not None and fault.fix is not None)
+        self.problem_label.setVisible(bool(problem))
+        self.fix_button.setVisible(fault is not None and fault.fix is not None)
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -270,8 +272,8 @@ class MessageForm(QWidget):
             return
         topic = text.strip()
         msg_type = self._type_of(topic)
-        if msg_type and msg_type != self.kind.text():
-            self.kind.setText(msg_type)
+        if msg_type and msg_type != self.type_field.text():
+            self.type_field.setText(msg_type)
             self._update_message(topic=topic, msg_type=msg_type)
         else:
             self._update_message(topic=topic)
@@ -289,7 +291,7 @@ class MessageForm(QWidget):
 
     def set_type(self, msg_type: str) -> None:
         """Set the message type."""
-        self.kind.setText(msg_type)
+        self.type_field.setText(msg_type)
         self._update_message(msg_type=msg_type)
 
     def replace_text(self, text: str) -> None:

@@ -43,16 +43,16 @@ class PublishPanel(PanelWidget):
         self._last_state: tuple[object, ...] = ()
         self._ticks = 0
         self._requested_id = ""
-        self._peek: Watch | None = None
-        self._peeked = ""
-        self.count = label("", "small", role="textSecondary")
-        self.chips = [self.count]
-        self.new = Button(self.theme, _("New"), "plus", size="small")
-        self.new.setAccessibleName(_("New message"))
-        self.new.clicked.connect(lambda: self.open_for(""))
-        self.header = [self.new]
+        self._template_watch: Watch | None = None
+        self._template_topic = ""
+        self.count_label = label("", "small", role="textSecondary")
+        self.chips = [self.count_label]
+        self.new_button = Button(self.theme, _("New"), "plus", size="small")
+        self.new_button.setAccessibleName(_("New message"))
+        self.new_button.clicked.connect(lambda: self.open_for(""))
+        self.header = [self.new_button]
         self.strip = ArmedStrip(context)
-        self._minutes = ArmDurationMenu(self.theme, self, self.acting)
+        self._duration_menu = ArmDurationMenu(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter saved messages"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = SavedMessageList(self.theme, lambda each: state_cell(each, self.acting))
@@ -61,7 +61,10 @@ class PublishPanel(PanelWidget):
             self.theme,
             "send",
             _("No saved messages"),
-            _("Right-click a topic or a message, or create one."),
+            _(
+                "Right-click a topic or a received message and choose “Publish to this topic”, or create a "
+                "new message."
+            ),
             [EmptyAction(_("New"), lambda: self.open_for(""), "plus", is_primary=True)],
         )
         self._connect()
@@ -89,16 +92,16 @@ class PublishPanel(PanelWidget):
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # the form takes the remaining height
-        self._sides = ListDetailView(
+        self._list_detail_view = ListDetailView(
             self.theme,
             (self.filter, self.list, scroll),
             list_px=LIST_WIDTH_PX,
-            list_high_px=LIST_HEIGHT_PX,
+            list_height_px=LIST_HEIGHT_PX,
             narrow_px=SIDE_BY_SIDE_PX,
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
-        self.pages.addWidget(self._sides)
+        self.pages.addWidget(self._list_detail_view)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -110,20 +113,20 @@ class PublishPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         self.strip.refresh()
-        self._poll_peek()
+        self._poll_template()
         acting, topics = self.acting, self.session.live.topics
         state = (acting.saved_messages.revision, acting.revision, acting.arming.revision, topics.revision)
         if state != self._last_state:
             self._last_state = state
             self._rebuild()
-            self.form.topic.set_completions(sorted(topic.name for topic in topics.existing_topics()))
+            self.form.topic_field.set_completions(sorted(topic.name for topic in topics.existing_topics()))
         elif self._ticks % STATE_UPDATE_TICKS == 0:
             self._update_sending()
             self.list.refresh_visible()
 
     def source_changed(self) -> None:
         self._last_state = ()
-        self._end_peek()
+        self._stop_template_watch()
 
     def _rebuild(self) -> None:
         messages = self.acting.saved_messages.messages
@@ -146,7 +149,7 @@ class PublishPanel(PanelWidget):
         self.list.refresh_visible()
         self.pages.setCurrentIndex(1 if messages else 0)
         text = ngettext("{count} saved message", "{count} saved messages", len(messages))
-        self.count.setText(text.format(count=len(messages)) if messages else "")
+        self.count_label.setText(text.format(count=len(messages)) if messages else "")
         self._show_selected()
 
     @property
@@ -159,7 +162,7 @@ class PublishPanel(PanelWidget):
         self.form.setVisible(message is not None)
         if message is not None:
             if self.form.message is not None and self.form.message.id != message.id:
-                self._end_peek()
+                self._stop_template_watch()
             self.form.show_message(message)
             self._update_sending()
 
@@ -171,20 +174,22 @@ class PublishPanel(PanelWidget):
         problem = acting.problem_of(message)
         form.show_problem(problem)
         is_armed = acting.arming.allows(Target("topic", message.topic))
-        is_going = acting.outbox.is_sending(message.id)
+        is_sending = acting.outbox.is_sending(message.id)
         can_send = not problem and not self.session.is_replaying
-        form.send.setEnabled(can_send)
-        form.send.set_label(_("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock")
-        form.repeat.setEnabled(can_send or is_going)
-        form.repeat.set_label(
-            _("Stop sending") if is_going else _("Start sending"), "square" if is_going else "repeat"
+        form.send_button.setEnabled(can_send)
+        form.send_button.set_label(
+            _("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock"
         )
-        form.rate.setEnabled(not is_going)
-        form.last.setText(self._last_result_text(message))
-        form.count.setText(self._count_text(message))
+        form.repeat_button.setEnabled(can_send or is_sending)
+        form.repeat_button.set_label(
+            _("Stop sending") if is_sending else _("Start sending"), "square" if is_sending else "repeat"
+        )
+        form.rate_field.setEnabled(not is_sending)
+        form.last_result_label.setText(self._last_result_text(message))
+        form.count_label.setText(self._count_text(message))
 
     def _last_result_text(self, message: SavedMessage) -> str:
-        result, at_s = self.acting.last.get(message.id), self.acting.sent_at_s.get(message.id)
+        result, at_s = self.acting.last_results.get(message.id), self.acting.last_sent_s.get(message.id)
         if result is None or at_s is None:
             return ""
         clock = dt.datetime.fromtimestamp(at_s, tz=dt.timezone.utc).astimezone().strftime("%H:%M:%S")
@@ -230,7 +235,7 @@ class PublishPanel(PanelWidget):
         self._rebuild()
         if not saved and topic:
             self.insert_template()
-        field = self.form.edit if topic else self.form.topic
+        field = self.form.edit if topic else self.form.topic_field
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def insert_template(self) -> None:
@@ -243,37 +248,37 @@ class PublishPanel(PanelWidget):
         if message is None:
             return
         topic = self.session.live.topics.get(message.topic)
-        if self._peek is not None or topic is None or not topic.publishers:
-            self._end_peek()
+        if self._template_watch is not None or topic is None or not topic.publishers:
+            self._stop_template_watch()
             self.form.replace_text(format_empty_message(message.msg_type))
             if topic is None or not topic.publishers:
                 self.context.show_toast(_("No publisher on this topic: using the fields of the message type"))
             return
         if topic.msg_type != message.msg_type:
             self.form.set_type(topic.msg_type)
-        self._peeked = message.topic
-        self._peek = self.session.watch(message.topic)
-        self.form.template.set_label(_("Waiting for a message"), "hourglass")
-        self._poll_peek()
+        self._template_topic = message.topic
+        self._template_watch = self.session.watch(message.topic)
+        self.form.template_button.set_label(_("Waiting for a message"), "hourglass")
+        self._poll_template()
 
-    def _poll_peek(self) -> None:
-        if self._peek is None:
+    def _poll_template(self) -> None:
+        if self._template_watch is None:
             return
-        topic = self.session.live.topics.get(self._peeked)
+        topic = self.session.live.topics.get(self._template_topic)
         newest = topic.newest if topic is not None else None
         if newest is None:
             return
-        self._end_peek()
+        self._stop_template_watch()
         try:
             self.form.replace_text(format_message(newest))
         except NepError as error:
             self.context.show_toast(str(error))
 
-    def _end_peek(self) -> None:
-        if self._peek is not None:
-            self._peek.close()
-            self._peek = None
-            self.form.template.set_label(_("Use the last message"), "history")
+    def _stop_template_watch(self) -> None:
+        if self._template_watch is not None:
+            self._template_watch.close()
+            self._template_watch = None
+            self.form.template_button.set_label(_("Use the last message"), "history")
 
     def _message_edited(self, message: object) -> None:
         if isinstance(message, SavedMessage):
@@ -323,18 +328,18 @@ class PublishPanel(PanelWidget):
             self._rebuild()
 
     def _undo_delete(self) -> None:
-        back = self.acting.saved_messages.restore()
-        if back is not None:
-            self._requested_id = back.id
+        restored = self.acting.saved_messages.restore()
+        if restored is not None:
+            self._requested_id = restored.id
             self._rebuild()
 
     def menu_of(self, id: str) -> Menu:
         """Return the context menu of a message."""
-        is_going = self.acting.outbox.is_sending(id)
-        text = _("Stop sending") if is_going else _("Start sending")
+        is_sending = self.acting.outbox.is_sending(id)
+        text = _("Stop sending") if is_sending else _("Start sending")
         actions = [
             RowAction(_("Send"), "send", self.send),
-            RowAction(text, "square" if is_going else "repeat", self.repeat),
+            RowAction(text, "square" if is_sending else "repeat", self.repeat),
             RowAction(_("Duplicate"), "copy", lambda: self.copy(id)),
             RowAction(_("Delete"), "trash-2", lambda: self.delete(id)),
         ]
@@ -348,7 +353,7 @@ class PublishPanel(PanelWidget):
     # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
-        return (self._minutes.entry(),)
+        return (self._duration_menu.entry(),)
 
     def focus_filter(self) -> bool:
         show_when(self.filter, True)
@@ -358,7 +363,7 @@ class PublishPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         self.list.fit_rows()
-        self._sides.fit()
+        self._list_detail_view.fit()
 
     def save_state(self) -> dict[str, object]:
         return {"message": self.list.selected_key() or ""}
@@ -368,10 +373,10 @@ class PublishPanel(PanelWidget):
         self._rebuild()
 
     def suspendables(self) -> Iterable[Suspendable | None]:
-        return (self._peek,)
+        return (self._template_watch,)
 
     def dispose(self) -> None:
-        self._end_peek()
+        self._stop_template_watch()
         self.acting.disarm()
 
 

@@ -27,7 +27,7 @@ def state_cell(message: SavedMessage, acting: SessionActing) -> Cell:
         return Cell(_("{rate}/s").format(rate=rate_text(message.rate_hz)), "dot", "warn")
     fault = None if is_plain_text(message.msg_type) else parse_json_text(message.text).fault
     if fault is not None:
-        return Cell(_("line {line}").format(line=fault.line), "circle-x", "error")
+        return Cell(_("error, line {line}").format(line=fault.line), "circle-x", "error")
     if acting.problem_of(message):
         return Cell(_("not ready"), "circle-x", "error")
     if not acting.arming.allows(Target("topic", message.topic)):
@@ -87,13 +87,13 @@ class SavedMessageList(TableView[SavedMessage]):
         self.selected.emit(self.selected_key() or "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, pressed = self.selected_key(), event.key()
+        key, pressed_key = self.selected_key(), event.key()
         has_ctrl = event.modifiers() == Qt.KeyboardModifier.ControlModifier
-        if key is not None and has_ctrl and pressed in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+        if key is not None and has_ctrl and pressed_key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.send_requested.emit(key)
-        elif key is not None and has_ctrl and pressed == Qt.Key.Key_D:
+        elif key is not None and has_ctrl and pressed_key == Qt.Key.Key_D:
             self.copy_requested.emit(key)
-        elif key is not None and is_plain_key(event) and pressed == Qt.Key.Key_Delete:
+        elif key is not None and is_plain_key(event) and pressed_key == Qt.Key.Key_Delete:
             self.delete_requested.emit(key)
         else:
             super().keyPressEvent(event)

@@ -53,7 +53,7 @@ class ValueFields(QWidget):
             self._set_invalid(field, is_invalid=not value.strip())
 
     def _rebuild(self, names: Sequence[str]) -> None:
-        focused = next((name for name, field in self.fields.items() if field.hasFocus()), "")
+        focused_name = next((name for name, field in self.fields.items() if field.hasFocus()), "")
         for part in self._parts:
             self._flow.removeWidget(part)
             part.hide()
@@ -61,8 +61,8 @@ class ValueFields(QWidget):
         self._parts, self.fields = [], {}
         for name in names:
             self._add_field(name)
-        if focused in self.fields:
-            self.fields[focused].setFocus()
+        if focused_name in self.fields:
+            self.fields[focused_name].setFocus()
 
     def _add_field(self, name: str) -> None:
         part = QWidget()

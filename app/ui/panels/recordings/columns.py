@@ -30,14 +30,14 @@ BADGES = {
 """Text, status and icon of each badge, by key."""
 
 
-def badge_of(info: RecordingInfo, being_written: bool) -> str:
+def badge_of(info: RecordingInfo, is_being_written: bool) -> str:
     """Return the key in `BADGES` of a recording's badge, or "" for no badge.
 
     Args:
         info: Properties of the recording.
-        being_written: True for the recording in progress.
+        is_being_written: True for the recording in progress.
     """
-    if being_written:
+    if is_being_written:
         return "recording"
     if info.problem:
         return "unreadable"
@@ -69,34 +69,36 @@ class RecordingMark:
     picture: QImage | None = field(compare=False)
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        side = theme.scaled(1.0)
-        picture_rect = QRectF(box.left(), 0, THUMBNAIL_SIZE.width() * side, THUMBNAIL_SIZE.height() * side)
+        pixel_scale = theme.scaled(1.0)
+        picture_rect = QRectF(
+            box.left(), 0, THUMBNAIL_SIZE.width() * pixel_scale, THUMBNAIL_SIZE.height() * pixel_scale
+        )
         picture_rect.moveCenter(QPointF(picture_rect.center().x(), box.center().y()))
         self._paint_picture(painter, picture_rect, theme)
         text_rect = QRectF(box)
         text_rect.setLeft(picture_rect.right() + GAP)
-        name, small = theme.font("label"), theme.font("small")
-        name.setWeight(name.Weight.DemiBold)
-        name_height, low = paint.height_of(name), paint.height_of(small)
-        top = box.center().y() - (name_height + (low if self.note else 0)) / 2
+        name_font, note_font = theme.font("label"), theme.font("small")
+        name_font.setWeight(name_font.Weight.DemiBold)
+        name_height, note_height = paint.height_of(name_font), paint.height_of(note_font)
+        top = box.center().y() - (name_height + (note_height if self.note else 0)) / 2
         chip = self._chip_width(theme)
-        room = max(0.0, text_rect.width() - (chip + 8 if chip else 0))
-        name_width = min(paint.width_of(name, self.name) + 1, room)
+        max_name_width = max(0.0, text_rect.width() - (chip + 8 if chip else 0))
+        name_width = min(paint.width_of(name_font, self.name) + 1, max_name_width)
         paint.text_line(
             painter,
             QRectF(text_rect.left(), top, name_width, name_height),
             self.name,
-            name,
+            name_font,
             theme.colour("text"),
         )
         if chip:
-            middle = QRectF(
+            chip_rect = QRectF(
                 text_rect.left() + name_width + 8, top + name_height / 2 - CHIP_HEIGHT / 2, chip, CHIP_HEIGHT
             )
-            self._paint_chip(painter, middle, theme)
+            self._paint_chip(painter, chip_rect, theme)
         if self.note:
-            line = QRectF(text_rect.left(), top + name_height, text_rect.width(), low)
-            paint.text_line(painter, line, self.note, small, theme.colour("textSecondary"))
+            note_rect = QRectF(text_rect.left(), top + name_height, text_rect.width(), note_height)
+            paint.text_line(painter, note_rect, self.note, note_font, theme.colour("textSecondary"))
 
     def _paint_picture(self, painter: QPainter, rect: QRectF, theme: Theme) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -107,10 +109,10 @@ class RecordingMark:
             icon.moveCenter(rect.center())
             paint_icon(painter, icon, "chart-line", theme.colour("textTertiary"))
             return
-        edge = QPainterPath()
-        edge.addRoundedRect(rect, radius, radius)
+        clip_path = QPainterPath()
+        clip_path.addRoundedRect(rect, radius, radius)
         painter.save()
-        painter.setClipPath(edge)
+        painter.setClipPath(clip_path)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         painter.drawImage(rect, self.picture)
         painter.restore()
@@ -138,13 +140,13 @@ def crop_to_thumbnail(image: QImage) -> QImage:
     width, height = image.width(), image.height()
     if not width or not height:
         return image
-    share = THUMBNAIL_SIZE.width() / THUMBNAIL_SIZE.height()
-    crop_width = min(width, round(height * share))
-    crop_height = min(height, round(width / share))
-    middle = image.copy(
+    aspect_ratio = THUMBNAIL_SIZE.width() / THUMBNAIL_SIZE.height()
+    crop_width = min(width, round(height * aspect_ratio))
+    crop_height = min(height, round(width / aspect_ratio))
+    cropped = image.copy(
         (width - crop_width) // 2, (height - crop_height) // 2, max(1, crop_width), max(1, crop_height)
     )
-    return middle.scaled(2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height())
+    return cropped.scaled(2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height())
 
 
 def note_of(info: RecordingInfo) -> str:
@@ -154,20 +156,20 @@ def note_of(info: RecordingInfo) -> str:
 
 def columns(
     picture: Callable[[RecordingInfo], QImage | None],
-    is_written: Callable[[RecordingInfo], bool],
+    is_being_written: Callable[[RecordingInfo], bool],
     now: Callable[[], dt.datetime],
 ) -> tuple[Column[RecordingInfo], ...]:
     """Return the columns of the table.
 
     Args:
         picture: Returns the thumbnail of a recording, or None if it is not loaded.
-        is_written: Returns True for the recording in progress.
+        is_being_written: Returns True for the recording in progress.
         now: Returns the current local time.
     """
 
     def name_cell(info: RecordingInfo) -> Cell:
         image = picture(info)
-        badge = badge_of(info, is_written(info))
+        badge = badge_of(info, is_being_written(info))
         note = note_of(info)
         mark = RecordingMark(info.path.stem, note, badge, image.cacheKey() if image else 0, image)
         text = ", ".join(filter(None, (info.path.stem, _(BADGES[badge][0]) if badge else "", note)))
@@ -191,16 +193,16 @@ def columns(
         )
 
     return (
-        Column("name", lazy("Recording"), 280, name_cell, key=lambda facts: facts.path.stem.casefold(),
-               stretch=True, tip=lambda facts: str(facts.path)),
+        Column("name", lazy("Recording"), 280, name_cell, key=lambda info: info.path.stem.casefold(),
+               stretch=True, tip=lambda info: str(info.path)),
         Column("when", lazy("Recorded"), 148, date_cell,
-               key=lambda facts: facts.start_ns or facts.changed_s * 1e9, hide_order=1),
-        Column("length", lazy("Length"), 68, length_cell, key=lambda facts: facts.duration_s,
-        is_numeric=True), Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),
-               key=lambda facts: facts.size_bytes, is_numeric=True, hide_order=2),
+               key=lambda info: info.start_ns or info.changed_s * 1e9, hide_order=1),
+        Column("length", lazy("Length"), 68, length_cell, key=lambda info: info.duration_s,
+        is_numeric=True), Column("size", lazy("Size"), 72, lambda info: Cell(size_text(info.size_bytes)),
+               key=lambda info: info.size_bytes, is_numeric=True, hide_order=2),
         Column("messages", lazy("Messages"), 84,
-               lambda facts: Cell(group_digits(facts.message_count) if facts.message_count else ""),
-               key=lambda facts: facts.message_count, is_numeric=True, hide_order=4),
-        Column("lost", lazy("Lost"), 92, lost_cell, key=lambda facts: facts.lost, is_numeric=True,
+               lambda info: Cell(group_digits(info.message_count) if info.message_count else ""),
+               key=lambda info: info.message_count, is_numeric=True, hide_order=4),
+        Column("lost", lazy("Lost"), 92, lost_cell, key=lambda info: info.lost, is_numeric=True,
         hide_order=3),
     )  # fmt: skip

@@ -58,20 +58,20 @@ class RecordingDetails(QWidget):
         super().__init__()
         self._theme = theme
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self.name = ElidedLabel("title", "text", min_width=60)
-        self.counts = label("", "small", role="textSecondary", wrap=True)
-        self.open = Button(theme, _("Open"), "play", size="small")
-        self.rename = Button(theme, _("Rename"), "pencil", size="small")
-        self.show_file = Button(theme, _("Show the file"), "folder-open", size="small")
-        self.delete = Button(theme, _("Delete"), "trash-2", size="small")
+        self.name_label = ElidedLabel("title", "text", min_width=60)
+        self.counts_label = label("", "small", role="textSecondary", wrap=True)
+        self.open_button = Button(theme, _("Open"), "play", size="small")
+        self.rename_button = Button(theme, _("Rename"), "pencil", size="small")
+        self.show_file_button = Button(theme, _("Show the file"), "folder-open", size="small")
+        self.delete_button = Button(theme, _("Delete"), "trash-2", size="small")
         formats = [(kind, _(text), None) for kind, text in FORMAT_LABELS.items()]
-        self.format = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
+        self.format_choice = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
         self._make_export_fields()
-        self.export = Button(theme, _("Export"), "download", size="small")
-        self.export.clicked.connect(self._press)
-        self.bar = ValueBar(theme)
-        self.bar.setFixedWidth(round(theme.scaled(BAR_WIDTH_PX)))
-        self.progress = label("", "small", role="textSecondary")
+        self.export_button = Button(theme, _("Export"), "download", size="small")
+        self.export_button.clicked.connect(self._toggle_export)
+        self.progress_bar = ValueBar(theme)
+        self.progress_bar.setFixedWidth(round(theme.scaled(BAR_WIDTH_PX)))
+        self.progress_label = label("", "small", role="textSecondary")
         self._is_exporting = False
         self._arrange()
         self.show_export(None)
@@ -82,37 +82,37 @@ class RecordingDetails(QWidget):
         theme = self._theme
         self.strip = FilmStrip(theme)
         self.strip.changed.connect(self._update_part)
-        self.topics = PatternField(theme, _("Topics to export"), _("all topics; or /odom *camera*"))
-        self.topics.changed.connect(self._patterns_edited)
+        self.topics_field = PatternField(theme, _("Topics to export"), _("all topics; or /odom *camera*"))
+        self.topics_field.changed.connect(self._patterns_edited)
         self._is_none_chosen = False
-        self.pick = ToggleButton(theme, _("From a list"), "list")
-        self.list = TopicList(theme)
-        self.list.hide()
-        self.pick.toggled.connect(self._set_list_visible)
-        self.list.selection_changed.connect(self._topics_checked)
+        self.list_button = ToggleButton(theme, _("Choose from list"), "list")
+        self.topic_list = TopicList(theme)
+        self.topic_list.hide()
+        self.list_button.toggled.connect(self._set_list_visible)
+        self.topic_list.selection_changed.connect(self._topics_checked)
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
-        self.times = Segments(theme, times, size="small", name=_("Count"))
-        self.times.changed.connect(lambda value: self.strip.set_clock_mode(value == "clock"))
+        self.time_mode = Segments(theme, times, size="small", name=_("Times"))
+        self.time_mode.changed.connect(lambda value: self.strip.set_clock_mode(value == "clock"))
         self.part_label = label("", "small", role="textSecondary", wrap=True)
-        self.about = label("", "small", role="textSecondary", wrap=True)
+        self.size_label = label("", "small", role="textSecondary", wrap=True)
         tooltip = _("Size of the messages. The files can be smaller or larger.")
-        self.about.setToolTip(plain.tip(tooltip))
-        self.format.changed.connect(lambda _kind: self._update_part())
+        self.size_label.setToolTip(plain.tip(tooltip))
+        self.format_choice.changed.connect(lambda _kind: self._update_part())
         self._recording: Path | None = None
         self.folder: Path | None = None
         """Folder for exports chosen by the user, or None for the folder of the recording."""
         self.folder_label = ElidedLabel("body", "text", min_width=60)
-        self.files = label("", "small", role="textSecondary")
-        self.choose = Button(theme, _("Choose"), "folder-open", size="small")
-        self.choose.setAccessibleName(_("Choose the export folder"))
+        self.file_count_label = label("", "small", role="textSecondary")
+        self.choose_button = Button(theme, _("Choose"), "folder-open", size="small")
+        self.choose_button.setAccessibleName(_("Choose the export folder"))
 
     def _arrange(self) -> None:
-        acts = Flow(gap=8, row_gap=6)
-        acts.add_elastic(self.name)
-        acts.addWidget(self.counts)
-        acts.push()
-        for button in (self.open, self.rename, self.show_file, self.delete):
-            acts.addWidget(button)
+        actions = Flow(gap=8, row_gap=6)
+        actions.add_elastic(self.name_label)
+        actions.addWidget(self.counts_label)
+        actions.push()
+        for button in (self.open_button, self.rename_button, self.show_file_button, self.delete_button):
+            actions.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -120,7 +120,7 @@ class RecordingDetails(QWidget):
         content = QVBoxLayout()
         content.setContentsMargins(12, 8, 12, 10)
         content.setSpacing(8)
-        content.addLayout(acts)
+        content.addLayout(actions)
         content.addWidget(self.strip)
         content.addLayout(self._form())
         column.addLayout(content)
@@ -128,15 +128,21 @@ class RecordingDetails(QWidget):
     def _form(self) -> QGridLayout:
         # One row per choice; rows wrap in a narrow panel.
         kinds, topics, times, folder_row = (Flow(gap=8, row_gap=6) for _row in range(4))
-        kinds.addWidget(self.format)
-        topics.add_elastic(self.topics, greedy=True)
-        topics.addWidget(self.pick)
-        times.addWidget(self.times)
-        for row, description in ((kinds, self.about), (times, self.part_label)):
+        kinds.addWidget(self.format_choice)
+        topics.add_elastic(self.topics_field, is_greedy=True)
+        topics.addWidget(self.list_button)
+        times.addWidget(self.time_mode)
+        for row, description in ((kinds, self.size_label), (times, self.part_label)):
             row.push()
             row.addWidget(description)
-        folder_row.add_elastic(self.folder_label, greedy=True)
-        for widget in (self.files, self.choose, self.export, self.bar, self.progress):
+        folder_row.add_elastic(self.folder_label, is_greedy=True)
+        for widget in (
+            self.file_count_label,
+            self.choose_button,
+            self.export_button,
+            self.progress_bar,
+            self.progress_label,
+        ):
             folder_row.addWidget(widget)
         form = QGridLayout()
         form.setHorizontalSpacing(12)
@@ -145,29 +151,29 @@ class RecordingDetails(QWidget):
         rows = (
             (_("Export as"), kinds),
             (_("Topics"), topics),
-            (_("Count"), times),
+            (_("Times"), times),
             (_("Save in"), folder_row),
         )
         for index, (title, row) in enumerate(rows):
             name = label(title, "small", role="textSecondary")
             form.addWidget(name, 2 * index, 0, Qt.AlignmentFlag.AlignTop)
-            name.setMinimumHeight(self.format.sizeHint().height())
+            name.setMinimumHeight(self.format_choice.sizeHint().height())
             form.addLayout(row, 2 * index, 1)
-        form.addWidget(self.list, 3, 1)
+        form.addWidget(self.topic_list, 3, 1)
         return form
 
-    def show_recording(self, info: RecordingInfo, being_written: bool) -> None:
+    def show_recording(self, info: RecordingInfo, is_being_written: bool) -> None:
         """Show the properties of a recording and enable the possible actions.
 
         Args:
             info: Properties of the recording.
-            being_written: True for the recording in progress.
+            is_being_written: True for the recording in progress.
         """
-        self.name.setText(info.path.stem)
+        self.name_label.setText(info.path.stem)
         self._recording = info.path
         self._update_export_path()
         topics, count = len(info.topics), info.message_count
-        self.counts.setText(
+        self.counts_label.setText(
             info.problem
             or info.scan_problem
             or _("{topics}, {messages}").format(
@@ -177,11 +183,11 @@ class RecordingDetails(QWidget):
                 ),
             )
         )
-        can_read = not being_written and not info.problem
-        self.open.setEnabled(can_read)
-        self.export.setEnabled(self._is_exporting or (can_read and info.is_read))
-        self.rename.setEnabled(not being_written)
-        self.delete.setEnabled(not being_written)
+        can_read = not is_being_written and not info.problem
+        self.open_button.setEnabled(can_read)
+        self.export_button.setEnabled(self._is_exporting or (can_read and info.is_read))
+        self.rename_button.setEnabled(not is_being_written)
+        self.delete_button.setEnabled(not is_being_written)
 
     def show_strip(self, preview: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
         """Show another recording on the film strip and select all of it for export.
@@ -191,7 +197,7 @@ class RecordingDetails(QWidget):
             images: Images of the film strip; None for images that are not loaded.
         """
         self.strip.show_preview(preview, images)
-        self.topics.show_patterns((), ())
+        self.topics_field.show_patterns((), ())
         self._is_none_chosen = False
         self.set_folder(None)
         self._update_part()
@@ -216,7 +222,7 @@ class RecordingDetails(QWidget):
             ]
             begin, end = (each.replace(":", ".") for each in times)
             name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
-        kind = _(FORMAT_LABELS[self.format.value])
+        kind = _(FORMAT_LABELS[self.format_choice.value])
         return (self.folder or self._recording.parent) / file_stem(f"{name}, {kind}")
 
     def _update_export_path(self) -> None:
@@ -238,15 +244,15 @@ class RecordingDetails(QWidget):
             return FULL_RECORDING
         if self._is_none_chosen:
             return None
-        included, unwanted = self.topics.patterns()
+        included, excluded = self.topics_field.patterns()
         try:
-            part = select_part(preview, self.strip.begin_ns, self.strip.end_ns, included, unwanted)
+            part = select_part(preview, self.strip.begin_ns, self.strip.end_ns, included, excluded)
         except BadTopicError:
             return None
         return part if part.topics is None or part.topics else None
 
     def _set_list_visible(self, is_visible: bool) -> None:
-        self.list.setVisible(is_visible)
+        self.topic_list.setVisible(is_visible)
         self._update_part()
 
     def _topics_checked(self, names: Sequence[str]) -> None:
@@ -254,19 +260,19 @@ class RecordingDetails(QWidget):
         preview = self.strip.preview
         self._is_none_chosen = not names
         if preview is not None and names:
-            self.topics.show_patterns(*shortest_choice(preview.topics, names))
+            self.topics_field.show_patterns(*shortest_choice(preview.topics, names))
         self._update_part()
 
     def _update_part(self) -> None:
         # Time range, number of topics and size.
         preview, part = self.strip.preview, self.part()
-        if preview is not None and not self.list.isHidden():
+        if preview is not None and not self.topic_list.isHidden():
             all_names = (
                 [each.name for each in preview.topics] if part is not None and part.topics is None else ()
             )
             names = all_names if part is None else part.topics or all_names
-            self.list.show_topics(preview.topics, names, preview.size_of)
-        self.topics.set_invalid(part is None)
+            self.topic_list.show_topics(preview.topics, names, preview.size_of)
+        self.topics_field.set_invalid(part is None)
         set_role(self.part_label, "error" if part is None else "textSecondary")
         self._update_size(preview, part)
         self._update_export_path()
@@ -293,19 +299,23 @@ class RecordingDetails(QWidget):
                 each.name
                 for each in preview.topics
                 if (part.topics is None or each.name in part.topics)
-                and can_export(self.format.value, each.codec)
+                and can_export(self.format_choice.value, each.codec)
             }
             text = (
-                self._size_text(preview, names) if names else _("This value can't be converted to this type")
+                self._size_text(preview, names)
+                if names
+                else _("None of the selected topics can be exported in this format")
             )
-            count = min(len(names), 1) if self.format.value == "mcap" else len(names)
-        self.about.setText(text)
-        self.files.setText(ngettext("{count} file", "{count} files", count).format(count=group_digits(count)))
-        self.files.setVisible(count > 0)
+            count = min(len(names), 1) if self.format_choice.value == "mcap" else len(names)
+        self.size_label.setText(text)
+        self.file_count_label.setText(
+            ngettext("{count} file", "{count} files", count).format(count=group_digits(count))
+        )
+        self.file_count_label.setVisible(count > 0)
 
     def _size_text(self, preview: FilmStripPreview, names: Collection[str]) -> str:
-        exact, size = preview.estimate_messages(self.strip.begin_ns, self.strip.end_ns, names)
-        count = round(exact if self.strip.is_all_selected else float(f"{exact:.2g}"))
+        exact_count, size = preview.estimate_messages(self.strip.begin_ns, self.strip.end_ns, names)
+        count = round(exact_count if self.strip.is_all_selected else float(f"{exact_count:.2g}"))
         messages = ngettext("{count} message", "{count} messages", count).format(count=group_digits(count))
         if size is None:
             return messages if self.strip.is_all_selected else _("about {messages}").format(messages=messages)
@@ -317,20 +327,30 @@ class RecordingDetails(QWidget):
     def show_export(self, job: RecordingExport | None) -> None:
         """Show the progress of an export, or hide it if `job` is None."""
         self._is_exporting = job is not None
-        self.export.set_label(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
-        for field in (self.format, self.strip, self.topics, self.choose, self.times, self.pick, self.list):
+        self.export_button.set_label(
+            _("Cancel") if job is not None else _("Export"), "x" if job else "download"
+        )
+        for field in (
+            self.format_choice,
+            self.strip,
+            self.topics_field,
+            self.choose_button,
+            self.time_mode,
+            self.list_button,
+            self.topic_list,
+        ):
             field.setEnabled(job is None)
-        self.bar.setVisible(job is not None)
-        self.progress.setVisible(job is not None)
+        self.progress_bar.setVisible(job is not None)
+        self.progress_label.setVisible(job is not None)
         if job is not None:
-            self.export.setEnabled(not job.was_cancelled)
-            share = job.progress
-            self.bar.set_fraction(share)
-            template = _("Exporting") if share is None else _("Exporting, {percent} %")
-            self.progress.setText(template.format(percent=round(100 * (share or 0.0))))
+            self.export_button.setEnabled(not job.was_cancelled)
+            fraction = job.progress
+            self.progress_bar.set_fraction(fraction)
+            template = _("Exporting") if fraction is None else _("Exporting, {percent} %")
+            self.progress_label.setText(template.format(percent=round(100 * (fraction or 0.0))))
 
-    def _press(self) -> None:
+    def _toggle_export(self) -> None:
         if self._is_exporting:
             self.cancelled.emit()
         else:
-            self.export_requested.emit(self.format.value)
+            self.export_requested.emit(self.format_choice.value)

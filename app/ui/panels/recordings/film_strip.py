@@ -63,8 +63,8 @@ class StripHandle(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         paint.box(painter, QRectF(self.rect()), 3, self._theme.colour("accent"))
-        middle = QRectF(self.width() / 2 - 1, self.height() / 2 - 7, 2, 14)
-        painter.fillRect(middle, self._theme.colour("onAccent"))
+        grip_rect = QRectF(self.width() / 2 - 1, self.height() / 2 - 7, 2, 14)
+        painter.fillRect(grip_rect, self._theme.colour("onAccent"))
         painter.end()
 
 
@@ -88,7 +88,7 @@ class FilmStrip(QWidget):
         self.preview: FilmStripPreview | None = None
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
-        self.by_clock = False
+        self.is_clock_mode = False
         """True to show times of day, False to show times relative to the start of the recording."""
         self.begin = StripHandle(theme, self, _("Start of the selected range"))
         self.end = StripHandle(theme, self, _("End of the selected range"))
@@ -146,15 +146,15 @@ class FilmStrip(QWidget):
             at_ns: Time in ns since 1970.
             digits: Number of decimals of the seconds.
         """
-        if self.by_clock:
+        if self.is_clock_mode:
             return clock_text(at_ns, digits=digits)
         return duration_text(
             at_ns - (self.preview.start_ns if self.preview is not None else 0), digits=digits
         )
 
-    def set_clock_mode(self, by_clock: bool) -> None:
-        """Show times of day if `by_clock` is True, else times relative to the start."""
-        self.by_clock = by_clock
+    def set_clock_mode(self, is_clock_mode: bool) -> None:
+        """Show times of day if `is_clock_mode` is True, else times relative to the start."""
+        self.is_clock_mode = is_clock_mode
         self.set_part(self.begin_ns, self.end_ns)
         self.update()
 
@@ -232,11 +232,11 @@ class FilmStrip(QWidget):
             self._paint_pictures(painter, film)
         else:
             self._paint_counts(painter, film, preview.counts)
-        veil = QColor(theme.colour("panel"))
-        veil.setAlphaF(1.0 - UNSELECTED_OPACITY)
+        dim_colour = QColor(theme.colour("panel"))
+        dim_colour.setAlphaF(1.0 - UNSELECTED_OPACITY)
         begin, end = float(self.begin.geometry().right() + 1), float(self.end.geometry().left())
-        painter.fillRect(QRectF(film.left(), 0, max(0.0, begin - film.left()), film.height()), veil)
-        painter.fillRect(QRectF(end, 0, max(0.0, film.right() - end), film.height()), veil)
+        painter.fillRect(QRectF(film.left(), 0, max(0.0, begin - film.left()), film.height()), dim_colour)
+        painter.fillRect(QRectF(end, 0, max(0.0, film.right() - end), film.height()), dim_colour)
         if not self.is_all_selected:
             for y in (0.0, film.height() - 2):
                 painter.fillRect(QRectF(begin, y, max(0.0, end - begin), 2), theme.colour("accent"))
@@ -251,13 +251,13 @@ class FilmStrip(QWidget):
                 continue
             frame_width = film.width() / count
             box = QRectF(film.left() + index * frame_width, 0, frame_width - 1, film.height())
-            share = box.width() / box.height()
-            crop_width = min(float(image.width()), image.height() * share)
-            crop_height = min(float(image.height()), image.width() / share)
-            middle = QRectF(
+            aspect_ratio = box.width() / box.height()
+            crop_width = min(float(image.width()), image.height() * aspect_ratio)
+            crop_height = min(float(image.height()), image.width() / aspect_ratio)
+            source_rect = QRectF(
                 (image.width() - crop_width) / 2, (image.height() - crop_height) / 2, crop_width, crop_height
             )
-            painter.drawImage(box, image, middle)
+            painter.drawImage(box, image, source_rect)
 
     def _paint_counts(self, painter: QPainter, film: QRectF, counts: Sequence[int]) -> None:
         peak = max(counts, default=0)

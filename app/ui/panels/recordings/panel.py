@@ -63,44 +63,44 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self._thumbnail_worker: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker(
             "recordings-pictures"
         )
-        self._job: RecordingExport | None = None
+        self._export_job: RecordingExport | None = None
         self._strip_worker: BackgroundWorker[tuple[FilmStripPreview | None, Sequence[QImage | None]]] = (
             BackgroundWorker("recordings-strip")
         )
         self._strip_key: tuple[Path, float, int] | None = None
-        self._loop: tuple[int, int] | None = None
+        self._last_loop_ns: tuple[int, int] | None = None
         self._ticks, self._requested_path, self._recorder_revision = 0, "", -1
         super().__init__(context, TABLE_TEXTS, "film")
-        self.count = label("", "small", role="textSecondary")
-        self.header.insert(0, self.count)
+        self.count_label = label("", "small", role="textSecondary")
+        self.header.insert(0, self.count_label)
         self.details = RecordingDetails(self.theme)
-        self._below = ContentScrollArea(self.details)
+        self._details_area = ContentScrollArea(self.details)
         self._connect()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self._below, 0)):
+        for widget, stretch in ((self.pages, 1), (self.line, 0), (self.foot, 0), (self._details_area, 0)):
             column.addWidget(widget, stretch)
         self.foot.hide()
         self.line.hide()
-        self._below.hide()
+        self._details_area.hide()
 
     def _connect(self) -> None:
         details = self.details
         self.table.selected.connect(lambda _key: self._show_details())  # type: ignore[attr-defined]
         self.table.rename_requested.connect(self._rename)  # type: ignore[attr-defined]
         self.table.delete_requested.connect(self._delete)  # type: ignore[attr-defined]
-        details.open.clicked.connect(lambda: self._run_on_selected(self.open_row))
-        details.rename.clicked.connect(lambda: self._run_on_selected(self._rename))
-        details.delete.clicked.connect(lambda: self._run_on_selected(self._delete))
-        details.show_file.clicked.connect(lambda: self._run_on_selected(self._show_file))
+        details.open_button.clicked.connect(lambda: self._run_on_selected(self.open_row))
+        details.rename_button.clicked.connect(lambda: self._run_on_selected(self._rename))
+        details.delete_button.clicked.connect(lambda: self._run_on_selected(self._delete))
+        details.show_file_button.clicked.connect(lambda: self._run_on_selected(self._show_file))
         details.export_requested.connect(self._export)
         details.cancelled.connect(self._cancel_export)
-        details.choose.clicked.connect(self._select_folder)
+        details.choose_button.clicked.connect(self._select_folder)
 
     def make_model(self) -> TableModel[RecordingInfo]:
         table_columns = columns(self._picture, self._is_being_written, lambda: dt.datetime.now().astimezone())
-        return TableModel(table_columns, lambda facts: str(facts.path))
+        return TableModel(table_columns, lambda info: str(info.path))
 
     def make_table(self, model: TableModel[RecordingInfo]) -> RecordingTable:
         return RecordingTable(self.theme, model)
@@ -115,13 +115,13 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self._folder = RecordingFolder(recordings.folder, recordings.new_opener())
             self._ticks = FIRST_SCAN_TICK
         revision = recordings.client.revision
-        is_new = revision != self._recorder_revision
+        has_changed = revision != self._recorder_revision
         if self._ticks % SCAN_INTERVAL_TICKS == FIRST_SCAN_TICK:
             self._folder.start_scan(recordings.client.state.path if recordings.is_recording else None)
         scan = self._folder.pop_result()
         if scan is not None:
             self._scan, self._has_scanned = scan, True
-        if scan is not None or is_new:
+        if scan is not None or has_changed:
             self._recorder_revision = revision
             self.rebuild()
         if self._collect_thumbnails():
@@ -164,19 +164,19 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         count = len(recordings) + self._scan.omitted_count
         template = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
         size = size_text(sum(each.size_bytes for each in recordings))
-        self.count.setText(template.format(count=group_digits(count), size=size) if count else "")
+        self.count_label.setText(template.format(count=group_digits(count), size=size) if count else "")
         self.filter.setVisible(count > 0)
-        left_out = self._scan.omitted_count
-        older = ngettext(
-            "{count} older recording not listed", "{count} older recordings not listed", left_out
+        omitted_count = self._scan.omitted_count
+        template = ngettext(
+            "{count} older recording not listed", "{count} older recordings not listed", omitted_count
         )
-        self.foot.setText(older.format(count=group_digits(left_out)) if left_out else "")
-        self.foot.setVisible(bool(left_out))
-        self.line.setVisible(bool(left_out))
+        self.foot.setText(template.format(count=group_digits(omitted_count)) if omitted_count else "")
+        self.foot.setVisible(bool(omitted_count))
+        self.line.setVisible(bool(omitted_count))
 
-    def show_table(self, any_rows: bool, filtered: bool) -> None:
-        if any_rows or filtered:
-            super().show_table(any_rows, filtered)
+    def show_table(self, has_rows: bool, is_filtered: bool) -> None:
+        if has_rows or is_filtered:
+            super().show_table(has_rows, is_filtered)
             return
         self.pages.setCurrentIndex(1)
         self.update_empty_state()
@@ -203,7 +203,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     def _show_details(self) -> None:
         info = self._selected()
-        self._below.setVisible(info is not None)
+        self._details_area.setVisible(info is not None)
         if info is not None:
             self.details.show_recording(info, self._is_being_written(info))
         self._request_strip(info)
@@ -217,40 +217,40 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         # Missing thumbnails are requested from a background thread.
         if not info.is_read or info.problem or info.scan_problem:
             return None
-        mark = (info.path, info.changed_s, info.size_bytes)
-        if mark in self._pictures:
-            self._pictures.move_to_end(mark)
-            return self._pictures[mark]
-        owner = str(info.path)
-        if self._requested_thumbnails.get(owner) != mark:
-            self._requested_thumbnails[owner] = mark
-            self._thumbnail_worker.submit(owner, lambda: (_load_thumbnail(info.path, self._opener),))
+        picture_key = (info.path, info.changed_s, info.size_bytes)
+        if picture_key in self._pictures:
+            self._pictures.move_to_end(picture_key)
+            return self._pictures[picture_key]
+        path_key = str(info.path)
+        if self._requested_thumbnails.get(path_key) != picture_key:
+            self._requested_thumbnails[path_key] = picture_key
+            self._thumbnail_worker.submit(path_key, lambda: (_load_thumbnail(info.path, self._opener),))
         return None
 
     def _collect_thumbnails(self) -> bool:
-        is_any = False
-        for owner, mark in list(self._requested_thumbnails.items()):
-            result = self._thumbnail_worker.pop_result(owner)
+        has_collected = False
+        for path_key, picture_key in list(self._requested_thumbnails.items()):
+            result = self._thumbnail_worker.pop_result(path_key)
             if result is not None:
-                is_any = True
-                del self._requested_thumbnails[owner]
-                self._pictures[mark] = result[0]
+                has_collected = True
+                del self._requested_thumbnails[path_key]
+                self._pictures[picture_key] = result[0]
         while len(self._pictures) > MAX_CACHED_PICTURES:
             self._pictures.popitem(last=False)
-        return is_any
+        return has_collected
 
     # -- film strip ---------------------------------------------------------------------------------------
 
     def _request_strip(self, info: RecordingInfo | None) -> None:
         # Loads the film strip in a background thread.
         can_read = info is not None and info.is_read and not info.problem and not self._is_being_written(info)
-        mark = (info.path, info.changed_s, info.size_bytes) if info is not None and can_read else None
-        if mark == self._strip_key:
+        strip_key = (info.path, info.changed_s, info.size_bytes) if info is not None and can_read else None
+        if strip_key == self._strip_key:
             return
-        self._strip_key, self._loop = mark, None
+        self._strip_key, self._last_loop_ns = strip_key, None
         self.details.show_strip(None)
-        if mark is not None:
-            path = mark[0]
+        if strip_key is not None:
+            path = strip_key[0]
             self._strip_worker.submit("strip", lambda: _load_strip(path, self._opener))
 
     def _poll_strip(self) -> None:
@@ -260,16 +260,16 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             preview, images = result
             if preview is not None and self._strip_key is not None and preview.path == self._strip_key[0]:
                 self.details.show_strip(preview, images)
-                self._loop = None
+                self._last_loop_ns = None
         replay, preview = self.session.replay, self.details.strip.preview
         player = replay.player if replay is not None else None
         if preview is None or replay is None or player is None or replay.path != preview.path:
             return
-        loop = player.loop if player.is_looping else None
-        if loop != self._loop:
-            self._loop = loop
-            if loop is not None:
-                self.details.strip.set_part(*loop)
+        loop_ns = player.loop if player.is_looping else None
+        if loop_ns != self._last_loop_ns:
+            self._last_loop_ns = loop_ns
+            if loop_ns is not None:
+                self.details.strip.set_part(*loop_ns)
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -315,22 +315,22 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         if not stem:
             self.context.show_toast(_("Enter a name for the recording"))
             return False
-        new = path.with_name(f"{stem}{path.suffix}")
-        if new.exists():
+        new_path = path.with_name(f"{stem}{path.suffix}")
+        if new_path.exists():
             self.context.show_toast(_("A recording named “{name}” already exists").format(name=stem))
             return False
-        if not self._move_files(path, new):
+        if not self._move_files(path, new_path):
             return False
-        self._requested_path = str(new)
-        self._update_listing(path, new)
+        self._requested_path = str(new_path)
+        self._update_listing(path, new_path)
         return True
 
-    def _move_files(self, path: Path, new: Path) -> bool:
+    def _move_files(self, path: Path, new_path: Path) -> bool:
         try:
-            replace_file(path, new)
+            replace_file(path, new_path)
             sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
             if sidecar.exists():
-                replace_file(sidecar, new.with_name(new.name + SIDECAR_SUFFIX))
+                replace_file(sidecar, new_path.with_name(new_path.name + SIDECAR_SUFFIX))
         except OSError as error:
             message = _("Can't rename {file}: {reason}")
             self.context.show_toast(
@@ -339,12 +339,12 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             return False
         return True
 
-    def _update_listing(self, path: Path, new: Path | None) -> None:
+    def _update_listing(self, path: Path, new_path: Path | None) -> None:
         # Shown before the next scan confirms the change.
         files = [
-            replace(each, path=new) if each.path == path and new is not None else each
+            replace(each, path=new_path) if each.path == path and new_path is not None else each
             for each in self._scan.files
-            if each.path != path or new is not None
+            if each.path != path or new_path is not None
         ]
         self._scan = replace(self._scan, files=tuple(files))
         self._ticks = 0
@@ -356,14 +356,14 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self.context.show_toast(_("A recording can be deleted after it has ended"))
             return
         path = info.path
-        bin_file = QFile(str(path))
-        if not bin_file.moveToTrash():
+        file = QFile(str(path))
+        if not file.moveToTrash():
             message = _("Can't move {file} to the bin: {reason}")
-            self.context.show_toast(message.format(file=path.name, reason=bin_file.errorString().lower()))
+            self.context.show_toast(message.format(file=path.name, reason=file.errorString().lower()))
             return
         self._update_listing(path, None)
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
-        trash_path = Path(bin_file.fileName())
+        trash_path = Path(file.fileName())
         message = _("Moved “{name}” to the bin").format(name=path.stem)
         if trash_path != path and trash_path.is_file():
             self.context.show_toast(message, _("Undo"), lambda: self._restore_deleted(trash_path, path))
@@ -373,8 +373,8 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
     def _restore_deleted(self, trash_path: Path, path: Path) -> None:
         try:
             replace_file(trash_path, free(path))
-            about = trash_path.parent.parent / "info" / f"{trash_path.name}.trashinfo"
-            about.unlink(missing_ok=True)
+            trash_info = trash_path.parent.parent / "info" / f"{trash_path.name}.trashinfo"
+            trash_info.unlink(missing_ok=True)
         except OSError as error:
             message = _("Can't restore {file}: {reason}")
             self.context.show_toast(
@@ -393,14 +393,14 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     def _export(self, kind: str) -> None:
         info, part = self._selected(), self.details.part()
-        if info is None or self._job is not None:
+        if info is None or self._export_job is not None:
             return
         if part is None:
             self.context.show_toast(_("No matching topics in this recording"))
             return
         folder = free(self.details.export_path() or info.path.with_suffix(""), is_folder=True)
-        self._job = RecordingExport(info.path, kind, folder, part, self._recordings.new_opener())
-        self.details.show_export(self._job)
+        self._export_job = RecordingExport(info.path, kind, folder, part, self._recordings.new_opener())
+        self.details.show_export(self._export_job)
 
     def _select_folder(self) -> None:
         info = self._selected()
@@ -409,17 +409,17 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             self.context.files.select_folder(str(folder), self.details.set_folder)
 
     def _cancel_export(self) -> None:
-        if self._job is not None:
-            self._job.cancel()
+        if self._export_job is not None:
+            self._export_job.cancel()
 
     def _poll_export(self) -> None:
-        job = self._job
+        job = self._export_job
         if job is None:
             return
         if not job.is_finished:
             self.details.show_export(job)
             return
-        self._job = None
+        self._export_job = None
         self.details.show_export(None)
         self._show_details()
         if job.files:
@@ -468,8 +468,8 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
         self._opener.close()
         self._thumbnail_worker.close()
         self._strip_worker.close()
-        if self._job is not None:
-            self._job.close()
+        if self._export_job is not None:
+            self._export_job.close()
 
 
 def _load_thumbnail(path: Path, opener: RecordingOpener) -> QImage | None:

@@ -32,15 +32,15 @@ class TopicList(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._topics: Sequence[RecordedTopic] = ()
-        self._names: frozenset[str] = frozenset()
+        self._checked_names: frozenset[str] = frozenset()
         self._size_of: Callable[[RecordedTopic], float | None] = lambda _topic: None
         self.filter = FilterField(theme, _("Filter topics"))
         self.filter.textChanged.connect(self._show_rows)
-        self.all = Button(theme, pgettext("topics", "All"), "check", size="small")
-        self.none = Button(theme, _("None"), "minus", size="small")
-        self.all.clicked.connect(lambda: self._set_matching_selected(is_selected=True))
-        self.none.clicked.connect(lambda: self._set_matching_selected(is_selected=False))
-        self.count = ElidedLabel("small", "textSecondary", min_width=60)
+        self.all_button = Button(theme, pgettext("topics", "All"), "check", size="small")
+        self.none_button = Button(theme, _("None"), "minus", size="small")
+        self.all_button.clicked.connect(lambda: self._set_matching_selected(is_selected=True))
+        self.none_button.clicked.connect(lambda: self._set_matching_selected(is_selected=False))
+        self.count_label = ElidedLabel("small", "textSecondary", min_width=60)
         self.model: TableModel[RecordedTopic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[RecordedTopic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to export"))
@@ -50,10 +50,10 @@ class TopicList(QWidget):
         self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.table.setFixedHeight(round(theme.scaled(TABLE_HEIGHT_PX)))
         row = Flow(gap=8, row_gap=6)
-        for widget in (self.all, self.none):
+        for widget in (self.all_button, self.none_button):
             row.addWidget(widget)
         row.addWidget(self.filter)
-        row.add_elastic(self.count)
+        row.add_elastic(self.count_label)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
@@ -62,12 +62,12 @@ class TopicList(QWidget):
 
     def _columns(self) -> tuple[Column[RecordedTopic], ...]:
         def included_cell(topic: RecordedTopic) -> Cell:
-            if topic.name in self._names:
+            if topic.name in self._checked_names:
                 return Cell(icon="check", role="accentText", accessible_text=_("exported"))
             return Cell(icon="minus", role="textTertiary", accessible_text=_("excluded"))
 
         def text_role(topic: RecordedTopic) -> str:
-            return "text" if topic.name in self._names else "textTertiary"
+            return "text" if topic.name in self._checked_names else "textTertiary"
 
         return (
             Column("has", "", 40, included_cell, label=lazy("Export")),
@@ -102,7 +102,7 @@ class TopicList(QWidget):
             checked: Names of checked topics.
             size_of: Returns the size of a topic's messages in bytes, or None if it is unknown.
         """
-        self._names, self._size_of = frozenset(checked), size_of
+        self._checked_names, self._size_of = frozenset(checked), size_of
         if topics is not self._topics:
             self._topics = topics
             self.filter.clear()
@@ -120,20 +120,20 @@ class TopicList(QWidget):
         self.model.set_rows(self.table.order.sort(self._matching_topics()))
         self.table.refresh_visible()
         self.table.viewport().update()
-        count = sum(topic.message_count for topic in self._topics if topic.name in self._names)
+        count = sum(topic.message_count for topic in self._topics if topic.name in self._checked_names)
         template = ngettext("{count} message", "{count} messages", count)
-        self.count.setText(template.format(count=group_digits(count)))
+        self.count_label.setText(template.format(count=group_digits(count)))
 
     def _toggle(self, name: str) -> None:
-        self._set_selection(self._names ^ {name})
+        self._set_selection(self._checked_names ^ {name})
 
     def _set_matching_selected(self, *, is_selected: bool) -> None:
         # Topics that match the filter.
         matching = {topic.name for topic in self._matching_topics()}
-        self._set_selection(self._names | matching if is_selected else self._names - matching)
+        self._set_selection(self._checked_names | matching if is_selected else self._checked_names - matching)
 
     def _set_selection(self, names: frozenset[str]) -> None:
-        self._names = names
+        self._checked_names = names
         self._show_rows()
         self.selection_changed.emit([topic.name for topic in self._topics if topic.name in names])
 
@@ -152,5 +152,5 @@ def shortest_choice(
         are empty, all topics are selected.
     """
     included = tuple(topic.name for topic in topics if topic.name in names)
-    unwanted = tuple(topic.name for topic in topics if topic.name not in names)
-    return ((), unwanted) if len(unwanted) < len(included) else (included, ())
+    excluded = tuple(topic.name for topic in topics if topic.name not in names)
+    return ((), excluded) if len(excluded) < len(included) else (included, ())

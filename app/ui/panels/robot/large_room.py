@@ -19,12 +19,12 @@ class LargeRoom(QWidget):
     Args:
         panel: Panel within the area to cover.
         stage: Widget to show.
-        tools: Copies of the buttons in the panel's title bar.
+        buttons: Copies of the buttons in the panel's title bar.
     """
 
     closed = Signal()
 
-    def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
+    def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, buttons: Sequence[QWidget] = ()) -> None:
         workbench = _workbench_of(panel)
         super().__init__(workbench)
         self._theme, self._workbench = theme, workbench
@@ -32,14 +32,14 @@ class LargeRoom(QWidget):
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
         self.screen_button.clicked.connect(self.toggle_full_screen)
-        self.back = Button(theme, _("Back to the panels"), "minimize-2", size="small")
-        self.back.clicked.connect(self.dispose)
+        self.back_button = Button(theme, _("Back to the panels"), "minimize-2", size="small")
+        self.back_button.clicked.connect(self.dispose)
         row = QHBoxLayout()
         row.setContentsMargins(10, 6, 10, 6)
         row.addWidget(label(_("Room"), "title"))
         row.addStretch(1)
         row.setSpacing(8)
-        for button in (*tools, self.screen_button, self.back):
+        for button in (*buttons, self.screen_button, self.back_button):
             row.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -47,8 +47,8 @@ class LargeRoom(QWidget):
         column.addLayout(row)
         column.addWidget(stage, 1)
         workbench.installEventFilter(self)
-        self._top = workbench.window()  # receives Esc while the run bar has the focus
-        self._top.installEventFilter(self)
+        self._window = workbench.window()  # receives Esc while the run bar has the focus
+        self._window.installEventFilter(self)
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._retain_focus)
@@ -60,11 +60,11 @@ class LargeRoom(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _retain_focus(self, _old: QWidget | None, now: QWidget | None) -> None:
+    def _retain_focus(self, _old: QWidget | None, new: QWidget | None) -> None:
         # Covered widgets must not get the focus: Esc would not reach the overlay, and the editor would change
         # invisibly.
-        covered = now is not None and self._workbench.isAncestorOf(now) and not self.isAncestorOf(now)
-        if covered and now is not self and self.isVisible():
+        is_covered = new is not None and self._workbench.isAncestorOf(new) and not self.isAncestorOf(new)
+        if is_covered and new is not self and self.isVisible():
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def toggle_full_screen(self) -> None:
@@ -79,7 +79,7 @@ class LargeRoom(QWidget):
         if self.is_full_screen:
             self.toggle_full_screen()
         self._workbench.removeEventFilter(self)
-        self._top.removeEventFilter(self)
+        self._window.removeEventFilter(self)
         self.hide()
         self.closed.emit()
         self.deleteLater()
@@ -87,9 +87,9 @@ class LargeRoom(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self._workbench and event.type() == QEvent.Type.Resize:
             self.setGeometry(self._workbench.rect())
-        if watched is self._top and isinstance(event, QKeyEvent) and self.isVisible():
-            pressed = event.type() == QEvent.Type.KeyPress
-            if pressed and event.key() == Qt.Key.Key_Escape:
+        if watched is self._window and isinstance(event, QKeyEvent) and self.isVisible():
+            is_press = event.type() == QEvent.Type.KeyPress
+            if is_press and event.key() == Qt.Key.Key_Escape:
                 self.dispose()
                 return True
         return super().eventFilter(watched, event)
@@ -108,7 +108,7 @@ class LargeRoom(QWidget):
 
 def _workbench_of(panel: QWidget) -> QWidget:
     # Returns the window if the panel is not within the workbench.
-    around = panel.parentWidget()
-    while around is not None and not isinstance(around, QMainWindow):
-        around = around.parentWidget()
-    return around if around is not None else panel.window()
+    ancestor = panel.parentWidget()
+    while ancestor is not None and not isinstance(ancestor, QMainWindow):
+        ancestor = ancestor.parentWidget()
+    return ancestor if ancestor is not None else panel.window()

@@ -74,80 +74,84 @@ class RobotPanel(OneRobotPanel):
         self._last_drawing: Mapping[str, object] | None = None
         self._last_drawing_s = 0.0
         self.chip = Chip(self.theme)
-        self.add, self.reset = self._make_room_tools(size=30)
-        self.reset.setVisible(False)
-        self.choose = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
-        self.choose.setProperty("place", "start")
-        self.choose.clicked.connect(self._show_menu)
-        self.choose.setVisible(False)
-        self.chips = [self.choose, self.chip]
-        self.add.setVisible(False)
-        self.large = IconButton(self.theme, "maximize-2", _("Large room"), size=30)
-        self.large.clicked.connect(self.toggle_enlarged)
-        self.large.setVisible(False)
-        self.header = [self.add, self.reset, self.large]
+        self.add_button, self.reset_button = self._make_room_tools(size=30)
+        self.reset_button.setVisible(False)
+        self.choose_button = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
+        self.choose_button.setProperty("place", "start")
+        self.choose_button.clicked.connect(self._show_menu)
+        self.choose_button.setVisible(False)
+        self.chips = [self.choose_button, self.chip]
+        self.add_button.setVisible(False)
+        self.enlarge_button = IconButton(self.theme, "maximize-2", _("Large room"), size=30)
+        self.enlarge_button.clicked.connect(self.toggle_enlarged)
+        self.enlarge_button.setVisible(False)
+        self.header = [self.add_button, self.reset_button, self.enlarge_button]
         self._make_stage()
         title = _("No robot is connected")
         text = _("With a virtual robot you can try everything right away.")
-        start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
-        self.empty = EmptyState(self.theme, "bot", title, text, [start])
-        self._no_robot = NoRobotController(self.empty, title, text, [start])
+        start_action = EmptyAction(
+            _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot"
+        )
+        self.empty = EmptyState(self.theme, "bot", title, text, [start_action])
+        self._no_robot = NoRobotController(self.empty, title, text, [start_action])
         self._no_robot.set_starting(self.session.starting_robots)
         self.pages = self.make_page_stack(self.empty, self.stage)
 
     def _make_room_tools(self, size: int) -> tuple[IconButton, IconButton]:
         # Called once for the title bar and once for the enlarged room.
-        add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
-        add.clicked.connect(lambda: self._show_room_menu("", None, add))
-        reset = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
-        reset.clicked.connect(self._reset_room)
-        return add, reset
+        add_button = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
+        add_button.clicked.connect(lambda: self._show_room_menu("", None, add_button))
+        reset_button = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
+        reset_button.clicked.connect(self._reset_room)
+        return add_button, reset_button
 
     def _make_stage(self) -> None:
         # The drawing and the bar below it.
         self.view = RoomView(self.theme)
         view = self.view
-        view.touched.connect(lambda name, part, down: self._change_world({"touch": part, "down": down}, name))
+        view.touched.connect(
+            lambda name, part, is_pressed: self._change_world({"touch": part, "down": is_pressed}, name)
+        )
         view.moved.connect(self._move_thing)
         view.robot_moved.connect(
             lambda name, x, y: self._change_world({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
         )
-        view.robot_lifted.connect(lambda name, on: self._change_world({"hold": on}, name))
+        view.robot_lifted.connect(lambda name, is_lifted: self._change_world({"hold": is_lifted}, name))
         view.bumper_pressed.connect(
             lambda name, side: self._change_world({"happen": "bump", "side": side}, name)
         )
         view.removed.connect(self.session.room.remove)
         view.menu_requested.connect(self._show_room_menu)
         view.enlarge_requested.connect(self.toggle_enlarged)
-        self.say = SayBar(self.theme, self._awaited_values)
-        self.say.speech_submitted.connect(lambda words: self._change_world({"say": words}))
-        self.say.event_simulated.connect(self._change_world)
+        self.say_bar = SayBar(self.theme, self._awaited_values)
+        self.say_bar.speech_submitted.connect(lambda words: self._change_world({"say": words}))
+        self.say_bar.event_simulated.connect(self._change_world)
         stage = QWidget()
         column = QVBoxLayout(stage)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.view, 1)
-        column.addWidget(self.say)
+        column.addWidget(self.say_bar)
         self.stage = stage
-        self.sound = IconButton(self.theme, "volume-2", _("Unmute the robots"), size=26)
-        self.sound.clicked.connect(self._toggle_sound)
-        self.say.add(self.sound)
+        self.sound_button = IconButton(self.theme, "volume-2", _("Unmute the robots"), size=26)
+        self.sound_button.clicked.connect(self._toggle_sound)
+        self.say_bar.add(self.sound_button)
         self._shown_sound_state: object = None
         self._update_sound_button()
-        self._large: LargeRoom | None = None
+        self._large_room: LargeRoom | None = None
         self._cached_things: tuple[int, tuple[Thing, ...]] = (-1, ())
         self._sensor_watches: dict[str, Watch] = {}
 
     def fleet_changed(self) -> None:
-        self.choose.setVisible(bool(self.session.fleet.links))
+        self.choose_button.setVisible(bool(self.session.fleet.links))
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             self._no_robot.set_starting(self.session.starting_robots)
             return
         self._update_sound_button()
-        if self._large is not None:
-            self._large.raise_()  # a panel raised in its tab group would cover it
+        if self._large_room is not None:
+            self._large_room.raise_()  # a panel raised in its tab group would cover it
         self.chip.set(link.chip_text, STATUS_BY_ROBOT_STATE[link.state])
         if link.drawing is not None:
             now = time.monotonic()
@@ -158,7 +162,7 @@ class RobotPanel(OneRobotPanel):
             self.view.set_stale(
                 not link.is_connected or link.is_unresponsive or now - self._last_drawing_s > STALE_AFTER_S
             )
-            if self._large is None:
+            if self._large_room is None:
                 self.pages.setCurrentWidget(self.stage)
 
     def _show_menu(self) -> None:
@@ -177,14 +181,14 @@ class RobotPanel(OneRobotPanel):
                 lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
             )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        open_below(menu, self.choose)
+        open_below(menu, self.choose_button)
 
     def show_robot(self, link: RobotLink) -> None:
         self.set_title(link.name)
-        for button in (self.reset, self.add, self.large):
+        for button in (self.reset_button, self.add_button, self.enlarge_button):
             button.setVisible(link.is_virtual)
         self.view.robot_name = link.name
-        self.say.show_robot(link.robot)
+        self.say_bar.show_robot(link.robot)
         self._update_empty_state(link)
 
     def _update_empty_state(self, link: RobotLink) -> None:
@@ -195,8 +199,8 @@ class RobotPanel(OneRobotPanel):
             self.empty.set_actions([])
         else:
             self.empty.set_texts(link.name, _hint_text(link))
-            show = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
-            self.empty.set_actions([show])
+            show_action = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
+            self.empty.set_actions([show_action])
 
     def _awaited_values(self, event: Event, name: str) -> Sequence[str]:
         # Values used in the active behaviour come first.
@@ -214,16 +218,16 @@ class RobotPanel(OneRobotPanel):
 
     def _update_sound_button(self) -> None:
         # The reason is shown if speech is on but does not work.
-        on, problem = self.session.voices.is_on, self.session.voices.problem
-        if (on, problem) == self._shown_sound_state:
+        is_on, problem = self.session.voices.is_on, self.session.voices.problem
+        if (is_on, problem) == self._shown_sound_state:
             return
-        self._shown_sound_state = (on, problem)
-        self.sound.set_icon("volume-2" if on and not problem else "volume-x")
-        text = _("Mute the robots") if on else _("Unmute the robots")
-        self.sound.set_name(text)
-        self.sound.setAccessibleDescription(problem if on else "")
-        if on and problem:
-            self.sound.setToolTip(plain.tip(f"{text}\n{problem}"))
+        self._shown_sound_state = (is_on, problem)
+        self.sound_button.set_icon("volume-2" if is_on and not problem else "volume-x")
+        text = _("Mute the robots") if is_on else _("Unmute the robots")
+        self.sound_button.set_name(text)
+        self.sound_button.setAccessibleDescription(problem if is_on else "")
+        if is_on and problem:
+            self.sound_button.setToolTip(plain.tip(f"{text}\n{problem}"))
 
     # -- room ---------------------------------------------------------------------------------------------
 
@@ -298,13 +302,13 @@ class RobotPanel(OneRobotPanel):
                 action.triggered.connect(lambda _on=False, kind=kind: self._add_thing(kind))
             menu.addSeparator()
         menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._reset_room)
-        start = menu.addAction(_("Reset robots to their start position before each run"))
-        start.setCheckable(True)
-        start.setChecked(self.session.fleet.resets_at_start)
-        start.triggered.connect(lambda: self.context.run("run.from_start"))
+        reset_action = menu.addAction(_("Reset robots to their start position before each run"))
+        reset_action.setCheckable(True)
+        reset_action.setChecked(self.session.fleet.resets_at_start)
+        reset_action.triggered.connect(lambda: self.context.run("run.from_start"))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if position is None:
-            open_below(menu, button or self.add)
+            open_below(menu, button or self.add_button)
         else:
             menu.popup(position)
 
@@ -318,35 +322,35 @@ class RobotPanel(OneRobotPanel):
         if name is None:
             self.context.show_toast(_("The room is full. Remove something first"))
         else:
-            self.view.chosen = name
+            self.view.selected_item = name
 
     # -- enlarged room ------------------------------------------------------------------------------------
 
     def toggle_enlarged(self) -> None:
         """Show or hide the enlarged room."""
-        if self._large is not None:
-            self._large.dispose()
+        if self._large_room is not None:
+            self._large_room.dispose()
             return
-        self._large = LargeRoom(self.theme, self, self.stage, self._make_room_tools(size=26))
-        self._large.closed.connect(self._restore_stage)
+        self._large_room = LargeRoom(self.theme, self, self.stage, self._make_room_tools(size=26))
+        self._large_room.closed.connect(self._restore_stage)
         self.context.focus_question()  # the question lies above the room
-        self.large.set_icon("minimize-2")
+        self.enlarge_button.set_icon("minimize-2")
 
     def toggle_full_screen(self) -> None:
         """Show or hide the room in full screen mode, with the run bar above it."""
-        if self._large is not None and self._large.is_full_screen:
-            self._large.dispose()
+        if self._large_room is not None and self._large_room.is_full_screen:
+            self._large_room.dispose()
             return
-        if self._large is None:
+        if self._large_room is None:
             self.toggle_enlarged()
-        if self._large is not None:
-            self._large.toggle_full_screen()
+        if self._large_room is not None:
+            self._large_room.toggle_full_screen()
 
     def _restore_stage(self) -> None:
-        self._large = None
+        self._large_room = None
         self.pages.insertWidget(1, self.stage)
         self.pages.setCurrentWidget(self.stage)
-        self.large.set_icon("maximize-2")
+        self.enlarge_button.set_icon("maximize-2")
         self.view.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _change_world(self, change: Mapping[str, object], robot: str = "") -> None:
@@ -372,12 +376,12 @@ class RobotPanel(OneRobotPanel):
 
 def _hint_text(link: RobotLink) -> str:
     # Mentions only parts that the robot has.
-    images = [sensor.is_image for sensor in link.robot.sensors]
-    if True in images and False in images:
+    image_flags = [sensor.is_image for sensor in link.robot.sensors]
+    if True in image_flags and False in image_flags:
         return _("Use its camera and sensors to see its state.")
-    if True in images:
+    if True in image_flags:
         return _("Use its camera to see its state.")
-    if images:
+    if image_flags:
         return _("Use its sensors to see its state.")
     return _("This robot reports no state, but you can try its actions.")
 

@@ -42,7 +42,7 @@ STEP_M, SMALL_STEP_M = 0.1, 0.02
 DRAG_DISTANCE_PX = 4
 
 
-def split(part: str) -> tuple[str, str]:
+def split_part(part: str) -> tuple[str, str]:
     """Split the id of a part, such as ``Turtle/body``, into the name of the robot and the part.
 
     The name is "" for the main robot.
@@ -75,17 +75,17 @@ class RoomView(QWidget):
         self._state_key: object = None
         self.state = RobotState()
         self.others: Sequence[tuple[str, RobotState]] = ()
-        self.stale = False
+        self.is_stale = False
         self.caption = ""
-        self._pressed: str | None = None
-        self._pressed_at = QPointF()
-        self._offset = QPointF()
-        self._dragging = False
-        self._hovered: str | None = None
-        self.chosen: str | None = None
+        self._pressed_part: str | None = None
+        self._press_position = QPointF()
+        self._drag_offset = QPointF()
+        self._is_dragging = False
+        self._hovered_part: str | None = None
+        self.selected_item: str | None = None
         self.robot_name = ""
         """Name of the main robot."""
-        self._keys: dict[int, tuple[str, str]] = {}  # part touched by each pressed key
+        self._touches_by_key: dict[int, tuple[str, str]] = {}  # part touched by each pressed key
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -123,16 +123,16 @@ class RoomView(QWidget):
         state = RobotState.parse(data)
         if things is not None:
             state = replace(state, objects=things)
-        parsed = [(name, RobotState.parse(each)) for name, each in others]
-        if (state, parsed) != (self.state, self.others):
-            self.state, self.others = state, parsed
+        other_states = [(name, RobotState.parse(each)) for name, each in others]
+        if (state, other_states) != (self.state, self.others):
+            self.state, self.others = state, other_states
             self.setAccessibleDescription(self._description())
             self.update()
 
-    def set_stale(self, stale: bool) -> None:
+    def set_stale(self, is_stale: bool) -> None:
         """Set if the robot is stale: a stale robot is grey and shows no speech."""
-        if stale != self.stale:
-            self.stale = stale
+        if is_stale != self.is_stale:
+            self.is_stale = is_stale
             self.setAccessibleDescription(self._description())
             self.update()
 
@@ -143,7 +143,7 @@ class RoomView(QWidget):
             self.update()
 
     def _description(self) -> str:
-        return "" if self.stale else self.state.caption
+        return "" if self.is_stale else self.state.caption
 
     def sizeHint(self) -> QSize:
         return QSize(382, 286)
@@ -154,12 +154,12 @@ class RoomView(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        state = replace(self.state, speech=None, sound="", is_moving=False) if self.stale else self.state
-        selected = self.chosen if self.hasFocus() else None
-        marks = Marks(self._hovered, selected, self._theme.colour("focus"))
+        state = replace(self.state, speech=None, sound="", is_moving=False) if self.is_stale else self.state
+        selected_item = self.selected_item if self.hasFocus() else None
+        marks = Marks(self._hovered_part, selected_item, self._theme.colour("focus"))
         area = QRectF(self.rect())
-        self._drawing.paint(painter, area, state, self.others, marks=marks, dark=self._theme.dark)
-        if self.stale:
+        self._drawing.paint(painter, area, state, self.others, marks=marks, is_dark=self._theme.is_dark)
+        if self.is_stale:
             painter.fillRect(self.rect(), STALE_COLOUR)
         if self.caption:
             paint_caption(painter, area, self.caption, self._theme.font("label"))
@@ -176,14 +176,14 @@ class RoomView(QWidget):
 
     def _robot(self, part: str | None) -> RobotState | None:
         # Returns the robot that has this part as its body.
-        name, part_name = split(part or "")
+        name, part_name = split_part(part or "")
         return ({"": self.state} | dict(self.others)).get(name) if part_name == BODY else None
 
     def _position_m(self, part: str | None) -> tuple[float, float] | None:
         # Returns the position in m of an item that can be moved.
         item = self._robot(part) or self._thing(part)
-        movable = item is not None and (isinstance(item, RobotState) or self._is_movable(item))
-        return (item.x, item.y) if item is not None and movable else None
+        is_movable = item is not None and (isinstance(item, RobotState) or self._is_movable(item))
+        return (item.x, item.y) if item is not None and is_movable else None
 
     def _is_movable(self, thing: Thing) -> bool:
         return self.state.is_room_shared or thing.kind in {"ball", "person"}
@@ -199,62 +199,64 @@ class RoomView(QWidget):
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._pressed = (
+        self._pressed_part = (
             self._part_at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
         )
-        self._pressed_at, self._dragging = event.position(), False
-        position_m = self._position_m(self._pressed)
-        if self._pressed is not None and split(self._pressed)[1] in TOUCHABLE_PARTS:
-            self.touched.emit(*split(self._pressed), True)
+        self._press_position, self._is_dragging = event.position(), False
+        position_m = self._position_m(self._pressed_part)
+        if self._pressed_part is not None and split_part(self._pressed_part)[1] in TOUCHABLE_PARTS:
+            self.touched.emit(*split_part(self._pressed_part), True)
         elif position_m is not None:
-            self.chosen = self._pressed
+            self.selected_item = self._pressed_part
             self.update()
             pixel = self._drawing.pixel_of(*position_m, QRectF(self.rect()), self.state)
-            self._offset = pixel - event.position()
+            self._drag_offset = pixel - event.position()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is None:
+        if self._pressed_part is None:
             part = self._part_at(event.position())
             self._hover(part)
-        elif self._position_m(self._pressed) is not None:
+        elif self._position_m(self._pressed_part) is not None:
             self._drag(event.position())
 
     def _hover(self, part: str | None) -> None:
-        touchable = part is not None and split(part)[1] in TOUCHABLE_PARTS
-        movable = self._position_m(part) is not None
-        shape = Qt.CursorShape.PointingHandCursor if touchable else Qt.CursorShape.OpenHandCursor
-        self.setCursor(shape if touchable or movable else Qt.CursorShape.ArrowCursor)
-        hovered = part if movable else None
-        if hovered != self._hovered:
-            self._hovered = hovered
+        is_touchable = part is not None and split_part(part)[1] in TOUCHABLE_PARTS
+        is_movable = self._position_m(part) is not None
+        shape = Qt.CursorShape.PointingHandCursor if is_touchable else Qt.CursorShape.OpenHandCursor
+        self.setCursor(shape if is_touchable or is_movable else Qt.CursorShape.ArrowCursor)
+        hovered_part = part if is_movable else None
+        if hovered_part != self._hovered_part:
+            self._hovered_part = hovered_part
             self.update()
 
     def _drag(self, position: QPointF) -> None:
-        if not self._dragging:
-            if (position - self._pressed_at).manhattanLength() < DRAG_DISTANCE_PX:
+        if not self._is_dragging:
+            if (position - self._press_position).manhattanLength() < DRAG_DISTANCE_PX:
                 return
-            self._dragging = True
+            self._is_dragging = True
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
-            if self._robot(self._pressed) is not None:
-                self.robot_lifted.emit(split(self._pressed or "")[0], True)
+            if self._robot(self._pressed_part) is not None:
+                self.robot_lifted.emit(split_part(self._pressed_part or "")[0], True)
         area = QRectF(self.rect())
-        self._move(self._pressed or "", *self._drawing.floor_at(position + self._offset, area, self.state))
+        self._move(
+            self._pressed_part or "", *self._drawing.floor_at(position + self._drag_offset, area, self.state)
+        )
 
     def _move(self, part: str, x: float, y: float) -> None:
         if self._robot(part) is not None:
-            self.robot_moved.emit(split(part)[0], x, y)
+            self.robot_moved.emit(split_part(part)[0], x, y)
         else:
             self.moved.emit(part, x, y)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        pressed, self._pressed = self._pressed, None
-        if pressed is not None and split(pressed)[1] in TOUCHABLE_PARTS:
-            self.touched.emit(*split(pressed), False)
-        elif self._dragging and self._robot(pressed) is not None:
-            self.robot_lifted.emit(split(pressed or "")[0], False)
-        elif pressed is not None:
-            self._bump(pressed, event.position())
-        self._dragging = False
+        pressed_part, self._pressed_part = self._pressed_part, None
+        if pressed_part is not None and split_part(pressed_part)[1] in TOUCHABLE_PARTS:
+            self.touched.emit(*split_part(pressed_part), False)
+        elif self._is_dragging and self._robot(pressed_part) is not None:
+            self.robot_lifted.emit(split_part(pressed_part or "")[0], False)
+        elif pressed_part is not None:
+            self._bump(pressed_part, event.position())
+        self._is_dragging = False
         self._hover(self._part_at(event.position()))
 
     def _bump(self, part: str, position: QPointF) -> bool:
@@ -262,7 +264,7 @@ class RoomView(QWidget):
         area = QRectF(self.rect())
         side = self._drawing.bumper_side_at(position, area, part, self.state, self.others)
         if side is not None:
-            self.bumper_pressed.emit(split(part)[0], side)
+            self.bumper_pressed.emit(split_part(part)[0], side)
         return side is not None
 
     def _has_bumper(self, part: str | None) -> bool:
@@ -271,20 +273,20 @@ class RoomView(QWidget):
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._part_at(event.position())
-        if part is not None and (split(part)[1] in TOUCHABLE_PARTS or self._has_bumper(part)):
+        if part is not None and (split_part(part)[1] in TOUCHABLE_PARTS or self._has_bumper(part)):
             self.mousePressEvent(event)  # second press of a fast double click
         elif event.button() == Qt.MouseButton.LeftButton:
             self.enlarge_requested.emit()
 
     def leaveEvent(self, _event: object) -> None:
-        if self._pressed is None:
+        if self._pressed_part is None:
             self._hover(None)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Mouse:
             part, position = self._part_at(QPointF(event.pos())), event.globalPos()
         else:
-            part = self.chosen
+            part = self.selected_item
             position = self.mapToGlobal(
                 (self.position_of(part or "") or QPointF(self.rect().center())).toPoint()
             )
@@ -297,37 +299,43 @@ class RoomView(QWidget):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         choices = self.selectable_items()
-        index = choices.index(self.chosen) if self.chosen in choices else -1 if forward else len(choices)
+        index = (
+            choices.index(self.selected_item)
+            if self.selected_item in choices
+            else -1
+            if forward
+            else len(choices)
+        )
         index += 1 if forward else -1
         if 0 <= index < len(choices):
-            self.chosen = choices[index]
-            thing = self._thing(self.chosen)
-            name = split(self.chosen)[0] or self.robot_name
+            self.selected_item = choices[index]
+            thing = self._thing(self.selected_item)
+            name = split_part(self.selected_item)[0] or self.robot_name
             paint.announce(self, thing.name if thing is not None else name)
             self.update()
             return True
-        self.chosen = None
+        self.selected_item = None
         self.update()
         return super().focusNextPrevChild(forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, position_m = Qt.Key(event.key()), self._position_m(self.chosen)
-        if key in ARROW_DIRECTIONS and position_m is not None and self.chosen is not None:
-            small = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-            step = SMALL_STEP_M if small else STEP_M
-            dx, aside = ARROW_DIRECTIONS[key]
-            self._move(self.chosen, position_m[0] + dx * step, position_m[1] + aside * step)
-        elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
-            self.removed.emit(self.chosen)
+        key, position_m = Qt.Key(event.key()), self._position_m(self.selected_item)
+        if key in ARROW_DIRECTIONS and position_m is not None and self.selected_item is not None:
+            is_small_step = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+            step = SMALL_STEP_M if is_small_step else STEP_M
+            dx, dy = ARROW_DIRECTIONS[key]
+            self._move(self.selected_item, position_m[0] + dx * step, position_m[1] + dy * step)
+        elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.selected_item) is not None:
+            self.removed.emit(self.selected_item)
         elif key in PRESS_KEYS and self._has_bumper(self._keyboard_target()) and has_no_modifiers(event):
             if not event.isAutoRepeat():
-                self.bumper_pressed.emit(split(self.chosen or "")[0], "front")
+                self.bumper_pressed.emit(split_part(self.selected_item or "")[0], "front")
         else:
             self._touch_with_key(event, key)
 
     def _keyboard_target(self) -> str:
         # Space acts on the selected item, else on the main robot.
-        return self.chosen or BODY
+        return self.selected_item or BODY
 
     def _touch_with_key(self, event: QKeyEvent, key: Qt.Key) -> None:
         part = TOUCH_KEYS.get(key) if has_no_modifiers(event) else None
@@ -335,14 +343,14 @@ class RoomView(QWidget):
             part = "head"
         if part is None:
             event.ignore()
-        elif not event.isAutoRepeat() and event.key() not in self._keys:
-            self._keys[event.key()] = split(self.chosen or "")[0], part
-            self.touched.emit(*self._keys[event.key()], True)
+        elif not event.isAutoRepeat() and event.key() not in self._touches_by_key:
+            self._touches_by_key[event.key()] = split_part(self.selected_item or "")[0], part
+            self.touched.emit(*self._touches_by_key[event.key()], True)
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         if event.isAutoRepeat():
             return
-        touch = self._keys.pop(event.key(), None)
+        touch = self._touches_by_key.pop(event.key(), None)
         if touch is None:
             event.ignore()
         else:
@@ -350,6 +358,6 @@ class RoomView(QWidget):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         # The key release goes to the newly focused widget, so end all touches here.
-        while self._keys:
-            self.touched.emit(*self._keys.popitem()[1], False)
+        while self._touches_by_key:
+            self.touched.emit(*self._touches_by_key.popitem()[1], False)
         super().focusOutEvent(event)

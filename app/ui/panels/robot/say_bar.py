@@ -43,7 +43,7 @@ class SayField(SearchField):
         self.setMaxLength(200)
         self.setMinimumWidth(60)
         self.setMaximumWidth(MAX_WIDTH)
-        self._last = ""
+        self._last_text = ""
 
     def sizeHint(self) -> QSize:
         return QSize(120, super().sizeHint().height())
@@ -51,16 +51,16 @@ class SayField(SearchField):
     def submit(self, text: str) -> None:
         """Emit a text as `submitted` and clear the field; ignored if the text is blank."""
         if text.strip():
-            self._last = text.strip()
+            self._last_text = text.strip()
             self.clear()
-            self.submitted.emit(self._last)
+            self.submitted.emit(self._last_text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key() if has_no_modifiers(event) else None
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.submit(self.text())
         elif key == Qt.Key.Key_Up and not self.text():
-            self.setText(self._last)
+            self.setText(self._last_text)
         elif key == Qt.Key.Key_Down:
             self.suggestions_requested.emit()
         else:
@@ -71,8 +71,8 @@ class SayBar(QWidget):
     """Bar with a field for speech, its suggestions, and the menu of simulated events.
 
     Args:
-        awaited: Returns the values of an event's field that blocks in open behaviours react to, those of
-            the current behaviour first.
+        get_awaited_values: Returns the values of an event's field that blocks in open behaviours react to,
+            those of the current behaviour first.
 
     Signals:
         speech_submitted: Text to say to the robot.
@@ -82,23 +82,23 @@ class SayBar(QWidget):
     speech_submitted = Signal(str)
     event_simulated = Signal(object)  # `SimulatedEvent`, in the format of a virtual robot's world
 
-    def __init__(self, theme: Theme, awaited: AwaitedValuesGetter) -> None:
+    def __init__(self, theme: Theme, get_awaited_values: AwaitedValuesGetter) -> None:
         super().__init__()
-        self._theme, self._awaited = theme, awaited
+        self._theme, self._get_awaited_values = theme, get_awaited_values
         self._robot: Robot | None = None
         self.field = SayField(theme)
         self.suggestions_button = IconButton(theme, "chevron-down", _("Choose what to say"), size=26)
-        self.events = IconButton(theme, "zap", _("Simulate an event"), size=26)
+        self.events_button = IconButton(theme, "zap", _("Simulate an event"), size=26)
         self.field.submitted.connect(self.speech_submitted)
         self.field.suggestions_requested.connect(self.show_suggestions)
         self.suggestions_button.clicked.connect(self.show_suggestions)
-        self.events.clicked.connect(self.show_event_menu)
+        self.events_button.clicked.connect(self.show_event_menu)
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 6, 8, 6)
         row.setSpacing(4)
         row.addStretch(0)
         row.addWidget(self.field, 1)
-        for button in (self.suggestions_button, self.events):
+        for button in (self.suggestions_button, self.events_button):
             row.addWidget(button)
         row.addStretch(0)
         self._row = row
@@ -111,28 +111,30 @@ class SayBar(QWidget):
     def show_robot(self, robot: Robot) -> None:
         """Switch to another robot."""
         self._robot = robot
-        hears = robot.event(HEARD_EVENT) is not None
+        can_hear = robot.event(HEARD_EVENT) is not None
         text = _("Say something to {robot}").format(robot=robot.name)
         self.field.setPlaceholderText(text)
         self.field.setAccessibleName(text)
-        self.field.setVisible(hears)
-        self.suggestions_button.setVisible(hears)
-        self.events.setVisible(any(True for _entry in self.simulated_events()))
-        self.setVisible(robot.virtual and (hears or self.events.isVisibleTo(self)))
+        self.field.setVisible(can_hear)
+        self.suggestions_button.setVisible(can_hear)
+        self.events_button.setVisible(any(True for _entry in self.simulated_events()))
+        self.setVisible(robot.virtual and (can_hear or self.events_button.isVisibleTo(self)))
 
     # -- speech -------------------------------------------------------------------------------------------
 
     def suggestions(self) -> Sequence[str]:
         """Return the words that programs react to."""
         event = self._robot.event(HEARD_EVENT) if self._robot is not None else None
-        return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
+        return (
+            self._get_awaited_values(event, event.filters[0]) if event is not None and event.filters else ()
+        )
 
     def show_suggestions(self) -> None:
         """Show a menu of the words that programs react to; selecting one says it."""
         menu = Menu(self._theme, self)
         for suggestion in self.suggestions():
             menu.addAction(plain.escape_menu_text(suggestion)).triggered.connect(
-                lambda _on=False, word=suggestion: self.field.submit(word)
+                lambda _on=False, text=suggestion: self.field.submit(text)
             )
         if menu.isEmpty():
             menu.addAction(_("No program is waiting for speech")).setEnabled(False)
@@ -145,22 +147,24 @@ class SayBar(QWidget):
         for event in self._robot.events if self._robot is not None else ():
             if event.name in {HEARD_EVENT, "released"}:  # a tap includes the release
                 continue
-            yield from _entries(event, self._awaited)
+            yield from _entries(event, self._get_awaited_values)
 
     def show_event_menu(self) -> None:
         """Show the menu of events."""
         menu = Menu(self._theme, self)
-        for text, icon, happening in list(self.simulated_events())[:MAX_ENTRIES]:
+        for text, icon, event in list(self.simulated_events())[:MAX_ENTRIES]:
             action = menu.addAction(self._theme.icon(icon), plain.escape_menu_text(text))
-            action.triggered.connect(lambda _on=False, told=happening: self.event_simulated.emit(told))
-        self._pop_up(menu, self.events)
+            action.triggered.connect(lambda _on=False, event=event: self.event_simulated.emit(event))
+        self._pop_up(menu, self.events_button)
 
     def _pop_up(self, menu: Menu, anchor: QWidget) -> None:
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         open_below(menu, anchor)
 
 
-def _entries(event: Event, awaited: AwaitedValuesGetter) -> Iterator[tuple[str, str, SimulatedEvent]]:
+def _entries(
+    event: Event, get_awaited_values: AwaitedValuesGetter
+) -> Iterator[tuple[str, str, SimulatedEvent]]:
     # One entry per value, such as "head is touched" and "left hand is touched".
     if not event.filters:
         yield _event_text(event, {}), event.icon, {"happen": event.name}
@@ -170,7 +174,7 @@ def _entries(event: Event, awaited: AwaitedValuesGetter) -> Iterator[tuple[str, 
     if parameter is not None and parameter.choices:
         values: list[tuple[object, str]] = [(each.value, each.title) for each in parameter.choices]
     else:
-        values = [(value, value) for value in awaited(event, name)]
+        values = [(value, value) for value in get_awaited_values(event, name)]
     for value, title in values:
         yield _event_text(event, {name: title}), event.icon, {"happen": event.name, name: value}
 

@@ -40,17 +40,17 @@ class ActionCard(Card):
     Args:
         action: Action of the robot.
         options: Returns the values that a property of the robot currently offers.
-        folded: True if the form is collapsed at first.
+        is_collapsed: True if the form is collapsed at first.
         pictures: Source of images for image parameters.
         title_of: Returns the title of another action by its name.
 
     Signals:
         try_requested: Input with which to start the action.
-        cancelled: The action should be cancelled.
+        cancel_requested: The action should be cancelled.
     """
 
     try_requested = Signal(dict)
-    cancelled = Signal()
+    cancel_requested = Signal()
 
     def __init__(
         self,
@@ -58,16 +58,16 @@ class ActionCard(Card):
         action: Action,
         options: Callable[[str], Sequence[str]],
         *,
-        folded: bool = False,
+        is_collapsed: bool = False,
         pictures: ImageSource | None = None,
         title_of: Callable[[str], str] = str,
     ) -> None:
         super().__init__(theme)
         self.action = action
         self._title_of = title_of
-        self._running = False
+        self._is_running = False
         self._submitted_input: Mapping[str, object] = {}
-        self._folded = False
+        self._is_collapsed = False
         self.form = ActionForm(theme, action, options, pictures)
         self.form.changed.connect(self._update_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
@@ -78,22 +78,22 @@ class ActionCard(Card):
         self.result = Chip(theme)
         self.try_button = Button(theme, _("Try"), "play")
         self.try_button.setAccessibleName(_("Try {action}").format(action=action.title))
-        self.try_button.clicked.connect(self._press)
+        self.try_button.clicked.connect(self._start_or_cancel)
         tries = _("Recent results of {action}").format(action=action.title)
-        self.past = IconButton(theme, "history", tries, size=30)
-        self.past.setCheckable(True)
-        self.past.toggled.connect(self._set_tries_visible)
-        self.past.hide()
-        self.fold = IconButton(theme, "chevron-down", _("Show values"), size=30)
-        self.fold.clicked.connect(lambda: self.set_collapsed(not self._folded))
-        self.fold.setVisible(folded and bool(action.parameters))
+        self.history_button = IconButton(theme, "history", tries, size=30)
+        self.history_button.setCheckable(True)
+        self.history_button.toggled.connect(self._set_tries_visible)
+        self.history_button.hide()
+        self.collapse_button = IconButton(theme, "chevron-down", _("Show values"), size=30)
+        self.collapse_button.clicked.connect(lambda: self.set_collapsed(not self._is_collapsed))
+        self.collapse_button.setVisible(is_collapsed and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
         self.progress = ValueBar(theme)
         self.tries = TryList(theme, action)
         self.tries.selected.connect(self._reuse_input)
         self.tries.hide()
         self._lay_out(theme)
-        self.set_collapsed(folded)
+        self.set_collapsed(is_collapsed)
         self.show_invocation(None)
 
     def _lay_out(self, theme: Theme) -> None:
@@ -102,9 +102,9 @@ class ActionCard(Card):
         after: tuple[QWidget, ...] = (
             self.remaining_label,
             self.result,
-            self.past,
+            self.history_button,
             self.try_button,
-            self.fold,
+            self.collapse_button,
         )
         below: tuple[QWidget, ...] = (self.form, self.error, self.progress, self.tries)
         for widget in before:
@@ -121,34 +121,34 @@ class ActionCard(Card):
         for widget in below:
             column.addWidget(widget)
 
-    def set_collapsed(self, folded: bool) -> None:
-        """Collapse the form if `folded` is True, else expand it."""
-        self._folded = folded
-        self.form.setVisible(not folded and bool(self.action.parameters))
-        self.fold.set_icon("chevron-down" if folded else "chevron-up")
-        self.fold.set_name(_("Show values") if folded else _("Hide values"))
+    def set_collapsed(self, is_collapsed: bool) -> None:
+        """Collapse the form if `is_collapsed` is True, else expand it."""
+        self._is_collapsed = is_collapsed
+        self.form.setVisible(not is_collapsed and bool(self.action.parameters))
+        self.collapse_button.set_icon("chevron-down" if is_collapsed else "chevron-up")
+        self.collapse_button.set_name(_("Show values") if is_collapsed else _("Hide values"))
         self._update_summary()
 
     def _update_summary(self) -> None:
-        self.summary.setText(self.form.summary() if self._folded else "")
-        self.summary.setVisible(self._folded)
+        self.summary.setText(self.form.summary() if self._is_collapsed else "")
+        self.summary.setVisible(self._is_collapsed)
 
-    def set_highlighted(self, first: bool) -> None:
+    def set_highlighted(self, is_highlighted: bool) -> None:
         """Highlight the card with an accent border and a filled Try button, or remove the highlight.
 
         Args:
-            first: True for the highlighted card.
+            is_highlighted: True for the highlighted card.
         """
-        border = "accent" if first else "border"
+        border = "accent" if is_highlighted else "border"
         if border != self.border:
             self.border = border
             self.update()
-        self.try_button.set_kind("primary" if first and not self._running else "plain")
-        self.try_button.fill_icon = first
+        self.try_button.set_kind("primary" if is_highlighted and not self._is_running else "plain")
+        self.try_button.has_filled_icon = is_highlighted
 
-    def _press(self) -> None:
-        if self._running:
-            self.cancelled.emit()
+    def _start_or_cancel(self) -> None:
+        if self._is_running:
+            self.cancel_requested.emit()
         else:
             self._submitted_input = self.form.input()
             self.try_requested.emit(dict(self._submitted_input))
@@ -157,13 +157,13 @@ class ActionCard(Card):
         has_ctrl = event.modifiers() & (
             Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier
         )
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_ctrl and not self._running:
-            self._press()
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and has_ctrl and not self._is_running:
+            self._start_or_cancel()
         else:
             super().keyPressEvent(event)
 
-    def _set_tries_visible(self, on: bool) -> None:
-        self.tries.setVisible(on)
+    def _set_tries_visible(self, is_visible: bool) -> None:
+        self.tries.setVisible(is_visible)
 
     def _reuse_input(self, input_values: Mapping[str, object]) -> None:
         # Puts the input of an earlier try into the form.
@@ -173,14 +173,14 @@ class ActionCard(Card):
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
         """Show the errors for which the input was rejected; empty removes them."""
-        if problems and self._folded:
+        if problems and self._is_collapsed:
             self.set_collapsed(False)
         self.form.show_problems(problems)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
         """Update the list of the latest tries of this action."""
         self.tries.show_tries(tries)
-        self.past.setVisible(bool(self.tries.rows))
+        self.history_button.setVisible(bool(self.tries.rows))
 
     def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
         """Show the state of the latest try.
@@ -189,8 +189,8 @@ class ActionCard(Card):
             invocation: Latest try, or None.
             may_move: True if the robot may still be moving after the end of the try.
         """
-        self._running = invocation is not None and invocation.is_running
-        can_cancel = self._running and (
+        self._is_running = invocation is not None and invocation.is_running
+        can_cancel = self._is_running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
         )
         if can_cancel:
@@ -199,19 +199,21 @@ class ActionCard(Card):
             self.try_button.set_label(_("Try"), "play")
         template = _("Cancel {action}") if can_cancel else _("Try {action}")
         self.try_button.setAccessibleName(template.format(action=self.action.title))
-        self.try_button.setEnabled(can_cancel or not self._running)
+        self.try_button.setEnabled(can_cancel or not self._is_running)
         self.set_highlighted(self.border == "accent")
-        share, text, remaining = None, "", ""
-        if invocation is not None and self._running:
-            share = progress_of(self.action, self._submitted_input or invocation.input, invocation.feedback)
+        fraction, text, remaining = None, "", ""
+        if invocation is not None and self._is_running:
+            fraction = progress_of(
+                self.action, self._submitted_input or invocation.input, invocation.feedback
+            )
             text = state_text(self.action, invocation, self._title_of)
             remaining = remaining_text(invocation)
-        self.progress.setVisible(share is not None)
-        self.progress.set_fraction(share)
+        self.progress.setVisible(fraction is not None)
+        self.progress.set_fraction(fraction)
         self.text_label.setText(text)
         self.remaining_label.setText(remaining)
         self.remaining_label.setVisible(bool(remaining))
-        self._show_result(None if self._running else invocation, may_move)
+        self._show_result(None if self._is_running else invocation, may_move)
 
     def _show_result(self, invocation: Invocation | None, may_move: bool) -> None:
         chip_text, status, message = ("", "ok", "")

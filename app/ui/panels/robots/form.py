@@ -26,7 +26,7 @@ MIN_TALL_ROW_HEIGHT = 60  # px; in taller rows the label is vertically centred
 
 
 class ActionForm(QWidget):
-    """Form with one row per parameter. The button "More" shows the advanced parameters.
+    """Form with one row per parameter. The button "Show more" shows the advanced parameters.
 
     Args:
         theme: Theme of the window.
@@ -53,7 +53,7 @@ class ActionForm(QWidget):
         self._error_labels: dict[str, QLabel] = {}
         self._rows: dict[str, tuple[QWidget, QWidget]] = {}
         self._heights: dict[QWidget, int] = {}
-        self._stacked = False
+        self._is_stacked = False
         self._theme, self._pictures = theme, pictures
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
@@ -62,7 +62,7 @@ class ActionForm(QWidget):
         self._fit()
         theme.changed.connect(self._fit)
         self._grid.setColumnStretch(1, 1)
-        self.more = Button(theme, _("More"), "chevron-down", kind="ghost", size="small")
+        self.more = Button(theme, _("Show more"), "chevron-down", kind="ghost", size="small")
         self.more.setCheckable(True)
         self.more.toggled.connect(self._show_advanced)
         self.problem = label("", "small", role="error", wrap=True)
@@ -73,14 +73,14 @@ class ActionForm(QWidget):
         column.addLayout(self._grid)
         column.addWidget(self.more)
         column.addWidget(self.problem)
-        for parameter in sorted(action.parameters, key=lambda one: one.advanced):
+        for parameter in sorted(action.parameters, key=lambda one: one.is_advanced):
             self._add_row(parameter, options(parameter.options_from) if parameter.options_from else ())
-        self.more.setVisible(any(parameter.advanced for parameter in action.parameters))
+        self.more.setVisible(any(parameter.is_advanced for parameter in action.parameters))
         self._show_advanced(False)
 
     def _add_row(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
-        # not plain text: with a buddy, "&" would define a mnemonic
+        # escaped because "&" would define a mnemonic in a label with a buddy
         title = plain.escape_menu_text(sentence_case(parameter.title))
         name = label(title, "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
@@ -106,26 +106,26 @@ class ActionForm(QWidget):
     def _fit(self) -> None:
         # Labels are beside the controls if all controls fit there, else above them.
         label_width = round(self._theme.scaled(LABEL_WIDTH))
-        stacked = self.width() < label_width + self._grid.horizontalSpacing() + self._control_width()
-        self._grid.setColumnMinimumWidth(0, 0 if stacked else label_width)
-        if stacked != self._stacked:
-            self._stacked = stacked
+        is_stacked = self.width() < label_width + self._grid.horizontalSpacing() + self._control_width()
+        self._grid.setColumnMinimumWidth(0, 0 if is_stacked else label_width)
+        if is_stacked != self._is_stacked:
+            self._is_stacked = is_stacked
             for index, (name, cell) in enumerate(self._rows.values()):
                 self._position_row(2 * index, name, cell)
 
     def _control_width(self) -> int:
         # Wrapping controls count with the width that they need for a single row.
-        each = [control.widget for control in self.controls.values()]
+        widgets = [control.widget for control in self.controls.values()]
         in_one_row = (
-            control.sizeHint().width() for control in each if isinstance(control, Segments | ColourChoice)
+            widget.sizeHint().width() for widget in widgets if isinstance(widget, Segments | ColourChoice)
         )
-        return max((*in_one_row, *(control.minimumSizeHint().width() for control in each)), default=0)
+        return max((*in_one_row, *(widget.minimumSizeHint().width() for widget in widgets)), default=0)
 
     def _position_row(self, row: int, name: QWidget, cell: QWidget) -> None:
         for widget in (name, cell):
             self._grid.removeWidget(widget)
-        name.setMinimumHeight(0 if self._stacked else self._heights[name])
-        if self._stacked:
+        name.setMinimumHeight(0 if self._is_stacked else self._heights[name])
+        if self._is_stacked:
             self._grid.addWidget(name, row, 0, 1, 2)
             self._grid.addWidget(cell, row + 1, 0, 1, 2)
         else:
@@ -152,15 +152,15 @@ class ActionForm(QWidget):
         problems = [] if problem is None else [problem]
         self._show_errors_of(parameter, problems)
 
-    def _show_advanced(self, on: bool) -> None:
-        if on:
-            self.more.set_label(_("Fewer"), "chevron-up")
+    def _show_advanced(self, is_visible: bool) -> None:
+        if is_visible:
+            self.more.set_label(_("Show less"), "chevron-up")
         else:
-            self.more.set_label(_("More"), "chevron-down")
+            self.more.set_label(_("Show more"), "chevron-down")
         for parameter in self.action.parameters:
-            if parameter.advanced:
+            if parameter.is_advanced:
                 for widget in self._rows[parameter.name]:
-                    widget.setVisible(on)
+                    widget.setVisible(is_visible)
 
     def input(self) -> dict[str, object]:
         """Return the input for the action; empty fields are omitted."""
@@ -186,7 +186,7 @@ class ActionForm(QWidget):
         control = self.controls[parameter.name]
         self._set_errors(self._error_labels[parameter.name], () if control.error_text else problems)
         self._set_invalid(control.widget, is_invalid=bool(problems or control.error_text))
-        if problems and parameter.advanced:
+        if problems and parameter.is_advanced:
             self.more.setChecked(True)
 
     def _set_errors(self, error_label: QLabel, messages: Sequence[str]) -> None:
@@ -206,7 +206,7 @@ class ActionForm(QWidget):
     def summary(self) -> str:
         """Return a short description of the input, such as "happy, for 2 s"."""
         values = {name: control.value() for name, control in self.controls.items()}
-        return input_summary(self.action, values, texts=False)
+        return input_summary(self.action, values, include_texts=False)
 
     def dispose(self) -> None:
         """Release the resources of all controls."""

@@ -12,16 +12,17 @@ UNITS = {"s": "seconds", "min": "minutes"}
 MAX_TEXT_LENGTH = 32
 
 
-def input_summary(action: Action, values: Mapping[str, object], *, texts: bool = True) -> str:
+def input_summary(action: Action, values: Mapping[str, object], *, include_texts: bool = True) -> str:
     """Format the most important values of an input, in the order of the parameters.
 
     Args:
         action: Action with the parameters.
         values: Input by parameter name.
-        texts: False to omit texts, which are formatted in quotation marks.
+        include_texts: False to omit texts, which are formatted in quotation marks.
     """
     parts = (
-        _value_text(parameter, values.get(parameter.name), texts=texts) for parameter in action.parameters
+        _value_text(parameter, values.get(parameter.name), include_texts=include_texts)
+        for parameter in action.parameters
     )
     return ", ".join(text for text in parts if text)
 
@@ -32,7 +33,7 @@ def is_unit(title: str, unit: str | None) -> bool:
     return english is not None and title in {english, translate("robot", english)}
 
 
-def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
+def _value_text(parameter: Parameter, value: object, *, include_texts: bool) -> str:
     title = next((choice.title for choice in parameter.choices if choice.value == value), None)
     if title is not None:
         return title
@@ -42,7 +43,7 @@ def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
         if is_unit(parameter.title, parameter.unit):
             return _("for {duration}").format(duration=amount)
         return f"{parameter.title} {amount}"
-    if not texts:
+    if not include_texts:
         return ""
     if parameter.kind == "image" and value:
         return _("an image")

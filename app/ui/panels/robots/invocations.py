@@ -81,9 +81,9 @@ def progress_of(action: Action, values: Mapping[str, object], feedback: Mapping[
         feedback: Latest feedback by field name.
     """
     for name in RATIO_FIELDS:
-        share = _float_or_none(feedback.get(name))
-        if share is not None:
-            return _clamp_ratio(share)
+        reported_ratio = _float_or_none(feedback.get(name))
+        if reported_ratio is not None:
+            return _clamp_ratio(reported_ratio)
     for field in action.feedback:
         value = _float_or_none(feedback.get(field.name))
         if value is None:
@@ -124,8 +124,8 @@ def state_text(action: Action, invocation: Invocation, title_of: Callable[[str],
                 actions=format_list([title_of(name) for name in invocation.replaced_actions])
             )
         return _("sent")
-    took = _("for {duration}").format(duration=seconds_text(invocation.elapsed_s))
-    return feedback_text(action, invocation.feedback) or took
+    elapsed = _("for {duration}").format(duration=seconds_text(invocation.elapsed_s))
+    return feedback_text(action, invocation.feedback) or elapsed
 
 
 def remaining_text(invocation: Invocation) -> str:
@@ -146,13 +146,13 @@ def result_texts(invocation: Invocation, *, may_move: bool = False) -> tuple[str
     Returns:
         Text and status of the chip, and a sentence with the reason or "".
     """
-    took = seconds_text(invocation.elapsed_s)
+    elapsed = seconds_text(invocation.elapsed_s)
     if invocation.state == "succeeded":
-        return _("done in {duration}").format(duration=took), "ok", ""
+        return _("done in {duration}").format(duration=elapsed), "ok", ""
     if invocation.state == "canceled":
         reason = invocation.error if invocation.error and invocation.error != "stopped" else ""
         template = _("ended after {duration}") if may_move else _("stopped after {duration}")
-        return template.format(duration=took), "off", _as_sentence(reason)
+        return template.format(duration=elapsed), "off", _as_sentence(reason)
     return _("failed"), "error", _as_sentence(invocation.error or _("The robot reported no reason"))
 
 
@@ -165,8 +165,8 @@ def _float_or_none(value: object) -> float | None:
     return float(value) if is_number else None  # type: ignore[arg-type]
 
 
-def _clamp_ratio(share: float) -> float:
-    return min(1.0, max(0.0, share))
+def _clamp_ratio(ratio: float) -> float:
+    return min(1.0, max(0.0, ratio))
 
 
 class TryRow(PaintedButton):
@@ -176,14 +176,14 @@ class TryRow(PaintedButton):
         super().__init__(theme)
         self.invocation = invocation
         text, status, reason = result_texts(invocation)
-        self.when = time.strftime("%H:%M:%S", time.localtime(invocation.sent_at_s))
+        self.time_text = time.strftime("%H:%M:%S", time.localtime(invocation.sent_at_s))
         self.input_text = input_summary(action, invocation.input)
         output = output_text(action, invocation.output) if invocation.state == "succeeded" else ""
         self.result = f"{text}, {output}" if output else reason.rstrip(".") or text
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         text = _("{when}, {values}, {result}; use these values again")
-        self.setAccessibleName(text.format(when=self.when, values=self.input_text, result=self.result))
+        self.setAccessibleName(text.format(when=self.time_text, values=self.input_text, result=self.result))
         self.setToolTip(plain.tip(_("{result}. Click to use these values again").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
@@ -194,13 +194,13 @@ class TryRow(PaintedButton):
         if self.is_highlighted:
             paint.box(painter, rect, theme.radius("small"), theme.colour("hover"))
         font = theme.font("body")
-        quiet = theme.colour("textSecondary")
+        result_colour = theme.colour("textSecondary")
         left = rect.left() + 6
         time_width = paint.width_of(font, "00:00:00") + 14
         paint.text_line(
             painter,
             QRectF(left, rect.top(), time_width, rect.height()),
-            self.when,
+            self.time_text,
             font,
             theme.colour("textTertiary"),
         )
@@ -210,7 +210,7 @@ class TryRow(PaintedButton):
         status = theme.status(self.status)
         mark = QRectF(right.left() - 20, rect.center().y() - 7, 14, 14)
         paint_icon(painter, mark, status.icon, theme.colour(status.colour))
-        paint.text_line(painter, right, self.result, font, quiet)
+        paint.text_line(painter, right, self.result, font, result_colour)
         middle = QRectF(left, rect.top(), mark.left() - left - 8, rect.height())
         paint.text_line(painter, middle, self.input_text, font, theme.colour("text"))
 

@@ -49,7 +49,7 @@ class RobotItem(PaintedButton):
         super().__init__(theme, radius="panel", checkable=True)
         self.name = name
         self.location = ""
-        self._is_disconnected = self.may_be_forgotten = False
+        self._is_disconnected = self.can_be_discarded = False
         self.setAutoExclusive(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.chip = Chip(theme)
@@ -66,9 +66,13 @@ class RobotItem(PaintedButton):
             last_seen: Text with the time when the robot was last seen, shown while it is disconnected.
         """
         location = _("virtual, this computer") if link.is_virtual else link.robot.title
-        is_away = not link.is_connected
-        self._show(link.state, last_seen if is_away and last_seen else location, is_away=is_away)
-        self.may_be_forgotten = self._is_disconnected and not link.is_virtual
+        is_disconnected = not link.is_connected
+        self._show(
+            link.state,
+            last_seen if is_disconnected and last_seen else location,
+            is_disconnected=is_disconnected,
+        )
+        self.can_be_discarded = self._is_disconnected and not link.is_virtual
 
     def show_disconnected(self, last_seen: str) -> None:
         """Show a robot of an earlier session that is not connected. A click opens its context menu.
@@ -78,13 +82,13 @@ class RobotItem(PaintedButton):
         """
         self.setAutoExclusive(False)
         self.setCheckable(False)
-        self._show("away", last_seen, is_away=True)
-        self.may_be_forgotten = True
+        self._show("away", last_seen, is_disconnected=True)
+        self.can_be_discarded = True
 
-    def _show(self, state: str, location: str, *, is_away: bool) -> None:
+    def _show(self, state: str, location: str, *, is_disconnected: bool) -> None:
         state_label = _(STATE_LABELS[state])
         self.chip.set(state_label, STATUS_BY_ROBOT_STATE[state])
-        self.location, self._is_disconnected = location, is_away
+        self.location, self._is_disconnected = location, is_disconnected
         self.setAccessibleName(f"{self.name}, {location}, {state_label}")
         self.update()
 
@@ -101,18 +105,18 @@ class RobotItem(PaintedButton):
         if self.isChecked() or self.is_hovered:
             fill = "selected" if self.isChecked() else "hover"
             paint.box(painter, rect, theme.radius("panel"), theme.colour(fill))
-        quiet = self._is_disconnected and not self.isChecked()
+        is_faint = self._is_disconnected and not self.isChecked()
         tile = QRectF(12, rect.center().y() - 18, 36, 36)
         paint.box(painter, tile, theme.radius("panel"), theme.colour("sunken"))
-        icon = theme.colour("textTertiary" if quiet else "textSecondary")
+        icon = theme.colour("textTertiary" if is_faint else "textSecondary")
         paint_icon(painter, tile.adjusted(9, 9, -9, -9), "bot", icon)
         bold = theme.font("bodyLarge")
         bold.setWeight(bold.Weight.DemiBold)
-        colour = theme.colour("selectedText" if self.isChecked() else "textTertiary" if quiet else "text")
+        colour = theme.colour("selectedText" if self.isChecked() else "textTertiary" if is_faint else "text")
         height = max(19.0, paint.height_of(bold) - 2)
         text_rect = QRectF(60, rect.center().y() - height, rect.width() - 66 - self.chip.width() - 12, height)
         paint.text_line(painter, text_rect, self.name, bold, colour)
-        location_colour = theme.colour("textTertiary" if quiet else "textSecondary")
+        location_colour = theme.colour("textTertiary" if is_faint else "textSecondary")
         paint.text_line(
             painter, text_rect.translated(0, height), self.location, theme.font("small"), location_colour
         )
@@ -138,15 +142,15 @@ class RobotList(QWidget):
         self._run = run
         self._known_robots: dict[str, KnownRobot] = {}
         self.items: dict[str, RobotItem] = {}
-        self.away: dict[str, RobotItem] = {}
+        self.disconnected_items: dict[str, RobotItem] = {}
         self.setFixedWidth(LIST_WIDTH)
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(8, 8, 8, 8)
         self._column.setSpacing(2)
         self._column.addStretch(1)
-        self._column.addWidget(self._make_help_button(run))
+        self._column.addWidget(self._make_help_card(run))
 
-    def _make_help_button(self, run: Callable[[str], object]) -> QWidget:
+    def _make_help_card(self, run: Callable[[str], object]) -> QWidget:
         card = Card(self._theme, fill="sunken")
         column = QVBoxLayout(card)
         column.setContentsMargins(14, 12, 14, 12)
@@ -154,19 +158,19 @@ class RobotList(QWidget):
         column.addWidget(label(_("Is your robot missing?"), "label"))
         text = _("Check that it is switched on and that its driver is running.")
         column.addWidget(label(text, "body", role="textSecondary", wrap=True))
-        self.why = Button(self._theme, _("Find the cause"), "stethoscope", size="small")
-        self.why.clicked.connect(lambda: run("help.doctor"))
+        self.doctor_button = Button(self._theme, _("Find the cause"), "stethoscope", size="small")
+        self.doctor_button.clicked.connect(lambda: run("help.doctor"))
         self.turtle = Button(self._theme, _("Use a virtual Turtle"), "bot", kind="ghost", size="small")
         self.turtle.setAccessibleName(_("Use the virtual Turtle"))
         self.turtle.clicked.connect(lambda: run("robots.turtle"))
-        for button in (self.why, self.turtle):  # in a column, because large text needs the width
+        for button in (self.doctor_button, self.turtle):  # in a column, because large text needs the width
             column.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
         return card
 
     @property
     def count(self) -> int:
         """Number of rows."""
-        return len(self.items) + len(self.away)
+        return len(self.items) + len(self.disconnected_items)
 
     def show_fleet(self, fleet: Fleet) -> list[str]:
         """Show the robots of this session, then the robots of earlier sessions.
@@ -176,7 +180,7 @@ class RobotList(QWidget):
         Returns:
             The names of the listed robots of this session.
         """
-        self._known_robots = {robot.name: robot for robot in fleet.known.robots}
+        self._known_robots = {robot.name: robot for robot in fleet.known_robots.robots}
         links = [
             link
             for link in fleet.links
@@ -194,26 +198,26 @@ class RobotList(QWidget):
         away_by_name = {robot.name: robot for robot in away_robots}
         for name in [name for name in self.items if name not in {link.name for link in links}]:
             self._remove_item(self.items.pop(name))
-        for name in [name for name in self.away if name not in away_by_name]:
-            self._remove_item(self.away.pop(name))
+        for name in [name for name in self.disconnected_items if name not in away_by_name]:
+            self._remove_item(self.disconnected_items.pop(name))
         for link in links:
             if link.name not in self.items:
                 item = self._make_item(link.name, len(self.items))
                 item.clicked.connect(lambda _on=False, name=link.name: self.selected.emit(name))
                 self.items[link.name] = item
         for robot in away_robots:
-            if robot.name not in self.away:
-                item = self._make_item(robot.name, len(self.items) + len(self.away))
+            if robot.name not in self.disconnected_items:
+                item = self._make_item(robot.name, len(self.items) + len(self.disconnected_items))
                 item.clicked.connect(partial(self._open_menu_below, item))
-                self.away[robot.name] = item
-            self.away[robot.name].show_disconnected(seen_text(robot.last_connected_s))
+                self.disconnected_items[robot.name] = item
+            self.disconnected_items[robot.name].show_disconnected(seen_text(robot.last_connected_s))
         self.turtle.setVisible(
             not any(link.robot.model == TURTLE_MODEL and link.is_connected for link in links)
         )
 
     def _make_item(self, name: str, index: int) -> RobotItem:
         item = RobotItem(self._theme, name)
-        item.menu_requested.connect(lambda at: self._open_menu(item, at))
+        item.menu_requested.connect(lambda position: self._open_menu(item, position))
         self._column.insertWidget(index, item)
         return item
 
@@ -234,11 +238,13 @@ class RobotList(QWidget):
 
     def menu_of(self, item: RobotItem) -> Menu | None:
         """Return the context menu of a disconnected robot; None for connected and virtual robots."""
-        if not item.may_be_forgotten:
+        if not item.can_be_discarded:
             return None
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(_("Find the cause")).triggered.connect(lambda: self._run("help.doctor"))
-        forget = menu.addAction(plain.escape_menu_text(_("Forget {robot}").format(robot=item.name)))
-        forget.triggered.connect(lambda: self.discard_requested.emit(item.name))
+        discard = menu.addAction(
+            plain.escape_menu_text(_("Remove {robot} from the list").format(robot=item.name))
+        )
+        discard.triggered.connect(lambda: self.discard_requested.emit(item.name))
         return menu

@@ -58,7 +58,7 @@ class RobotHeader(QWidget):
         self.finder.setFixedWidth(FINDER_WIDTH)
         self.finder.setMinimumHeight(theme.size("control", "form"))
         self.stop = Button(theme, _("Stop"), "square", kind="stop", size="large")
-        self.stop.fill_icon = True
+        self.stop.has_filled_icon = True
         row = Flow(self)
         row.setContentsMargins(16, 7, 16, 8)
         row.addWidget(self.name)
@@ -74,13 +74,13 @@ class SessionImageSource:
 
     def __init__(self, session: Session, files: FileDialogs) -> None:
         self._session, self._files = session, files
-        self._opened: list[ImageStream] = []
+        self._open_streams: list[ImageStream] = []
 
     @property
     def streams(self) -> Sequence[ImageStream]:
         """Open streams."""
-        self._opened = [stream for stream in self._opened if not stream.is_closed]
-        return self._opened
+        self._open_streams = [stream for stream in self._open_streams if not stream.is_closed]
+        return self._open_streams
 
     def topics(self) -> Sequence[str]:
         """Return the names of available image topics."""
@@ -91,7 +91,7 @@ class SessionImageSource:
     def open_stream(self, topic: str) -> ImageStream:
         """Subscribe to the images of a topic; the caller closes the stream."""
         stream = self._session.live.images.stream(topic)
-        self._opened = [*self.streams, stream]
+        self._open_streams = [*self.streams, stream]
         return stream
 
     def prompt_file(self, folder: str, callback: Callable[[Path], None]) -> None:
@@ -111,7 +111,7 @@ class RobotsPanel(OneRobotPanel):
         super().__init__(context, _("Robots"))
         self._names: list[str] = []  # names of the robots in the list
         self.cards: dict[str, ActionCard] = {}
-        self._cards_of = ""
+        self._cards_robot_name = ""
         self._pictures = SessionImageSource(self.session, self.context.files)
         self._shown_values: dict[str, tuple[object, ...]] = {}
         self._last_sensor_values: dict[tuple[str, str], list[str]] = {}
@@ -164,9 +164,9 @@ class RobotsPanel(OneRobotPanel):
         scroll = ScrollColumn(_("Actions"), margins=(16, 14, 16, 14), gap=12)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self._card_column = scroll.column
-        self.none = label(_("No matching actions."), "bodyLarge", role="textSecondary")
-        self.none.hide()
-        self._card_column.insertWidget(0, self.none)
+        self.no_match_label = label(_("No matching actions."), "bodyLarge", role="textSecondary")
+        self.no_match_label.hide()
+        self._card_column.insertWidget(0, self.no_match_label)
         return scroll
 
     # -- display ------------------------------------------------------------------------------------------
@@ -206,19 +206,19 @@ class RobotsPanel(OneRobotPanel):
 
     def _has_changed(self, key: str, *now: object) -> bool:
         # Returns True if the value differs from the one that was shown last.
-        changed = self._shown_values.get(key) != now
+        has_changed = self._shown_values.get(key) != now
         self._shown_values[key] = now
-        return changed
+        return has_changed
 
     def discard(self, name: str) -> None:
         """Remove a disconnected robot from the list until it connects again."""
-        self.session.fleet.known.discard(name)
+        self.session.fleet.known_robots.discard(name)
         self._shown_values.pop(name, None)
         self._revision = -1
         self.refresh()
 
     def select_robot(self, name: str) -> None:
-        """Select a robot for this panel and for all others that show one robot."""
+        """Select a robot for this panel and all other panels that display a single robot."""
         self.session.fleet.select(name)
         link = self.session.fleet.link(name)
         if link is not None:
@@ -245,16 +245,18 @@ class RobotsPanel(OneRobotPanel):
                 self.theme,
                 action,
                 self._options,
-                folded=index >= EXPANDED_CARD_COUNT,
+                is_collapsed=index >= EXPANDED_CARD_COUNT,
                 pictures=self._pictures,
                 title_of=lambda name: titles.get(name, name.replace("_", " ")),
             )
             card.form.set_input(inputs.get(action.name, {}))
-            card.try_requested.connect(lambda given, name=action.name: self.start_action(name, given))
-            card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
+            card.try_requested.connect(lambda values, name=action.name: self.start_action(name, values))
+            card.cancel_requested.connect(
+                lambda name=action.name: self.session.fleet.cancel(self._robot, name)
+            )
             self.cards[action.name] = card
             self._card_column.insertWidget(index, card)
-        self._cards_of = link.name
+        self._cards_robot_name = link.name
         self._set_highlighted(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
         self.stop.set_label(_("Stop {robot}").format(robot=link.name))
@@ -267,8 +269,8 @@ class RobotsPanel(OneRobotPanel):
         self._apply_filter()
 
     def _has_cards_of(self, link: RobotLink) -> bool:
-        # Returns True if the typed input of the cards was kept.
-        return self._cards_of == link.name
+        # Returns True if the cards belong to this robot, so that their typed input can be kept.
+        return self._cards_robot_name == link.name
 
     def _remove_cards(self) -> None:
         for card in self.cards.values():
@@ -321,7 +323,7 @@ class RobotsPanel(OneRobotPanel):
             is_match = all(keyword in text for keyword in keywords)
             card.setVisible(is_match)
             visible_count += is_match
-        self.none.setVisible(bool(self.cards) and not visible_count)
+        self.no_match_label.setVisible(bool(self.cards) and not visible_count)
 
     # -- user actions -------------------------------------------------------------------------------------
 
@@ -350,9 +352,9 @@ class RobotsPanel(OneRobotPanel):
                 if card.isAncestorOf(new):
                     self._set_highlighted(card)
 
-    def _set_highlighted(self, first: ActionCard | None) -> None:
+    def _set_highlighted(self, highlighted_card: ActionCard | None) -> None:
         for card in self.cards.values():
-            card.set_highlighted(card is first)
+            card.set_highlighted(card is highlighted_card)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

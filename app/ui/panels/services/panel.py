@@ -57,10 +57,10 @@ class ServicesPanel(PanelWidget):
         self._texts: dict[str, str] = {}
         self._shown_service = ""
         self._is_showing = False
-        self.count = label("", "small", role="textSecondary")
-        self.chips = [self.count]
+        self.count_label = label("", "small", role="textSecondary")
+        self.chips = [self.count_label]
         self.strip = ArmedStrip(context)
-        self._minutes = ArmDurationMenu(self.theme, self, self.acting)
+        self._duration_menu = ArmDurationMenu(self.theme, self, self.acting)
         self.filter = FilterField(self.theme, _("Filter services"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ServiceList(self.theme)
@@ -73,25 +73,25 @@ class ServicesPanel(PanelWidget):
 
     def _make_request(self) -> None:
         theme = self.theme
-        self.name = ElidedLabel("code", "text", min_width=60)
+        self.name_label = ElidedLabel("code", "text", min_width=60)
         self.format_switch = Segments(
             theme, [("form", _("Form"), None), ("json", _("JSON"), None)], size="small", name=_("Request as")
         )
         self.form = RequestForm(theme)
-        self.edit = JsonEdit(theme, _("Request"), least_lines=4)
-        self.requests = QStackedWidget()
-        self.requests.addWidget(self.form)
-        self.requests.addWidget(self.edit)
-        self.sentence = label("", "small", role="error", wrap=True)
-        self.sentence.setMinimumWidth(0)
-        self.fix = Button(theme, _("Fix it"), "wrench", size="small")
+        self.edit = JsonEdit(theme, _("Request"), min_lines=4)
+        self.request_pages = QStackedWidget()
+        self.request_pages.addWidget(self.form)
+        self.request_pages.addWidget(self.edit)
+        self.problem_label = label("", "small", role="error", wrap=True)
+        self.problem_label.setMinimumWidth(0)
+        self.fix_button = Button(theme, _("Fix it"), "wrench", size="small")
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
         self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls the service"), "Ctrl+Enter")))
         self.cancel_button = Button(theme, _("Cancel"), "x")
-        self.seconds = NumberEdit(theme, MIN_TIMEOUT_S, MAX_TIMEOUT_S, _("s"), 1)
-        self.seconds.setAccessibleName(_("Time limit in seconds"))
-        self.seconds.setFixedWidth(round(theme.scaled(SECONDS_WIDTH_PX)))
-        self.seconds.show_number(TIMEOUT_S)
+        self.timeout_field = NumberEdit(theme, MIN_TIMEOUT_S, MAX_TIMEOUT_S, _("s"), 1)
+        self.timeout_field.setAccessibleName(_("Time limit in seconds"))
+        self.timeout_field.setFixedWidth(round(theme.scaled(SECONDS_WIDTH_PX)))
+        self.timeout_field.show_number(TIMEOUT_S)
         self.timeout_s = TIMEOUT_S
 
     def _make_calls(self) -> None:
@@ -113,10 +113,10 @@ class ServicesPanel(PanelWidget):
             ),
         )
         self.calls_model: TableModel[CallRecord] = TableModel(columns, lambda each: str(each.number))
-        self.calls = TableView(self.theme, self.calls_model)
-        self.calls.setAccessibleName(_("Calls"))
-        self._clear = QAction(_("Clear the call history"), self)
-        self._clear.triggered.connect(self._clear_calls)
+        self.calls_table = TableView(self.theme, self.calls_model)
+        self.calls_table.setAccessibleName(_("Calls"))
+        self._clear_action = QAction(_("Clear the call history"), self)
+        self._clear_action.triggered.connect(self._clear_calls)
 
     def _connect(self) -> None:
         self.filter.textChanged.connect(lambda _text: self._rebuild())
@@ -129,24 +129,24 @@ class ServicesPanel(PanelWidget):
         self.form.typed.connect(self._form_typed)
         self.edit.changed.connect(self._text_typed)
         self.edit.submitted.connect(self.call)
-        self.fix.clicked.connect(self._apply_fix)
+        self.fix_button.clicked.connect(self._apply_fix)
         self.call_button.clicked.connect(self.call)
         self.cancel_button.clicked.connect(self._cancel_call)
-        self.seconds.number.connect(lambda value: setattr(self, "timeout_s", value))
-        self.calls.opened.connect(self._open_call)
-        self.calls.menu_requested.connect(self._show_call_menu)
+        self.timeout_field.number_entered.connect(lambda value: setattr(self, "timeout_s", value))
+        self.calls_table.opened.connect(self._open_call)
+        self.calls_table.menu_requested.connect(self._show_call_menu)
 
     def _arrange(self) -> None:
-        self._sides = ListDetailView(
+        self._list_detail_view = ListDetailView(
             self.theme,
             (self.filter, self.list, self._make_right_side()),
             list_px=LIST_WIDTH_PX,
-            list_high_px=LIST_HEIGHT_PX,
+            list_height_px=LIST_HEIGHT_PX,
             narrow_px=SIDE_BY_SIDE_PX,
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
-        self.pages.addWidget(self._sides)
+        self.pages.addWidget(self._list_detail_view)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -155,28 +155,28 @@ class ServicesPanel(PanelWidget):
 
     def _make_right_side(self) -> QWidget:
         header, fault, buttons = QHBoxLayout(), QHBoxLayout(), Flow(gap=10, row_gap=6)
-        header.addWidget(self.name, 1)
+        header.addWidget(self.name_label, 1)
         header.addWidget(self.format_switch)
-        fault.addWidget(self.sentence, 1)
-        fault.addWidget(self.fix, 0, Qt.AlignmentFlag.AlignTop)
+        fault.addWidget(self.problem_label, 1)
+        fault.addWidget(self.fix_button, 0, Qt.AlignmentFlag.AlignTop)
         for button in (self.call_button, self.cancel_button):
             buttons.addWidget(button)
-        limit = QWidget()
-        limit_row = QHBoxLayout(limit)
-        limit_row.setContentsMargins(0, 0, 0, 0)
-        limit_row.addWidget(label(_("time limit"), "small", role="textSecondary"))
-        limit_row.addWidget(self.seconds)
-        buttons.addWidget(limit)
+        timeout_widget = QWidget()
+        timeout_row = QHBoxLayout(timeout_widget)
+        timeout_row.setContentsMargins(0, 0, 0, 0)
+        timeout_row.addWidget(label(_("time limit"), "small", role="textSecondary"))
+        timeout_row.addWidget(self.timeout_field)
+        buttons.addWidget(timeout_widget)
         self._request_widget = QWidget()
         request = QVBoxLayout(self._request_widget)
         request.setContentsMargins(12, 8, 12, 8)
         request.setSpacing(8)
         request.addLayout(header)
-        request.addWidget(self.requests, 1)
+        request.addWidget(self.request_pages, 1)
         request.addLayout(fault)
         request.addLayout(buttons)
         self.reply_view.setMinimumHeight(round(self.theme.scaled(110)))
-        self.calls.setMinimumHeight(round(self.theme.scaled(90)))
+        self.calls_table.setMinimumHeight(round(self.theme.scaled(90)))
         scroll = ScrollColumn(_("Selected service"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for index, (widget, stretch) in enumerate(
@@ -185,7 +185,7 @@ class ServicesPanel(PanelWidget):
                 (Separator(self.theme), 0),
                 (self.reply_view, 3),
                 (Separator(self.theme), 0),
-                (self.calls, 2),
+                (self.calls_table, 2),
             )
         ):
             scroll.column.insertWidget(index, widget)
@@ -233,7 +233,7 @@ class ServicesPanel(PanelWidget):
                 self.list.select_key(target)
             self._requested_service = ""
         self.list.refresh_visible()
-        self.count.setText(count_text(services))
+        self.count_label.setText(count_text(services))
         self.pages.setCurrentIndex(1 if services else 0)
         if not services:
             self._update_empty_state()
@@ -260,7 +260,7 @@ class ServicesPanel(PanelWidget):
         name = self.service
         if name and name != self._shown_service:
             self._shown_service = name
-            self.name.setText(name)
+            self.name_label.setText(name)
             self.form.reset_kinds()
             self._set_text(self._request_text(name))
             self._set_mode("form")
@@ -268,7 +268,7 @@ class ServicesPanel(PanelWidget):
         if name:
             records = [each for each in reversed(self.acting.calls.records) if each.service == name]
             self.calls_model.set_rows(records)
-            self.calls.refresh_visible()
+            self.calls_table.refresh_visible()
             self._update_call()
 
     def _request_text(self, service: str) -> str:
@@ -284,23 +284,23 @@ class ServicesPanel(PanelWidget):
         self._texts[self._shown_service] = text
         self._is_showing = True
         self.edit.set_text(text)
-        read = parse_json_text(text)
-        if read.fault is None and not read.placeholders:
-            self.form.show_request(read.fill({}))
+        parsed = parse_json_text(text)
+        if parsed.fault is None and not parsed.placeholders:
+            self.form.show_request(parsed.fill({}))
         self._is_showing = False
         self._validate()
 
     def _can_show_form(self) -> bool:
-        read = parse_json_text(self.text)
-        return read.fault is None and not read.placeholders and isinstance(read.fill({}), Mapping)
+        parsed = parse_json_text(self.text)
+        return parsed.fault is None and not parsed.placeholders and isinstance(parsed.fill({}), Mapping)
 
     def _validate(self) -> None:
         fault = self._parse_text().fault
         self.edit.mark_line(fault.line if fault is not None else 0)
         message = fault.message if fault is not None else self._problem()
-        self.sentence.setText(message)
-        self.sentence.setVisible(bool(message))
-        self.fix.setVisible(fault is not None and fault.fix is not None)
+        self.problem_label.setText(message)
+        self.problem_label.setVisible(bool(message))
+        self.fix_button.setVisible(fault is not None and fault.fix is not None)
         self._update_call()
 
     def _parse_text(self) -> JsonText:
@@ -310,34 +310,34 @@ class ServicesPanel(PanelWidget):
         # Reason why the request can't be sent although it is valid JSON.
         if self.format_switch.value == "form" and self.form.problems:
             return next(iter(self.form.problems.values()))
-        read = self._parse_text()
+        parsed = self._parse_text()
         return (
-            _("Fill in “{name}” first.").format(name=read.manual_placeholders[0])
-            if read.manual_placeholders
+            _("Fill in “{name}” first.").format(name=parsed.manual_placeholders[0])
+            if parsed.manual_placeholders
             else ""
         )
 
     def _update_call(self) -> None:
         acting, name = self.acting, self.service
-        waiting = acting.calls.in_flight
-        is_mine = waiting is not None and waiting.service == name
-        can_call = self._parse_text().fault is None and not self._problem() and waiting is None
+        pending_call = acting.calls.in_flight
+        is_own_call = pending_call is not None and pending_call.service == name
+        can_call = self._parse_text().fault is None and not self._problem() and pending_call is None
         self.call_button.setEnabled(can_call and not self.session.is_replaying)
         is_armed = acting.arming.allows(Target("service", name))
-        if is_mine:
+        if is_own_call:
             text = _("Waiting {time}").format(time=seconds_text(acting.calls.elapsed_s))
             self.call_button.set_label(text, "circle-dashed")
         else:
             self.call_button.set_label(
                 _("Call") if is_armed else _("Arm and call"), "play" if is_armed else "lock"
             )
-        self.cancel_button.setVisible(is_mine)
+        self.cancel_button.setVisible(is_own_call)
         record = self._displayed_record()
         self.reply_view.show_record(record, acting.calls.elapsed_s)
 
     def _displayed_record(self) -> CallRecord | None:
         records = [each for each in self.acting.calls.records if each.service == self.service]
-        selected_key = self.calls.selected_key()
+        selected_key = self.calls_table.selected_key()
         return next(
             (each for each in records if str(each.number) == selected_key), records[-1] if records else None
         )
@@ -355,7 +355,7 @@ class ServicesPanel(PanelWidget):
         if mode == "form" and not self._can_show_form():
             mode = "json"  # the request can't be shown as fields
         self.format_switch.set_value(mode)
-        self.requests.setCurrentIndex(1 if mode == "json" else 0)
+        self.request_pages.setCurrentIndex(1 if mode == "json" else 0)
         self._validate()
 
     def _form_typed(self, request: object) -> None:
@@ -379,8 +379,8 @@ class ServicesPanel(PanelWidget):
         """Call the selected service."""
         if not self.call_button.isEnabled():
             return
-        self.calls.clearSelection()
-        self.calls.setCurrentIndex(self.calls_model.index(-1, -1))
+        self.calls_table.clearSelection()
+        self.calls_table.setCurrentIndex(self.calls_model.index(-1, -1))
         reason = self.acting.call(self.service, self.text, self.timeout_s)
         if reason:
             self.context.show_toast(reason)
@@ -413,7 +413,7 @@ class ServicesPanel(PanelWidget):
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(
-            self.theme.icon("repeat"), _("Repeat the call"), lambda: self._set_text(record.request)
+            self.theme.icon("repeat"), _("Use this request"), lambda: self._set_text(record.request)
         )
         menu.addAction(
             self.theme.icon("copy"), _("Copy the request"), lambda: self._copy_request(record.request)
@@ -427,8 +427,8 @@ class ServicesPanel(PanelWidget):
     # -- overrides ----------------------------------------------------------------------------------------
 
     def more_actions(self) -> Sequence[QAction]:
-        self._clear.setEnabled(bool(self.acting.calls.records))
-        return (self._minutes.entry(), self._clear)
+        self._clear_action.setEnabled(bool(self.acting.calls.records))
+        return (self._duration_menu.entry(), self._clear_action)
 
     def focus_filter(self) -> bool:
         self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -437,7 +437,7 @@ class ServicesPanel(PanelWidget):
 
     def theme_changed(self) -> None:
         self.list.fit_rows()
-        self._sides.fit()
+        self._list_detail_view.fit()
 
     def save_state(self) -> dict[str, object]:
         return {"service": self.service}

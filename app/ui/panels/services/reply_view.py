@@ -100,15 +100,15 @@ def duration_cell(record: CallRecord) -> Cell:
         case "answered":
             return Cell(duration_text(record.duration_s), "circle-check", "ok")
         case "canceled":
-            return Cell(_("canceled"), "circle-x", "textSecondary")
+            return Cell(_("cancelled"), "circle-x", "textSecondary")
         case _:
             return Cell(record.error, "circle-x", "error")
 
 
 def clock_text(record: CallRecord) -> str:
     """Format the time of a call, such as "8:41:50"."""
-    started = dt.datetime.fromtimestamp(record.started_s, tz=dt.timezone.utc).astimezone()
-    return started.strftime("%H:%M:%S").lstrip("0")
+    started_at = dt.datetime.fromtimestamp(record.started_s, tz=dt.timezone.utc).astimezone()
+    return started_at.strftime("%H:%M:%S").lstrip("0")
 
 
 class ReplyView(QWidget):
@@ -128,8 +128,8 @@ class ReplyView(QWidget):
             name=_("Reply as"),
         )
         self.format_switch.changed.connect(self._set_mode)
-        self.copy = IconButton(theme, "copy", _("Copy reply"), size=26)
-        self.copy.clicked.connect(self._copy)
+        self.copy_button = IconButton(theme, "copy", _("Copy reply"), size=26)
+        self.copy_button.clicked.connect(self._copy)
         self.model: TableModel[ReplyRow] = TableModel(
             (
                 Column("name", lazy("Field"), 90, _name_cell, stretch=True, tip=lambda row: row.path),
@@ -140,13 +140,13 @@ class ReplyView(QWidget):
         self.table = TableView(theme, self.model)
         self.table.horizontalHeader().hide()
         self.table.setAccessibleName(_("Reply"))
-        self.text = JsonEdit(theme, _("Reply as JSON"), least_lines=3)
+        self.text = JsonEdit(theme, _("Reply as JSON"), min_lines=3)
         self.text.edit.setReadOnly(True)
-        self.sentence = label("", "body", role="textSecondary", wrap=True)
-        self.sentence.setMinimumWidth(0)
-        self.sentence.setContentsMargins(12, 4, 12, 4)
+        self.message_label = label("", "body", role="textSecondary", wrap=True)
+        self.message_label.setMinimumWidth(0)
+        self.message_label.setContentsMargins(12, 4, 12, 4)
         self.pages = QStackedWidget()
-        for page in (self.sentence, self.table, self.text):
+        for page in (self.message_label, self.table, self.text):
             self.pages.addWidget(page)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -157,20 +157,20 @@ class ReplyView(QWidget):
 
     def _make_header(self) -> QBoxLayout:
         # In a narrow panel the header wraps into two rows.
-        ended, controls = QHBoxLayout(), QHBoxLayout()
-        for row in (ended, controls):
+        result_row, control_row = QHBoxLayout(), QHBoxLayout()
+        for row in (result_row, control_row):
             row.setSpacing(8)
-        ended.addWidget(label(_("Reply"), "title"))
-        ended.addWidget(self.chip)
-        ended.addWidget(self.details, 1)
-        controls.addStretch(1)
-        controls.addWidget(self.format_switch)
-        controls.addWidget(self.copy)
+        result_row.addWidget(label(_("Reply"), "title"))
+        result_row.addWidget(self.chip)
+        result_row.addWidget(self.details, 1)
+        control_row.addStretch(1)
+        control_row.addWidget(self.format_switch)
+        control_row.addWidget(self.copy_button)
         self._header = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._header.setContentsMargins(12, 4, 8, 0)
         self._header.setSpacing(4)
-        self._header.addLayout(ended, 1)
-        self._header.addLayout(controls)
+        self._header.addLayout(result_row, 1)
+        self._header.addLayout(control_row)
         return self._header
 
     def minimumSizeHint(self) -> QSize:
@@ -196,18 +196,18 @@ class ReplyView(QWidget):
         if record == self.record and record is not None:
             return
         self.record = record
-        has_answer = record is not None and record.state == "answered" and record.is_retained
-        self.format_switch.setVisible(has_answer)
-        self.copy.setVisible(has_answer)
+        has_reply = record is not None and record.state == "answered" and record.is_retained
+        self.format_switch.setVisible(has_reply)
+        self.copy_button.setVisible(has_reply)
         if record is None:
             self.chip.set("")
             self.details.setText("")
-            self.sentence.setText(_("No calls yet."))
+            self.message_label.setText(_("No calls yet."))
         elif record.state != "waiting":
             status = "ok" if record.state == "answered" else "off" if record.state == "canceled" else "error"
             self.chip.set(call_text(record), status)
         self._update_details(record)
-        if has_answer and record is not None:
+        if has_reply and record is not None:
             self.model.set_rows(reply_rows(record.reply) if not record.is_truncated else [])
             self.text.set_text(record.text)
         self._set_mode(self.format_switch.value)
@@ -217,11 +217,11 @@ class ReplyView(QWidget):
             return
         self.details.setText(clock_text(record))
         if record.state == "waiting":
-            self.sentence.setText(_("Waiting for the reply…"))
+            self.message_label.setText(_("Waiting for the reply…"))
         elif record.state != "answered":
-            self.sentence.setText(record.error)
+            self.message_label.setText(record.error)
         elif not record.is_retained:
-            self.sentence.setText(_("The reply was discarded to make room for newer ones."))
+            self.message_label.setText(_("The reply was discarded to make room for newer ones."))
         else:
             size = size_text(len(record.text.encode("utf-8", "replace")))
             self.details.setText(_("{time}, {size}").format(time=clock_text(record), size=size))

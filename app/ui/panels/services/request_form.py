@@ -53,8 +53,8 @@ class RequestForm(QWidget):
         self.fields: dict[str, QLineEdit | Switch] = {}
         self.problems: dict[str, str] = {}
         """Error messages by field name."""
-        self.nothing = label("", "small", role="textSecondary", wrap=True)
-        self.nothing.setMinimumWidth(0)
+        self.hint_label = label("", "small", role="textSecondary", wrap=True)
+        self.hint_label.setMinimumWidth(0)
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(10)
@@ -64,7 +64,7 @@ class RequestForm(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(8)
-        column.addWidget(self.nothing)
+        column.addWidget(self.hint_label)
         column.addLayout(self._grid)
         column.addStretch(1)
 
@@ -85,19 +85,24 @@ class RequestForm(QWidget):
         for name, value in displayed.items():
             self._show_value(name, value)
         if not isinstance(request, Mapping):
-            self.nothing.setText(_("The request must be an object with names and values. Edit it as JSON."))
+            self.hint_label.setText(
+                _("The request must be an object with names and values. Edit it as JSON.")
+            )
         elif not values:
             hint = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
-            self.nothing.setText(hint)
+            self.hint_label.setText(hint)
         elif len(values) > MAX_FIELDS:
-            self.nothing.setText(_("Some fields aren't shown. Edit the request as JSON to see them all."))
-        self.nothing.setVisible(not values or len(values) > MAX_FIELDS)
+            self.hint_label.setText(_("Some fields aren't shown. Edit the request as JSON to see them all."))
+        self.hint_label.setVisible(not values or len(values) > MAX_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:
         # A field keeps its kind: a float field when an integer is typed, a JSON field for any value.
-        kind, before = kind_of(value), self._kinds.get(name)
+        kind, previous_kind = kind_of(value), self._kinds.get(name)
         return (
-            before if (before is not None and (before, kind) in WIDENING_KINDS) or before == "json" else kind
+            previous_kind
+            if (previous_kind is not None and (previous_kind, kind) in WIDENING_KINDS)
+            or previous_kind == "json"
+            else kind
         )
 
     def _show_value(self, name: str, value: object) -> None:
@@ -116,10 +121,10 @@ class RequestForm(QWidget):
 
     def _rebuild(self, kinds: Mapping[str, str]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
-            old = item.widget()
-            if old is not None:
-                old.hide()
-                old.deleteLater()
+            widget = item.widget()
+            if widget is not None:
+                widget.hide()
+                widget.deleteLater()
         self.fields, self._kinds, self.problems = {}, dict(kinds), {}
         for row, (name, kind) in enumerate(kinds.items()):
             name_label = label(name, "body", role="textSecondary", wrap=True)

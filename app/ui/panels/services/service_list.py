@@ -57,9 +57,9 @@ def count_text(services: Sequence[OfferedService]) -> str:
     if not services:
         return ""
     nodes = len({name for each in services for name in each.nodes})
-    text = ngettext("{count} service", "{count} services", len(services)).format(count=len(services))
-    by = ngettext("{count} node", "{count} nodes", nodes).format(count=nodes)
-    return _("{services} of {nodes}").format(services=text, nodes=by)
+    service_text = ngettext("{count} service", "{count} services", len(services)).format(count=len(services))
+    node_text = ngettext("{count} node", "{count} nodes", nodes).format(count=nodes)
+    return _("{services} of {nodes}").format(services=service_text, nodes=node_text)
 
 
 class ServiceList(TableView[OfferedService]):

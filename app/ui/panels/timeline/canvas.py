@@ -29,8 +29,7 @@ from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
 
 from app.core.recording.replay.replay import Replay
 from app.core.recording.replay.scale import TimeScale, clock_text, duration_text
-from app.ui.panels.timeline.event_lanes import LANE_LABELS as NAMES_OF_LANES
-from app.ui.panels.timeline.event_lanes import RUNS, EventLanes, LaneMark, visible_lanes
+from app.ui.panels.timeline.event_lanes import LANE_LABELS, RUNS, EventLanes, LaneMark, visible_lanes
 from app.ui.text import plain
 from app.ui.text.numbers import group_digits
 from app.ui.theme.icons import paint_icon
@@ -73,17 +72,16 @@ class TimelineCanvas(QAbstractScrollArea):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.by_clock = False
+        self.shows_clock = False
         self.scale: TimeScale | None = None
         self._replay: Replay | None = None
         self._topics: Sequence[str] = ()
-        self._lanes: QPixmap | None = None
+        self._lanes_pixmap: QPixmap | None = None
         self._marks: list[LaneMark] = []
         self.field: RenameField | None = None
         self._dragged_part = ""  # dragged part: "playhead", "start" or "end"
         self._position_ns = 0
-        self._loop: tuple[int, int] | None = None
-        self._follows = True
+        self._loop_range_ns: tuple[int, int] | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(_("Timeline"))
         self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
@@ -100,24 +98,24 @@ class TimelineCanvas(QAbstractScrollArea):
             self.field.close_field()
         self._replay = replay
         self._topics = tuple(replay.recorded_topics) if replay is not None else ()
-        is_open = replay is not None and replay.opened is not None
+        is_open = replay is not None and replay.opened_recording is not None
         self.scale = (
             TimeScale.full(replay.start_ns, replay.end_ns) if replay is not None and is_open else None
         )
-        self._position_ns, self._loop, self._follows = 0, None, True
+        self._position_ns, self._loop_range_ns = 0, None
         self.update_scroll_range()
 
-    def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
-        """Move the playhead. The view follows unless the user has scrolled away from the playhead.
+    def move_to(self, position_ns: int, loop_range_ns: tuple[int, int] | None) -> None:
+        """Move the playhead. The view scrolls to the playhead unless the mouse drags it or the loop range.
 
         Args:
             position_ns: Time of the playhead, in ns since 1970.
-            loop: Start and end of the repeated range in ns since 1970, or None.
+            loop_range_ns: Start and end of the repeated range in ns since 1970, or None.
         """
-        if (position_ns, loop) == (self._position_ns, self._loop):
+        if (position_ns, loop_range_ns) == (self._position_ns, self._loop_range_ns):
             return
-        self._position_ns, self._loop = position_ns, loop
-        if self.scale is not None and self._follows and not self._dragged_part:
+        self._position_ns, self._loop_range_ns = position_ns, loop_range_ns
+        if self.scale is not None and not self._dragged_part:
             self.set_scale(self.scale.with_time(position_ns))
         self.viewport().update()
 
@@ -144,7 +142,7 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def refresh_lanes(self) -> None:
         """Repaint the lanes, and request the message counts of the visible time range."""
-        self._lanes = None
+        self._lanes_pixmap = None
         self.request_counts()
         self.viewport().update()
 
@@ -169,9 +167,9 @@ class TimelineCanvas(QAbstractScrollArea):
     def _plot_rect(self) -> QRectF:
         # Area of the time axis, including the ruler.
         view = self.viewport()
-        narrow = view.width() < self._theme.scaled(NARROW_WIDTH)
-        left = self._theme.scaled(NARROW_NAMES_WIDTH if narrow else NAMES_WIDTH)
-        right = self._theme.scaled(NARROW_FIGURES_WIDTH if narrow else FIGURES_WIDTH)
+        is_narrow = view.width() < self._theme.scaled(NARROW_WIDTH)
+        left = self._theme.scaled(NARROW_NAMES_WIDTH if is_narrow else NAMES_WIDTH)
+        right = self._theme.scaled(NARROW_FIGURES_WIDTH if is_narrow else FIGURES_WIDTH)
         return QRectF(left, 0, max(20.0, view.width() - left - right), view.height())
 
     def x_of(self, at_ns: int) -> float:
@@ -183,8 +181,8 @@ class TimelineCanvas(QAbstractScrollArea):
         scale, left, width = self.scale, plot.left(), plot.width()
         if scale is None:
             return lambda _at_ns: left
-        share = scale.relative_position
-        return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * width
+        relative_position = scale.relative_position
+        return lambda at_ns: left + max(-1.0, min(2.0, relative_position(at_ns))) * width
 
     def time_at(self, x: float) -> int:
         """Return the time at an x coordinate, in ns since 1970."""
@@ -233,9 +231,9 @@ class TimelineCanvas(QAbstractScrollArea):
         painter = QPainter(self.viewport())
         painter.fillRect(self.viewport().rect(), self._theme.colour("panel"))
         if self._replay is not None and self.scale is not None:
-            if self._lanes is None:
-                self._lanes = self._render_lanes()
-            painter.drawPixmap(0, 0, self._lanes)
+            if self._lanes_pixmap is None:
+                self._lanes_pixmap = self._render_lanes()
+            painter.drawPixmap(0, 0, self._lanes_pixmap)
             self._paint_current_run(painter)
             self._paint_loop(painter)
             self._paint_playhead(painter)
@@ -269,13 +267,13 @@ class TimelineCanvas(QAbstractScrollArea):
         digits = 0 if scale.mark_interval_s(max_marks) >= 1 else 3
         font, colour = theme.font("small"), theme.colour("textSecondary")
         painter.setPen(QPen(theme.colour("border"), 1))
-        for at_ns in scale.marks(max_marks, by_clock=self.by_clock):
+        for at_ns in scale.marks(max_marks, by_clock=self.shows_clock):
             x = self.x_of(at_ns)
             painter.setPen(QPen(theme.colour("controlBorder"), 1))
             painter.drawLine(QPointF(x, height - 6), QPointF(x, height))
             from_start = duration_text(at_ns - scale.first_ns, digits=digits)
-            text = clock_text(at_ns, digits=digits) if self.by_clock else from_start
-            # otherwise it would overlap the text at the right
+            text = clock_text(at_ns, digits=digits) if self.shows_clock else from_start
+            # otherwise the label would overlap the text at the right
             if x + 3 + paint.width_of(font, text) <= plot.right():
                 paint.text_line(
                     painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), height - 4), text, font, colour
@@ -299,7 +297,7 @@ class TimelineCanvas(QAbstractScrollArea):
         lanes, height = EventLanes(theme, painter, plot, self._x_mapper(plot)), theme.scaled(LANE_HEIGHT)
         for index, lane in enumerate(visible_lanes(replay)):
             top = theme.scaled(RULER_HEIGHT) + index * height
-            icon, name = NAMES_OF_LANES[lane]
+            icon, name = LANE_LABELS[lane]
             box = QRectF(0, top, plot.left(), height)
             self._paint_name(painter, box, icon, _(name), "textSecondary")
             self._marks += lanes.paint(lane, replay, top, height)
@@ -337,14 +335,14 @@ class TimelineCanvas(QAbstractScrollArea):
             return
         top = self._lanes_top() + index * self._row_height() - self.verticalScrollBar().value()
         row_rect = QRectF(0, top, self.viewport().width(), self._row_height())
-        is_chosen = topic == replay.selected_topic
-        if is_chosen:
+        is_selected = topic == replay.selected_topic
+        if is_selected:
             painter.fillRect(row_rect, theme.colour("selected"))
         recorded = replay.recorded_topics[topic]
-        role = "selectedText" if is_chosen else "text"
+        role = "selectedText" if is_selected else "text"
         icon = TOPIC_ICONS.get(recorded.codec, "binary")
         self._paint_name(painter, QRectF(0, top, plot.left(), self._row_height()), icon, topic, role)
-        self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
+        self._paint_density(painter, plot, top, topic, is_selected=is_selected)
         self._paint_losses(painter, plot, top, topic)
         self._paint_alarms_of(painter, plot, top, topic)
         self._paint_stats(
@@ -354,28 +352,28 @@ class TimelineCanvas(QAbstractScrollArea):
         )
 
     def _paint_density(
-        self, painter: QPainter, plot: QRectF, top: float, topic: str, *, is_chosen: bool
+        self, painter: QPainter, plot: QRectF, top: float, topic: str, *, is_selected: bool
     ) -> None:
         replay, scale = self._replay, self.scale
         density = replay.densities.newest if replay is not None and replay.densities is not None else None
         if density is None or scale is None or topic not in density.counts:
             return
         counts = density.counts[topic]
-        filled = sum(1 for count in counts if count)
+        nonzero_count = sum(1 for count in counts if count)
         peak = density.peak(topic)
-        colour = self._theme.colour("accentText" if is_chosen else "textTertiary")
+        colour = self._theme.colour("accentText" if is_selected else "textTertiary")
         left, right = self.x_of(density.start_ns), self.x_of(density.end_ns)
         box = QRectF(left, top + (self._row_height() - DENSITY_HEIGHT) / 2, right - left, DENSITY_HEIGHT)
         painter.save()
         painter.setClipRect(
             QRectF(plot.left(), top, plot.width(), self._row_height()), Qt.ClipOperation.IntersectClip
         )
-        if filled * MIN_LINE_SPACING_PX < density.bucket_count:
-            per_px = box.width() / density.bucket_count
+        if nonzero_count * MIN_LINE_SPACING_PX < density.bucket_count:
+            bucket_width = box.width() / density.bucket_count
             for index, count in enumerate(counts):
                 if count:
                     painter.fillRect(
-                        QRectF(left + index * per_px, box.top(), TICK_WIDTH, DENSITY_HEIGHT), colour
+                        QRectF(left + index * bucket_width, box.top(), TICK_WIDTH, DENSITY_HEIGHT), colour
                     )
         elif peak:
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
@@ -389,11 +387,11 @@ class TimelineCanvas(QAbstractScrollArea):
         colour = self._theme.colour("warn")
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(colour)
-        painted = plot.left() - 4
+        last_x = plot.left() - 4
         for mark in replay.densities.losses.get(topic, ()):
             x = self.x_of(mark.at_ns)
-            if plot.left() <= x <= plot.right() and x >= painted + 3:
-                painted = x
+            if plot.left() <= x <= plot.right() and x >= last_x + 3:
+                last_x = x
                 middle = top + self._row_height() / 2
                 painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), colour)
                 notch = [QPointF(x - 4, middle - 8), QPointF(x + 4, middle - 8), QPointF(x, middle - 3)]
@@ -408,8 +406,8 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.setClipRect(
             QRectF(plot.left(), top, plot.width(), self._row_height()), Qt.ClipOperation.IntersectClip
         )
-        about = [span for span in replay.densities.spans.alarms if span.topic == topic]
-        for span in EventLanes(self._theme, painter, plot, self._x_mapper(plot)).visible_spans(about):
+        topic_spans = [span for span in replay.densities.spans.alarms if span.topic == topic]
+        for span in EventLanes(self._theme, painter, plot, self._x_mapper(plot)).visible_spans(topic_spans):
             left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
             box = QRectF(
                 left,
@@ -443,10 +441,10 @@ class TimelineCanvas(QAbstractScrollArea):
                 paint_icon(painter, icon_rect, "triangle-alert", theme.colour("warn"))
 
     def _paint_loop(self, painter: QPainter) -> None:
-        if self._loop is None:
+        if self._loop_range_ns is None:
             return
         plot, accent = self._plot_rect(), self._theme.colour("accent")
-        left, right = (self.x_of(each) for each in self._loop)
+        left, right = (self.x_of(each) for each in self._loop_range_ns)
         painter.save()
         painter.setClipRect(plot)
         tint = QColor(accent)
@@ -467,7 +465,9 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(QRectF(x - 0.75, 0, 1.5, plot.height()), theme.colour("text"))
         font = theme.font("small")
         first_ns = self.scale.first_ns
-        text = clock_text(self._position_ns) if self.by_clock else duration_text(self._position_ns - first_ns)
+        text = (
+            clock_text(self._position_ns) if self.shows_clock else duration_text(self._position_ns - first_ns)
+        )
         width = paint.width_of(font, text) + 12
         left = max(plot.left(), min(plot.right() - width, x - width / 2))
         flag = QRectF(left, 3, width, theme.scaled(RULER_HEIGHT) - 7)
@@ -486,8 +486,8 @@ class TimelineCanvas(QAbstractScrollArea):
         plot = self._plot_rect()
         if not plot.left() - GRIP_PX <= position.x() <= plot.right() + GRIP_PX or self.scale is None:
             return ""
-        if self._loop is not None and position.y() < self._theme.scaled(RULER_HEIGHT):
-            for name, edge in zip(("start", "end"), self._loop, strict=True):
+        if self._loop_range_ns is not None and position.y() < self._theme.scaled(RULER_HEIGHT):
+            for name, edge in zip(("start", "end"), self._loop_range_ns, strict=True):
                 outer = self.x_of(edge) + (-4 if name == "start" else 4)
                 if abs(position.x() - outer) <= GRIP_PX:
                     return name
@@ -517,8 +517,8 @@ class TimelineCanvas(QAbstractScrollArea):
         at_ns = self.time_at(event.position().x())
         if self._dragged_part == "playhead":
             self._replay.seek(at_ns)
-        elif self._loop is not None:
-            start_ns, end_ns = self._loop
+        elif self._loop_range_ns is not None:
+            start_ns, end_ns = self._loop_range_ns
             self._replay.loop(*((at_ns, end_ns) if self._dragged_part == "start" else (start_ns, at_ns)))
 
     def mouseReleaseEvent(self, _event: QMouseEvent) -> None:

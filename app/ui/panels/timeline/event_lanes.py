@@ -102,27 +102,31 @@ class EventLanes:
 
     def visible_spans(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
         """Yield the spans to paint: visible spans that the mark of the previous span does not hide."""
-        plot, free = self._plot, -1.0
+        plot, next_free_x = self._plot, -1.0
         for span in spans:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
-            if right < plot.left() - 1 or left > plot.right() + 1 or max(right, left + MIN_MARK_WIDTH) < free:
+            if (
+                right < plot.left() - 1
+                or left > plot.right() + 1
+                or max(right, left + MIN_MARK_WIDTH) < next_free_x
+            ):
                 continue
-            free = max(right, left + MIN_MARK_WIDTH) + 1
+            next_free_x = max(right, left + MIN_MARK_WIDTH) + 1
             yield span
 
     # -- bookmarks ----------------------------------------------------------------------------------------
 
     def _paint_bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
-        theme, painter, marks = self._theme, self._painter, replay.bookmarks
+        theme, painter, bookmarks = self._theme, self._painter, replay.bookmarks
         font, colour = theme.font("small"), theme.colour("accentText")
-        if not marks:
+        if not bookmarks:
             tertiary = theme.colour("textTertiary")
             paint.text_line(
-                painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add one"), font, tertiary
+                painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add a bookmark"), font, tertiary
             )
-        lane_marks, free = [], box.left() - 1.0
-        for mark in marks:
-            x = self._x_of(mark.at_ns)
+        lane_marks, next_free_x = [], box.left() - 1.0
+        for bookmark in bookmarks:
+            x = self._x_of(bookmark.at_ns)
             if not box.left() - 1 <= x <= box.right() + 1:
                 continue
             painter.setPen(QPen(colour, 1.5))
@@ -131,13 +135,13 @@ class EventLanes:
             painter.setBrush(colour)
             painter.drawRect(QRectF(x, box.top() + 4, FLAG_SIZE, 7))
             name_width = 0.0
-            if x >= free and mark.name:
-                name_width = min(paint.width_of(font, mark.name), theme.scaled(MAX_NAME_WIDTH))
+            if x >= next_free_x and bookmark.name:
+                name_width = min(paint.width_of(font, bookmark.name), theme.scaled(MAX_NAME_WIDTH))
                 name_rect = QRectF(x + 12, box.top(), name_width, box.height())
-                paint.text_line(painter, name_rect, mark.name, font, theme.colour("text"))
-                free = x + 16 + name_width
-            pressed = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + name_width, box.height())
-            lane_marks.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
+                paint.text_line(painter, name_rect, bookmark.name, font, theme.colour("text"))
+                next_free_x = x + 16 + name_width
+            hit_rect = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + name_width, box.height())
+            lane_marks.append(LaneMark(hit_rect, bookmark.at_ns, bookmark.name or _("Bookmark"), bookmark))
         return lane_marks
 
     # -- behaviours ---------------------------------------------------------------------------------------
@@ -179,12 +183,12 @@ class EventLanes:
         icon, role, result = RESULT_STYLES.get(span.result, ("", "", ""))
         text = span.details or (_(result) if result else "")
         result_width = side + GAP + paint.width_of(font, text)
-        name = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
-        if icon and name + 2 * GAP + result_width <= content_rect.width():
+        name_width = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
+        if icon and name_width + 2 * GAP + result_width <= content_rect.width():
             self._paint_icon(icon, content_rect.right() - result_width, content_rect, role)
             paint.text_line(painter, content_rect, text, font, theme.colour(role), paint.RIGHT)
             content_rect.adjust(0, 0, -result_width - GAP, 0)
-        elif icon and name + 2 * GAP + side <= content_rect.width():
+        elif icon and name_width + 2 * GAP + side <= content_rect.width():
             self._paint_icon(icon, content_rect.right() - side, content_rect, role)
             content_rect.adjust(0, 0, -side - GAP, 0)
         paint.text_line(painter, content_rect, span.name, font, theme.colour("text"))
@@ -206,17 +210,17 @@ class EventLanes:
             bar = QRectF(left, box.top() + 5, max(MIN_MARK_WIDTH, right - left), box.height() - 10)
             paint.box(self._painter, bar, 1.5, theme.colour(role))
             message = alarm_text(span)
-            until = self._x_of(spans[index + 1].start_ns) if index + 1 < len(spans) else box.right()
+            next_start = self._x_of(spans[index + 1].start_ns) if index + 1 < len(spans) else box.right()
             begin = max(bar.right(), box.left()) + 5
-            room = min(until, box.right()) - begin - side - GAP
-            pressed = bar.adjusted(-3, -3, 3, 3)
+            room = min(next_start, box.right()) - begin - side - GAP
+            hit_rect = bar.adjusted(-3, -3, 3, 3)
             if room >= theme.scaled(MIN_TEXT_WIDTH):
                 text_width = min(room, paint.width_of(font, message) + 1)
                 self._paint_icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
-                text = QRectF(begin + side + GAP, box.top(), text_width, box.height())
-                paint.text_line(self._painter, text, message, font, theme.colour(role))
-                pressed = pressed.united(text)
-            marks.append(LaneMark(pressed, span.start_ns, _with_times(message, span, start_ns)))
+                text_rect = QRectF(begin + side + GAP, box.top(), text_width, box.height())
+                paint.text_line(self._painter, text_rect, message, font, theme.colour(role))
+                hit_rect = hit_rect.united(text_rect)
+            marks.append(LaneMark(hit_rect, span.start_ns, _with_times(message, span, start_ns)))
         return marks
 
 

@@ -53,14 +53,14 @@ class TimelinePanel(PanelWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         self.strip, self.chooser = ReplayStrip(context), SendChooser(theme)
-        self._minutes = ArmDurationMenu(theme, self, context.session.acting)
-        self._below = QStackedWidget()
-        self._below.addWidget(self.canvas)
-        self._below.addWidget(self.chooser)
+        self._arm_duration_menu = ArmDurationMenu(theme, self, context.session.acting)
+        self._lower_pages = QStackedWidget()
+        self._lower_pages.addWidget(self.canvas)
+        self._lower_pages.addWidget(self.chooser)
         column.addWidget(self.transport)
         column.addWidget(Separator(theme))
         column.addWidget(self.strip)
-        column.addWidget(self._below, 1)
+        column.addWidget(self._lower_pages, 1)
         self.pages = self.make_page_stack(self.empty, body)
         self.setFocusProxy(self.canvas)
         self.ruler.changed.connect(self._set_ruler)
@@ -80,7 +80,7 @@ class TimelinePanel(PanelWidget):
     def refresh(self) -> None:
         replay = self.session.replay
         player = replay.player if replay is not None else None
-        if replay is None or player is None or replay.opened is None:
+        if replay is None or player is None or replay.opened_recording is None:
             self._shown_replay = None
             self._update_text()
             return
@@ -99,7 +99,7 @@ class TimelinePanel(PanelWidget):
         self.transport.show_replay(replay, player)
         self.strip.refresh()
         self.transport.set_armed(is_armed=self.strip.isVisibleTo(self))
-        if self._below.currentWidget() is self.chooser:
+        if self._lower_pages.currentWidget() is self.chooser:
             self.chooser.refresh()
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
 
@@ -137,7 +137,7 @@ class TimelinePanel(PanelWidget):
     def source_changed(self) -> None:
         self._shown_replay = None
         self.canvas.show_replay(None)
-        self._below.setCurrentWidget(self.canvas)
+        self._lower_pages.setCurrentWidget(self.canvas)
 
     def theme_changed(self) -> None:
         self.canvas.refresh_lanes()
@@ -153,8 +153,8 @@ class TimelinePanel(PanelWidget):
         if self._shown_replay is not None:
             self._shown_replay.select_topic(topic)
 
-    def _set_ruler(self, which: str) -> None:
-        self.canvas.by_clock = which == BY_CLOCK
+    def _set_ruler(self, mode: str) -> None:
+        self.canvas.shows_clock = mode == BY_CLOCK
         self.canvas.refresh_lanes()
 
     def _add_bookmark(self) -> None:
@@ -224,11 +224,11 @@ class TimelinePanel(PanelWidget):
         replay = self._shown_replay
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded_topics.items()}
-            self._below.setCurrentWidget(self.chooser)
+            self._lower_pages.setCurrentWidget(self.chooser)
             self.chooser.open(replay.sending, counts, replay.selected_topic)
 
     def _close_chooser(self) -> None:
-        self._below.setCurrentWidget(self.canvas)
+        self._lower_pages.setCurrentWidget(self.canvas)
         self.refresh()
         focus_target = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
         focus_target.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -240,59 +240,60 @@ class TimelinePanel(PanelWidget):
     # -- bookmarks ----------------------------------------------------------------------------------------
 
     def _run_on_current_bookmark(self, action: Callable[[Bookmark], object]) -> None:
-        mark = self._shown_replay.current_bookmark() if self._shown_replay is not None else None
-        if mark is not None:
-            action(mark)
+        bookmark = self._shown_replay.current_bookmark() if self._shown_replay is not None else None
+        if bookmark is not None:
+            action(bookmark)
         else:
             self.context.show_toast(_("No bookmark at the playhead. Select one, or press B to add one"))
 
-    def _show_menu(self, mark: Bookmark, position: QPoint) -> None:
+    def _show_menu(self, bookmark: Bookmark, position: QPoint) -> None:
         # Context menu of a bookmark.
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         actions = (
-            RowAction(_("Rename"), "pencil", lambda: self.rename_bookmark(mark)),
-            RowAction(_("Delete"), "trash-2", lambda: self.delete_bookmark(mark)),
+            RowAction(_("Rename"), "pencil", lambda: self.rename_bookmark(bookmark)),
+            RowAction(_("Delete"), "trash-2", lambda: self.delete_bookmark(bookmark)),
         )
         fill_menu(menu, self.theme, actions).popup(position)
 
-    def rename_bookmark(self, mark: Bookmark) -> None:
+    def rename_bookmark(self, bookmark: Bookmark) -> None:
         """Start editing the name of a bookmark in place."""
         replay = self._shown_replay
-        if replay is not None and not self._reject_note(mark):
+        if replay is not None and not self._reject_note(bookmark):
             self.canvas.rename(
-                mark, lambda name: self._apply_change(lambda: replay.rename_bookmark(mark, name.strip()))
+                bookmark,
+                lambda name: self._apply_change(lambda: replay.rename_bookmark(bookmark, name.strip())),
             )
 
-    def delete_bookmark(self, mark: Bookmark) -> None:
+    def delete_bookmark(self, bookmark: Bookmark) -> None:
         """Delete a bookmark; the toast offers to undo it."""
         replay = self._shown_replay
         if (
             replay is None
-            or self._reject_note(mark)
-            or not self._apply_change(lambda: replay.remove_bookmark(mark))
+            or self._reject_note(bookmark)
+            or not self._apply_change(lambda: replay.remove_bookmark(bookmark))
         ):
             return
-        text = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
+        text = _("Deleted the bookmark “{name}”").format(name=bookmark.name) if bookmark.name else ""
         self.context.show_toast(
             text or _("Deleted the bookmark"),
             _("Undo"),
-            lambda: self._apply_change(lambda: replay.restore_bookmark(mark)),
+            lambda: self._apply_change(lambda: replay.restore_bookmark(bookmark)),
         )
 
-    def _reject_note(self, mark: Bookmark) -> bool:
-        if mark.is_note:
+    def _reject_note(self, bookmark: Bookmark) -> bool:
+        if bookmark.is_note:
             self.context.show_toast(
                 _("Notes added while recording are part of the file and can't be changed")
             )
-        return mark.is_note
+        return bookmark.is_note
 
     def _apply_change(self, change: Callable[[], object]) -> bool:
         # Errors are shown in a toast.
         try:
             change()
         except RecordingError as error:
-            self.context.show_toast(_("Can't save the bookmark: {reason}").format(reason=error.reason))
+            self.context.show_toast(_("Can't change the bookmark: {reason}").format(reason=error.reason))
             return False
         except ValueError:  # already deleted
             return True
@@ -313,7 +314,7 @@ class TimelinePanel(PanelWidget):
         for old in self._menu_actions:
             old.deleteLater()
         self._menu_actions = actions
-        return [*actions, self._minutes.entry()] if path else actions
+        return [*actions, self._arm_duration_menu.entry()] if path else actions
 
     _menu_actions: Sequence[QAction] = ()
 

@@ -59,14 +59,14 @@ class ReplayStrip(ArmedStrip):
         active = self.sending.outbox.active_topics if self.sending is not None else ()
         if not active:
             return ""
-        count, skipped = sum(each.count for each in active), sum(each.dropped_count for each in active)
+        count, dropped_count = sum(each.count for each in active), sum(each.dropped_count for each in active)
         subscriber_count = max(each.subscriber_count for each in active)
         sent = ngettext("{count} sent", "{count} sent", count).format(count=group_digits(count))
-        late = [late_text(skipped)] if skipped else []
-        ears = ngettext("received by {count}", "received by {count}", subscriber_count).format(
+        late = [late_text(dropped_count)] if dropped_count else []
+        receivers_text = ngettext("{count} subscriber", "{count} subscribers", subscriber_count).format(
             count=subscriber_count
         )
-        return ", ".join((sent, *late, ears if subscriber_count else _("no subscribers")))
+        return ", ".join((sent, *late, receivers_text if subscriber_count else _("no subscribers")))
 
     def token_text(self, target: Target) -> str:
         routes = self.sending.routes if self.sending is not None else {}
@@ -104,7 +104,6 @@ class SendChooser(QWidget):
 
     exited = Signal()
     arming_failed = Signal(str)
-    """Emitted with the reason if the topics could not be armed."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -177,7 +176,9 @@ class SendChooser(QWidget):
             return
         self._last_state = (sending, sending.revision)
         self._show_rows()
-        hint = _("While armed, these topics are also sent to the live network during playback.")
+        hint = _(
+            "While sending is armed, the selected topics are also sent to the live network during playback."
+        )
         moving = _("Topics that move a robot are marked and need confirmation.")
         reading = _("Checking which topics move robots…")
         self.text_label.setText(f"{hint} {moving if sending.is_analyzed else reading}")

@@ -47,11 +47,11 @@ class TransportRow(QWidget):
         self.speed.setAccessibleName(_("Speed"))
         self.speed.setValue(SPEED_STEP_COUNT // 2)
         self.speed.setMaximumWidth(110)
-        self.hint = label("", "code", role="textSecondary")
+        self.speed_label = label("", "code", role="textSecondary")
         self.loop = ToggleButton(theme, _("Loop"), "repeat")
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="small")
         self.armed = Switch(theme, _("Armed"))
-        self.nothing = label(_("Sending is off"), "small", role="textSecondary")
+        self.sending_off_label = label(_("Sending is off"), "small", role="textSecondary")
         self._build()
         self._connect()
 
@@ -60,12 +60,12 @@ class TransportRow(QWidget):
         flow.setContentsMargins(12, 6, 12, 6)
         for widget in (
             self.time, self.length, self.date, self.previous, self.back, self.play, self.forward, self.next,
-            self.speed, self.hint, self.loop, self.bookmark,
+            self.speed, self.speed_label, self.loop, self.bookmark,
         ):  # fmt: skip
             flow.addWidget(widget)
         flow.push()
         flow.addWidget(self.armed)
-        flow.addWidget(self.nothing)
+        flow.addWidget(self.sending_off_label)
 
     def set_armed(self, *, is_armed: bool) -> None:
         """Hide the arming switch while sending is armed, because the arming strip then shows a switch too.
@@ -74,7 +74,7 @@ class TransportRow(QWidget):
             is_armed: True while sending is armed.
         """
         self.armed.setVisible(not is_armed)
-        self.nothing.setVisible(not is_armed)
+        self.sending_off_label.setVisible(not is_armed)
 
     def _request_arming(self) -> None:
         self.armed.setChecked(False)  # becomes checked once topics are chosen
@@ -132,17 +132,17 @@ class TransportRow(QWidget):
         return _("Loop {begin} to {end}").format(begin=begin, end=end)
 
     def _update_speed(self, player: PlayerStatus) -> None:
-        requested, true = player.speed, player.measured_speed
-        is_slow = player.is_playing and true is not None and true < MIN_NORMAL_SPEED_RATIO * requested
+        requested, actual = player.speed, player.measured_speed
+        is_slow = player.is_playing and actual is not None and actual < MIN_NORMAL_SPEED_RATIO * requested
         if is_slow:
             text = _("requested {asked}, actual {true} \u00d7").format(
-                asked=f"{requested:.3g}", true=f"{true:.2g}"
+                asked=f"{requested:.3g}", true=f"{actual:.2g}"
             )
         else:
             text = f"{requested:.1f}\u2009\u00d7" if requested >= 1 else f"{requested:.2g}\u2009\u00d7"
-        if text != self.hint.text():
-            self.hint.setText(text)
-            set_role(self.hint, "warn" if is_slow else "textSecondary")
+        if text != self.speed_label.text():
+            self.speed_label.setText(text)
+            set_role(self.speed_label, "warn" if is_slow else "textSecondary")
 
 
 def speed_of(step: int) -> float:

@@ -122,11 +122,13 @@ def loss_cell(topic: Topic) -> Cell:
         return Cell()
     if topic.lost == 0:
         return Cell("0", role=_text_role(topic, "text"))
-    share = topic.loss_ratio
+    loss_ratio = topic.loss_ratio
     return Cell(
         str(topic.lost)
-        if share is None
-        else number(share, ".1%" if share < 0.0995 else ".0%").replace("%", " %"),  # no decimals at 100 %
+        if loss_ratio is None
+        else number(loss_ratio, ".1%" if loss_ratio < 0.0995 else ".0%").replace(
+            "%", " %"
+        ),  # no decimals at 100 %
         "triangle-alert",
         "warn",
     )
@@ -193,13 +195,13 @@ def _rate_tip(topic: Topic) -> str:
 def _loss_tip(topic: Topic) -> str:
     displayed, kind = _displayed_tip(topic), network_without_stats(topic)
     if topic.lost is None and kind is not None:
-        lost = _("{network} doesn't count lost messages").format(network=kind.product_name)
+        loss_text = _("{network} doesn't count lost messages").format(network=kind.product_name)
     elif topic.lost is None:
-        lost = _("No subscriber reports losses")
+        loss_text = _("No subscriber reports losses")
     else:
-        lost = ngettext("{count} message lost", "{count} messages lost", topic.lost)
-        lost = lost.format(count=group_digits(topic.lost))
-    return _("{lost}. {shown}").format(lost=lost, shown=displayed) if displayed else lost
+        loss_text = ngettext("{count} message lost", "{count} messages lost", topic.lost)
+        loss_text = loss_text.format(count=group_digits(topic.lost))
+    return _("{lost}. {shown}").format(lost=loss_text, shown=displayed) if displayed else loss_text
 
 
 COLUMNS: tuple[Column[Topic], ...] = (
@@ -276,7 +278,7 @@ INDENT, CHEVRON = 14, 19
 
 
 def _folder_name_cell(folder: TopicFolder) -> Cell:
-    icon = "chevron-down" if folder.is_open else "chevron-right"
+    icon = "chevron-down" if folder.is_expanded else "chevron-right"
     return Cell(f"{folder.name}/", icon, mono=True, indent=folder.depth * INDENT)
 
 
@@ -364,34 +366,36 @@ COMMON_COLUMNS = tuple(
 
 
 def columns(
-    is_own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
+    is_own: Callable[[Topic], bool], has_several_networks: Callable[[], bool], is_tree: Callable[[], bool]
 ) -> tuple[Column[TreeRow], ...]:
     """Return the columns of the table.
 
     Args:
         is_own: Returns True for Studio's own topics, which are never shown as new.
-        several: Returns True to show the network column.
-        as_tree: Returns True if topics are shown below folders, with only the last part of their names.
+        has_several_networks: Returns True to show the network column.
+        is_tree: Returns True if topics are shown below folders, with only the last part of their names.
     """
 
     def topic_name_cell(topic: Topic) -> Cell:
         cell = name_cell(topic)
         if cell.chip and is_own(topic):
             cell = replace(cell, bold=False, chip=None)
-        if not as_tree():
+        if not is_tree():
             return cell
         parts = split_name(topic.name)
         return replace(cell, text=parts[-1], indent=(len(parts) - 1) * INDENT + CHEVRON)
 
     def folder_name_cell(folder: TopicFolder) -> Cell:
         cell = _folder_name_cell(folder)
-        has_new = not folder.is_open and any(
+        has_new = not folder.is_expanded and any(
             topic.is_new and topic.gone_s is None and not is_own(topic) for topic in folder.topics
         )
         return replace(cell, chip=pgettext("topic", "new")) if has_new else cell
 
-    first = _with_folders(
+    name_column = _with_folders(
         replace(COLUMNS[0], cell=topic_name_cell), (folder_name_cell, *FOLDER_COLUMNS["topic"][1:])
     )
-    network = _with_folders(replace(NETWORK_COLUMN, is_available=several), FOLDER_COLUMNS["network"])
-    return (first, network, *COMMON_COLUMNS)
+    network_column = _with_folders(
+        replace(NETWORK_COLUMN, is_available=has_several_networks), FOLDER_COLUMNS["network"]
+    )
+    return (name_column, network_column, *COMMON_COLUMNS)

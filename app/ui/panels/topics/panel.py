@@ -64,7 +64,7 @@ class TopicsTable(TableView[TreeRow]):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.selected_key() if self.shows_folders and has_no_modifiers(event) else None
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right} and key is not None:
-            self.keyboard = True
+            self.is_keyboard_navigation = True
             self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         else:
             super().keyPressEvent(event)
@@ -74,16 +74,16 @@ class TopicsPanel(NetworkTable[TreeRow]):
     """Panel with the topics as table or tree, a filter, and a note about the source of the statistics."""
 
     def __init__(self, context: PanelContext) -> None:
-        self._closed: set[str] = set()
+        self._collapsed_keys: set[str] = set()
         self._tree: TopicTree | None = None
         super().__init__(context, TABLE_TEXTS, "radio-tower")
-        self.as_tree = IconButton(
+        self.tree_button = IconButton(
             self.theme, "list-tree", _("Group topics into folders by name"), checkable=True, size=26
         )
-        self.as_tree.toggled.connect(lambda _on: self.rebuild())
-        self.count = ElidedLabel("small", "textSecondary", min_width=60)
-        self.header.insert(0, self.count)
-        self.header.append(self.as_tree)
+        self.tree_button.toggled.connect(lambda _on: self.rebuild())
+        self.count_label = ElidedLabel("small", "textSecondary", min_width=60)
+        self.header.insert(0, self.count_label)
+        self.header.append(self.tree_button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -116,8 +116,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._ticks += 1
         state = self._snapshot()
         order = self.table.order.column
-        lively = order is not None and order.name in CHANGING_COLUMNS
-        if state != self._last_snapshot or (lively and self._ticks % SORT_TICKS == 0):
+        is_sorted_by_stats = order is not None and order.name in CHANGING_COLUMNS
+        if state != self._last_snapshot or (is_sorted_by_stats and self._ticks % SORT_TICKS == 0):
             self.rebuild()
         if self._ticks % STATS_UPDATE_TICKS == 0 and self.model.rowCount():
             if self._tree is not None:
@@ -136,26 +136,26 @@ class TopicsPanel(NetworkTable[TreeRow]):
         topics = [*self.session.topics, *self.session.networks.topics]
         self._virtual_robots = self.session.launcher.virtual_robots
         keywords = self.filter_words()
-        fit = topic_filter(keywords)
-        rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if keywords else topics
-        self._show_rows(rows, filtered=bool(keywords))
+        matches = topic_filter(keywords)
+        rows = [topic for topic in topics if matches(topic.name, _haystack(topic))] if keywords else topics
+        self._show_rows(rows, is_filtered=bool(keywords))
         if self._requested_topic:
             self.show_topic(self._requested_topic)
         self._update_counts(len(topics), len(rows) if keywords else None)
         self.show_table(bool(rows), bool(keywords))
         self.show_networks()
-        recorded = self.session.replay is not None
+        is_replaying = self.session.replay is not None
         kinds = [network.kind for network in self.session.networks.selected_networks]
-        self.foot.setText(_(RECORDED_FOOTER_TEXT) if recorded else _footer_text(kinds))
+        self.foot.setText(_(RECORDED_FOOTER_TEXT) if is_replaying else _footer_text(kinds))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
 
-    def _show_rows(self, topics: list[Topic], *, filtered: bool) -> None:
+    def _show_rows(self, topics: list[Topic], *, is_filtered: bool) -> None:
         # Folders are never collapsed while a filter is active.
         was_tree = self._tree is not None
-        self.topics_table.shows_folders = self.as_tree.isChecked()
-        if self.as_tree.isChecked():
-            self._tree = TopicTree(topics, () if filtered else self._closed)
+        self.topics_table.shows_folders = self.tree_button.isChecked()
+        if self.tree_button.isChecked():
+            self._tree = TopicTree(topics, () if is_filtered else self._collapsed_keys)
             self.model.set_rows(self._tree.rows(self.table.order.sort))
         else:
             self._tree = None
@@ -175,7 +175,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         if nodes:
             node_text = ngettext("{count} node", "{count} nodes", nodes).format(count=group_digits(nodes))
             text = _("{topics}, {nodes}").format(topics=text, nodes=node_text)
-        self.count.setText(text if total else "")
+        self.count_label.setText(text if total else "")
         self.filter.setVisible(total > 0)
 
     def update_empty_state(self) -> None:
@@ -210,39 +210,41 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def _set_expanded(self, key: str, is_open: bool | None) -> None:
         # None toggles the folder. Left on a topic or a collapsed folder selects the parent folder.
         folder = self._folder(key)
-        if folder is None or (is_open is False and not folder.is_open):
+        if folder is None or (is_open is False and not folder.is_expanded):
             if is_open is False:
                 self._select_parent(key)
             return
         if is_open is None:
-            is_open = not folder.is_open
+            is_open = not folder.is_expanded
         if is_open:
-            self._closed.discard(key)
-        elif len(self._closed) < MAX_COLLAPSED_FOLDERS and not self.filter_words():
-            self._closed.add(key)
+            self._collapsed_keys.discard(key)
+        elif len(self._collapsed_keys) < MAX_COLLAPSED_FOLDERS and not self.filter_words():
+            self._collapsed_keys.add(key)
         self.rebuild()
         self.table.select_key(key)
 
     def _select_parent(self, key: str) -> None:
         network, name = split_key(key)
-        above = folders_above(name.removesuffix("/*"), network)
-        if self._tree is not None and above:
-            self.table.select_key(above[-1])
+        parent_keys = folders_above(name.removesuffix("/*"), network)
+        if self._tree is not None and parent_keys:
+            self.table.select_key(parent_keys[-1])
 
     def _set_all_expanded(self, *, is_open: bool) -> None:
-        self._closed.clear()
+        self._collapsed_keys.clear()
         if not is_open and self._tree is not None:
-            self._closed.update(folder.key for folder in list(self._tree)[:MAX_COLLAPSED_FOLDERS])
+            self._collapsed_keys.update(folder.key for folder in list(self._tree)[:MAX_COLLAPSED_FOLDERS])
         self.rebuild()
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         folder = self._folder(key)
         if folder is None:
             return topic_actions(self.context, key)
-        fold = _("Collapse the folder") if folder.is_open else _("Expand the folder")
+        toggle_label = _("Collapse the folder") if folder.is_expanded else _("Expand the folder")
         return (
             RowAction(
-                fold, "chevron-right" if folder.is_open else "chevron-down", lambda: self.open_row(key)
+                toggle_label,
+                "chevron-right" if folder.is_expanded else "chevron-down",
+                lambda: self.open_row(key),
             ),
             RowAction(_("Expand all folders"), "list-tree", lambda: self._set_all_expanded(is_open=True)),
             RowAction(_("Collapse all folders"), "list", lambda: self._set_all_expanded(is_open=False)),
@@ -250,10 +252,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
         )
 
     def show_topic(self, name: str) -> None:
-        if self._tree is not None and not self._closed.isdisjoint(
-            above := folders_above(*split_key(name)[::-1])
+        if self._tree is not None and not self._collapsed_keys.isdisjoint(
+            parent_keys := folders_above(*split_key(name)[::-1])
         ):
-            self._closed.difference_update(above)
+            self._collapsed_keys.difference_update(parent_keys)
             self._requested_topic = ""
             self.rebuild()
         self._requested_topic = (
@@ -262,22 +264,26 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self.table.select_key(name)
 
     def save_state(self) -> dict[str, object]:
-        return {**super().save_state(), "tree": self.as_tree.isChecked(), "closed": sorted(self._closed)}
+        return {
+            **super().save_state(),
+            "tree": self.tree_button.isChecked(),
+            "closed": sorted(self._collapsed_keys),
+        }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        closed = state.get("closed")
-        keys = closed if isinstance(closed, list) else []
-        self._closed = {key for key in keys[:MAX_COLLAPSED_FOLDERS] if isinstance(key, str)}
-        self.as_tree.setChecked(state.get("tree") is True)
+        saved_keys = state.get("closed")
+        collapsed_keys = saved_keys if isinstance(saved_keys, list) else []
+        self._collapsed_keys = {key for key in collapsed_keys[:MAX_COLLAPSED_FOLDERS] if isinstance(key, str)}
+        self.tree_button.setChecked(state.get("tree") is True)
         super().restore_state(state)
 
 
 def _footer_text(kinds: Sequence[NetworkKind]) -> str:
     # Note about the source of the statistics.
-    untold = [kind.product_name for kind in kinds if not kind.reports_stats]
-    if not untold:
+    silent_networks = [kind.product_name for kind in kinds if not kind.reports_stats]
+    if not silent_networks:
         return _(FOOTER_TEXT)
-    return _(NETWORKS_FOOTER_TEXT).format(networks=format_list(untold))
+    return _(NETWORKS_FOOTER_TEXT).format(networks=format_list(silent_networks))
 
 
 def _haystack(topic: Topic) -> str:

@@ -41,12 +41,12 @@ class FixedKey:
     Attributes:
         scope: Part of the window in which the keys work, wrapped in `lazy`.
         label: Function of the keys, wrapped in `lazy`.
-        key: Keys in Qt's portable format, separated by ", ".
+        keys: Keys in Qt's portable format, separated by ", ".
     """
 
     scope: str
     label: str
-    key: str
+    keys: str
 
 
 FIXED_KEYS: tuple[FixedKey, ...] = (
@@ -121,9 +121,9 @@ def normalize_key(key: str) -> str:
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
 
-def format_key(pressed: QKeyCombination) -> str:
+def format_key(combination: QKeyCombination) -> str:
     """Return a key combination in Qt's portable text format."""
-    return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
+    return QKeySequence(combination).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 class Shortcuts(QObject):
@@ -175,16 +175,16 @@ class Shortcuts(QObject):
         """
         keys = self._custom_shortcuts.get(name, self.default_shortcuts(name))
         if name == STOP_COMMAND:
-            assigned = {
+            reassigned_keys = {
                 key
                 for other, other_keys in self._custom_shortcuts.items()
                 if other != STOP_COMMAND
                 for key in other_keys
             }
-            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in assigned))
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in reassigned_keys))
         return tuple(key for key in keys if key != STOP_KEY)
 
-    def first(self, name: str) -> str:
+    def first_shortcut(self, name: str) -> str:
         """Return the first shortcut of a command, or "" if it has none."""
         return next(iter(self.shortcuts_of(name)), "")
 
@@ -196,25 +196,25 @@ class Shortcuts(QObject):
         """Return the name of the command to which a shortcut is assigned, or ""."""
         return next((name for name in self.commands if normalize_key(key) in self.shortcuts_of(name)), "")
 
-    def rejection_reason(self, name: str, pressed: QKeyCombination) -> str:
+    def rejection_reason(self, name: str, combination: QKeyCombination) -> str:
         """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
-        key = format_key(pressed)
+        key = format_key(combination)
         if key == STOP_KEY:
             return "" if name == STOP_COMMAND else _("F12 always triggers Stop and can't be changed.")
-        modifiers = pressed.keyboardModifiers() & MODIFIERS
-        if not modifiers and pressed.key() not in FUNCTION_KEYS:
+        modifiers = combination.keyboardModifiers() & MODIFIERS
+        if not modifiers and combination.key() not in FUNCTION_KEYS:
             return _(MODIFIER_REQUIRED_TEXT)
-        for fixed in FIXED_KEYS:
+        for fixed_key in FIXED_KEYS:
             is_own_default = key in self.default_shortcuts(
                 name
             )  # Ctrl+F is "find" both in the Inspector and in the blocks
             if (
-                key in [normalize_key(each) for each in fixed.key.split(", ")]
+                key in [normalize_key(each) for each in fixed_key.keys.split(", ")]
                 and modifiers
                 and not is_own_default
             ):
                 return _("{key} is reserved for “{command}” ({place}).").format(
-                    key=shortcut_text(key), command=_(fixed.label), place=_(fixed.scope)
+                    key=shortcut_text(key), command=_(fixed_key.label), place=_(fixed_key.scope)
                 )
         return ""
 
@@ -238,10 +238,10 @@ class Shortcuts(QObject):
 
         Both commands lose their other shortcuts. F12 stays assigned to Stop.
         """
-        owner, before = self.command_for(key), self.first(name)
+        owner, old_key = self.command_for(key), self.first_shortcut(name)
         self._custom_shortcuts[name] = (normalize_key(key),)
         if owner and owner != name:
-            self._custom_shortcuts[owner] = (before,) if before and before != STOP_KEY else ()
+            self._custom_shortcuts[owner] = (old_key,) if old_key and old_key != STOP_KEY else ()
         self._save()
 
     def reset(self, name: str) -> None:

@@ -23,7 +23,7 @@ from app.ui.widgets import Chip, IconButton, Segments, StopButton, paint
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _, lazy, ngettext
 
-FIELD_WIDTH, FIELD_HEIGHT, LEFT, ICON, GAP = 248, 28, 10, 14, 9
+FIELD_WIDTH, FIELD_HEIGHT, LEFT_PADDING, ICON_SIZE, GAP = 248, 28, 10, 14, 9
 EDGE_MARGIN = 12
 DIRECT_CHILDREN = Qt.FindChildOption.FindDirectChildrenOnly
 MIN_TEXT_WIDTH = 44  # minimum text width of the palette field in px; below it only icon and key are shown
@@ -51,8 +51,8 @@ class AppBar(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Menus and layouts"))
         self.menus = MenuBar(theme)
-        self.native = platform == "darwin"  # macOS shows the menus at the top of the screen
-        self.menus.setNativeMenuBar(self.native)
+        self.is_menu_bar_native = platform == "darwin"  # macOS shows the menus at the top of the screen
+        self.menus.setNativeMenuBar(self.is_menu_bar_native)
         self.menus.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
         self.switch = Segments(
             theme, [(layout.name, _(layout.title), layout.icon) for layout in layouts], name=_("Layout")
@@ -114,8 +114,8 @@ class AppBar(QWidget):
             if self._needed_width() <= self.width():
                 break
         switch_width = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE_MARGIN
-        half = (self.width() - 2 * EDGE_MARGIN - switch_width - EDGE_MARGIN) / 2
-        self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
+        half_width = (self.width() - 2 * EDGE_MARGIN - switch_width - EDGE_MARGIN) / 2
+        self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half_width))
 
     def _needed_width(self) -> int:
         parts = [
@@ -128,7 +128,7 @@ class AppBar(QWidget):
 
     def _min_width(self, part: QWidget) -> int:
         if part is self.menus:
-            return 0 if self.native else part.sizeHint().width()
+            return 0 if self.is_menu_bar_native else part.sizeHint().width()
         if part is self.switch:
             return part.sizeHint().width()
         return max(part.minimumSizeHint().width(), part.minimumWidth())
@@ -183,13 +183,13 @@ class PaletteField(PaintedButton):
         self._is_icon_only = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Hide the shortcut if `icon_only`, so that the button can be narrower; else show it.
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Hide the shortcut if `is_icon_only`, so that the button can be narrower; else show it.
 
         The text isn't hidden, but shortened as far as necessary.
         """
-        if icon_only != self._is_icon_only:
-            self._is_icon_only = icon_only
+        if is_icon_only != self._is_icon_only:
+            self._is_icon_only = is_icon_only
             self.updateGeometry()
             self.update()
 
@@ -200,21 +200,20 @@ class PaletteField(PaintedButton):
         self.update()
 
     def _icon_side(self) -> float:
-        return self._theme.scaled(ICON)
+        return self._theme.scaled(ICON_SIZE)
 
     def _key_cap_width(self) -> float:
         return paint.key_width(self._theme, self._key) + 7 if self._key and not self._is_icon_only else 0.0
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
-        width = (
-            LEFT + self._icon_side() + GAP + paint.width_of(font, self.text()) + 16 + self._key_cap_width()
-        )
+        text_width = paint.width_of(font, self.text())
+        width = LEFT_PADDING + self._icon_side() + GAP + text_width + 16 + self._key_cap_width()
         height = max(FIELD_HEIGHT, round(paint.height_of(font)) + 8)
         return QSize(max(FIELD_WIDTH, round(width)), height)
 
     def minimumSizeHint(self) -> QSize:
-        min_width = LEFT + self._icon_side() + GAP + (self._key_cap_width() or LEFT)
+        min_width = LEFT_PADDING + self._icon_side() + GAP + (self._key_cap_width() or LEFT_PADDING)
         return QSize(round(min_width), self.sizeHint().height())
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -222,10 +221,10 @@ class PaletteField(PaintedButton):
         fill = theme.colour("hover" if self.is_highlighted else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("borderStrong"))
         side = self._icon_side()
-        icon_area = QRectF(LEFT, middle - side / 2, side, side)
+        icon_area = QRectF(LEFT_PADDING, middle - side / 2, side, side)
         paint_icon(painter, icon_area, "search", theme.colour("textSecondary"))
         font = theme.font("body")
-        left = LEFT + side + GAP
+        left = LEFT_PADDING + side + GAP
         room = rect.width() - left - self._key_cap_width() - 4
         if room >= self._theme.scaled(MIN_TEXT_WIDTH):
             area = QRectF(left, 0, room, rect.height())
@@ -241,29 +240,31 @@ def robots_chip(session: Session) -> tuple[str, str]:
     """Return the text of the robot chip, such as "Pepper ready" or "2 robots", and its status."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
-        coming = session.starting_robots
-        return (connected_text((), coming), "running") if coming else (_("No robot"), "off")
-    moving = [link for link in links if link.state == "not stopped"]
-    if moving:
-        first, others = moving[0], len(moving) - 1
+        starting_robots = session.starting_robots
+        return (connected_text((), starting_robots), "running") if starting_robots else (_("No robot"), "off")
+    unstopped_links = [link for link in links if link.state == "not stopped"]
+    if unstopped_links:
+        first, others = unstopped_links[0], len(unstopped_links) - 1
         text = _("{robot}: {state}")
         if others:
             text = ngettext("{robot} and {count} more: {state}", "{robot} and {count} more: {state}", others)
         return text.format(robot=first.name, count=others, state=first.state_label), "error"
-    stopping = [link for link in links if link.state == "stopping"]
-    if stopping:
-        if len(stopping) == 1:
-            return _("{robot} stopping").format(robot=stopping[0].name), "running"
-        text = ngettext("{count} robot stopping", "{count} robots stopping", len(stopping))
-        return text.format(count=len(stopping)), "running"
-    silent = [link for link in links if link.state == "silent"]
-    if silent:
-        text = silent[0].silence_reason or _("not responding")
-        if len(silent) > 1:
-            text = ngettext("{count} robot not responding", "{count} robots not responding", len(silent))
-            return text.format(count=len(silent)), "error"
+    stopping_links = [link for link in links if link.state == "stopping"]
+    if stopping_links:
+        if len(stopping_links) == 1:
+            return _("{robot} stopping").format(robot=stopping_links[0].name), "running"
+        text = ngettext("{count} robot stopping", "{count} robots stopping", len(stopping_links))
+        return text.format(count=len(stopping_links)), "running"
+    silent_links = [link for link in links if link.state == "silent"]
+    if silent_links:
+        text = silent_links[0].silence_reason or _("not responding")
+        if len(silent_links) > 1:
+            text = ngettext(
+                "{count} robot not responding", "{count} robots not responding", len(silent_links)
+            )
+            return text.format(count=len(silent_links)), "error"
         if len(links) > 1:
-            return _("{robot}: {state}").format(robot=silent[0].name, state=text), "error"
+            return _("{robot}: {state}").format(robot=silent_links[0].name, state=text), "error"
         return text[:1].upper() + text[1:], "error"
     status = "off" if any(link.state == CONNECTING for link in links) else "ok"
     if len(links) > 1:

@@ -116,27 +116,27 @@ class BannerText(QWidget):
         """
         plain_font, bold = self._theme.font(kind), self._theme.font(kind)
         bold.setWeight(QFont.Weight.DemiBold)
-        rows = max(1, int(self.height() / paint.height_of(plain_font)))
+        max_lines = max(1, int(self.height() / paint.height_of(plain_font)))
         lines: list[list[tuple[str, QFont, str]]] = [[]]
         x = 0.0
         for text, font, role in (
             (self._title, bold, "text"),
             (self._detail, plain_font, "textSecondary"),
         ):
-            rest = text.split()
-            while rest:
-                fitting_count = _fitting_word_count(font, rest, self.width() - x)
-                if fitting_count < len(rest) and len(lines) == rows:
-                    lines[-1].append((" ".join(rest), font, role))
+            remaining_words = text.split()
+            while remaining_words:
+                fitting_count = _fitting_word_count(font, remaining_words, self.width() - x)
+                if fitting_count < len(remaining_words) and len(lines) == max_lines:
+                    lines[-1].append((" ".join(remaining_words), font, role))
                     return lines, False
                 if not fitting_count and not lines[-1]:
                     fitting_count = 1
                 if fitting_count:
-                    piece = " ".join(rest[:fitting_count])
+                    piece = " ".join(remaining_words[:fitting_count])
                     lines[-1].append((piece, font, role))
                     x += paint.width_of(font, piece + " ")
-                    del rest[:fitting_count]
-                if rest:
+                    del remaining_words[:fitting_count]
+                if remaining_words:
                     lines.append([])
                     x = 0.0
         return lines, True
@@ -162,23 +162,23 @@ class Banner(AlertBox):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
-        self._others = 0
-        self._step = ""
+        self._other_count = 0
+        self._step_text = ""
         self._icon: str | None = None
-        self._announced = ""
+        self._announced_text = ""
         self.text_label = BannerText(theme)
-        self.more = Button(theme, "", kind="ghost", size="small")
+        self.more_button = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
-        self.second = Button(theme, "", size="form")
-        for button in (self.button, self.second):
+        self.second_button = Button(theme, "", size="form")
+        for button in (self.button, self.second_button):
             button.allow_shrinking()
         self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
         self.text_column.addWidget(self.text_label)
-        for widget in (self.more, self.second, self.button, self.close_button):
+        for widget in (self.more_button, self.second_button, self.button, self.close_button):
             self.button_row.addWidget(widget)
         self.button.clicked.connect(self.pressed)
-        self.second.clicked.connect(self.second_pressed)
-        self.more.clicked.connect(self.more_pressed)
+        self.second_button.clicked.connect(self.second_pressed)
+        self.more_button.clicked.connect(self.more_pressed)
         self.close_button.clicked.connect(self.closed)
 
     def show_text(
@@ -187,7 +187,7 @@ class Banner(AlertBox):
         title: str,
         detail: str,
         button: str | None,
-        others: int = 0,
+        other_count: int = 0,
         *,
         second: str | None = None,
         icon: str | None = None,
@@ -199,7 +199,7 @@ class Banner(AlertBox):
             title: Problem, described in one sentence.
             detail: Explanation.
             button: Text of the button for the next step, or None.
-            others: Number of further alerts.
+            other_count: Number of further alerts.
             second: Text of the second button, or None.
             icon: Icon of the button in a narrow banner, or None for an arrow.
         """
@@ -209,12 +209,16 @@ class Banner(AlertBox):
         message = f"{title} {detail}".strip()
         self.setAccessibleName(message)
         text_without_digits = DIGITS.sub("", message)
-        if text_without_digits != self._announced:  # changes of numbers alone aren't announced again
-            self._announced = text_without_digits
+        if text_without_digits != self._announced_text:  # changes of numbers alone aren't announced again
+            self._announced_text = text_without_digits
             paint.announce(self, message)
-        self._step, self._others = button or "", others
-        self.second.set_label(second or "")
-        for widget, label in ((self.button, button), (self.second, second), (self.more, others)):
+        self._step_text, self._other_count = button or "", other_count
+        self.second_button.set_label(second or "")
+        for widget, label in (
+            (self.button, button),
+            (self.second_button, second),
+            (self.more_button, other_count),
+        ):
             paint.show_when(widget, bool(label))
         self._fit()
 
@@ -225,22 +229,23 @@ class Banner(AlertBox):
     def _fit(self) -> None:
         scaled = self._theme.scaled
         size: Size = "form" if self.height() >= scaled(MIN_TALL_HEIGHT) else "small"
-        for button in (self.button, self.second):
+        for button in (self.button, self.second_button):
             button.set_size(size)
-        count = ngettext("and {count} more", "and {count} more", self._others).format(count=self._others)
+        template = ngettext("and {count} more", "and {count} more", self._other_count)
+        count = template.format(count=self._other_count)
         widths = (
-            self.more.width_with(count),
-            self.button.width_with(self._step),
-            self.second.sizeHint().width(),
+            self.more_button.width_with(count),
+            self.button.width_with(self._step_text),
+            self.second_button.sizeHint().width(),
         )
-        button_widths = zip((self.more, self.button, self.second), widths, strict=True)
+        button_widths = zip((self.more_button, self.button, self.second_button), widths, strict=True)
         buttons_width = sum(width + self.gap for button, width in button_widths if not button.isHidden())
         room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - buttons_width
         is_narrow = room < scaled(MIN_TEXT_WIDTH)
-        self.more.set_label(f"+{self._others}" if is_narrow else count, name=count)
+        self.more_button.set_label(f"+{self._other_count}" if is_narrow else count, name=count)
         self.button.icon_name = NARROW_BUTTON_ICON if is_narrow and self._icon is None else self._icon
-        self.button.set_label("" if is_narrow else self._step, name=self._step)
-        self.button.setToolTip(plain.tip(self._step if is_narrow else ""))
+        self.button.set_label("" if is_narrow else self._step_text, name=self._step_text)
+        self.button.setToolTip(plain.tip(self._step_text if is_narrow else ""))
 
     def icon_top(self) -> float:
         return (self.height() - self.icon_side) / 2
@@ -269,7 +274,7 @@ class AlertBanner(QWidget):
         self._alerts: Sequence[AlertLike] = ()
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
         self._positioned_identity = ""
-        self._guarded_until = 0.0
+        self._guarded_until_s = 0.0
         self.on_action: Callable[[str], object] = lambda _name: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
         self.on_more: Callable[[], object] = lambda: None
@@ -349,9 +354,9 @@ class AlertBanner(QWidget):
                 return updated
         return alerts[0] if alerts else None
 
-    def _run_offer_action(self, which: int) -> None:
+    def _run_offer_action(self, index: int) -> None:
         if self._offer is not None:
-            action = self._offer[which]
+            action = self._offer[index]
             self._offer = None
             action()
             self.show_alerts(self._alerts)
@@ -367,9 +372,9 @@ class AlertBanner(QWidget):
             self._offer = None
             self.show_alerts(self._alerts)
         elif self._alert is not None:
-            closed = self._alert.id
-            self.show_alerts([alert for alert in self._alerts if alert.id != closed])
-            self.on_dismiss(closed)
+            alert_id = self._alert.id
+            self.show_alerts([alert for alert in self._alerts if alert.id != alert_id])
+            self.on_dismiss(alert_id)
 
     def _show_more(self) -> None:
         self.on_more()
@@ -388,8 +393,8 @@ class AlertBanner(QWidget):
             self._positioned_identity = self.identity
             self.setGeometry(area)
             self.raise_()
-            self._guarded_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
-        is_guarded = self.clock() < self._guarded_until
+            self._guarded_until_s = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
+        is_guarded = self.clock() < self._guarded_until_s
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, is_guarded)
 
     def _is_under_mouse(self) -> bool:

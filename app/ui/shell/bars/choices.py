@@ -46,8 +46,8 @@ class ChoiceButton(PaintedButton):
     def height_for(self, width: int) -> int:
         """Return the height in px that the button needs at a width in px."""
         room = QRectF(0, 0, max(1.0, width - self._text_left() - PADDING), 1e6)
-        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._display_text).height()
-        return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
+        text_height = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._display_text).height()
+        return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(text_height) + 2 * PADDING)
 
     def sizeHint(self) -> QSize:
         width = self.one_line_width()

@@ -21,19 +21,19 @@ from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, assign_c
 from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
-FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
+FREEZE_COMMAND, RECORD_COMMAND, KEEP_COMMAND = "view.freeze", "recording.toggle", "recording.keep"
 REFRESH_HALF_TICKS = 8  # refresh interval in half ticks
-RESTING_STATES = frozenset({"ready", "proven", "unanswered"})  # run states in which tools may reappear
+IDLE_STATES = frozenset({"ready", "proven", "unanswered"})  # run states in which tools may reappear
 RECORD_BUTTON_WIDTH_PX = (
     146  # fixed width of the record button, so that nothing moves when a recording starts
 )
 MIN_WIDTH_WITH_KEEP_PX = 1340  # width of the whole bar at 100 % text
-MIN_WIDTH_WITH_LAYOUTS_PX = 940  # width without Keep, which has a shortcut
+MIN_WIDTH_WITH_LAYOUTS_PX = 940  # width with the layout and panel menus, but without Keep
 MIN_WIDTH_WITH_RECORD_TEXT_PX = 680  # below this the record button shows only its dot
 MIN_WIDTH_WITH_FREEZE_PX = 548
 MIN_WIDTH_WITH_RECORD_PX = 520  # below this the result of a stop would be cut
 MIN_WIDTH_WITH_SOURCE_PX = 1120  # width with the source switch, which is also in the File menu
-MIN_WIDTH_DURING_REPLAY_PX = 1240  # the same with the button back to the live network
+MIN_WIDTH_DURING_REPLAY_PX = 1240  # width with the layout and panel menus while a recording is open
 
 
 class RecordButton(Button):
@@ -44,10 +44,10 @@ class RecordButton(Button):
         self.icon_role = "error"
         self._is_on = self._is_icon_only = False
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Show only the icon if `icon_only`, else the icon and the text."""
-        if icon_only != self._is_icon_only:
-            self._is_icon_only = icon_only
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Show only the icon if `is_icon_only`, else the icon and the text."""
+        if is_icon_only != self._is_icon_only:
+            self._is_icon_only = is_icon_only
             self.updateGeometry()
             self.update()
 
@@ -113,7 +113,7 @@ class SourceSwitch(MenuButton):
         if replay is None:
             self.set_label(_("Live network"), LIVE_ICON)
             return
-        is_loaded = replay.opened is not None
+        is_loaded = replay.opened_recording is not None
         length = duration_text(replay.end_ns - replay.start_ns, digits=0) if is_loaded else ""
         self.set_label(f"{replay.name}  {length}".strip(), RECORDING_ICON)
 
@@ -136,24 +136,24 @@ class DeveloperTools(QObject):
         super().__init__(bar)
         self._shell, self._bar, self._actions = shell, bar, commands.actions
         self._recordings, self._runs = session.recordings, session.runs
-        self._ticks = 0
-        self._crowded_out: list[QWidget] = []  # tools hidden for lack of room, the most important one last
+        self._half_ticks = 0
+        self._tools_hidden_for_space: list[QWidget] = []  # the most important one last
         theme, menus = shell.theme, commands.menus
         self.record = RecordButton(theme)
         self.keep = Button(theme, "", "history", size="small")
-        assign_command(self.record, RECORD)
+        assign_command(self.record, RECORD_COMMAND)
         self.record.clicked.connect(commands.recording.start_and_open_sheet)
-        self._actions.bind(self.keep, KEEP)
+        self._actions.bind(self.keep, KEEP_COMMAND)
         self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
         self.layout = MenuButton(theme, _("Developer"), "panel-left", size="small")
         self.panels = MenuButton(theme, _("Panels"), size="small")
         self.panels.setToolTip(plain.tip(_("Opens and closes panels")))
-        self._actions.bind(self.freeze, FREEZE)
-        self._actions[FREEZE].triggered.connect(self.refresh)
+        self._actions.bind(self.freeze, FREEZE_COMMAND)
+        self._actions[FREEZE_COMMAND].triggered.connect(self.refresh)
         self.layout.clicked.connect(lambda: menus.open_layout_menu(self.layout))
         self.panels.clicked.connect(lambda: menus.open_panel_menu(self.panels))
-        self._wide_only = (Separator(theme, upright=True, length=24), self.layout, self.panels)
-        tools = (self.record, self.keep, self.freeze, *self._wide_only)
+        self._wide_tools = (Separator(theme, upright=True, length=24), self.layout, self.panels)
+        tools = (self.record, self.keep, self.freeze, *self._wide_tools)
         for index, tool in enumerate(tools):
             bar.add_tool(tool, index)
         for button in (self.record, self.keep, self.freeze, self.layout, self.panels):
@@ -170,9 +170,9 @@ class DeveloperTools(QObject):
         self.source.refresh()
         if self.source.is_recording != was_recording:
             self._fit()
-        shell, frozen = self._shell, all_frozen(self._shell.bench)
-        self._actions[FREEZE].setChecked(frozen)
-        self.freeze.setChecked(frozen)
+        shell, is_frozen = self._shell, all_frozen(self._shell.bench)
+        self._actions[FREEZE_COMMAND].setChecked(is_frozen)
+        self.freeze.setChecked(is_frozen)
         self.freeze.setEnabled(bool(freeze_buttons(shell.bench)))
         self.record.show_recording(self._recordings)
         self.keep.set_label(_("Save last {count} s").format(count=self._recordings.ring_settings.seconds))
@@ -180,54 +180,55 @@ class DeveloperTools(QObject):
         name = custom_name or _("Developer")
         self.layout.set_label(name)
         self.layout.setAccessibleName(_("Layout {name}").format(name=name))
-        if self._runs.view().state in RESTING_STATES:
-            self._show_tools_with_room()
+        if self._runs.view().state in IDLE_STATES:
+            self._hide_tools_without_room()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
             self._fit()
         elif event.type() == QEvent.Type.LayoutRequest:
-            self._hide_crowded()
+            self._hide_tools_without_room()
         return False
 
     def _fit(self) -> None:
         # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
         # them are also in menus.
-        width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
-        self._crowded_out.clear()
-        paint.show_when(self.keep, width >= scaled(MIN_WIDTH_WITH_KEEP_PX) and not recording)
-        paint.show_when(self.source, recording or width >= scaled(MIN_WIDTH_WITH_SOURCE_PX))
-        paint.show_when(self.source.back, recording)
-        for tool in self._wide_only:
+        width, scaled, is_recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
+        self._tools_hidden_for_space.clear()
+        paint.show_when(self.keep, width >= scaled(MIN_WIDTH_WITH_KEEP_PX) and not is_recording)
+        paint.show_when(self.source, is_recording or width >= scaled(MIN_WIDTH_WITH_SOURCE_PX))
+        paint.show_when(self.source.back, is_recording)
+        for tool in self._wide_tools:
             paint.show_when(
-                tool, width >= scaled(MIN_WIDTH_DURING_REPLAY_PX if recording else MIN_WIDTH_WITH_LAYOUTS_PX)
+                tool,
+                width >= scaled(MIN_WIDTH_DURING_REPLAY_PX if is_recording else MIN_WIDTH_WITH_LAYOUTS_PX),
             )
         self.record.set_icon_only(width < scaled(MIN_WIDTH_WITH_RECORD_TEXT_PX))
         paint.show_when(self.freeze, width >= scaled(MIN_WIDTH_WITH_FREEZE_PX))
         paint.show_when(self.record, width >= scaled(MIN_WIDTH_WITH_RECORD_PX))
-        self._hide_crowded()
+        self._hide_tools_without_room()
 
     def _hide_crowded(self) -> None:
         # Hides further tools if the run state, or the texts of the language, need more room. They stay hidden
         # during the run, so that the other tools don't move with every change of the run state.
         source = () if self.source.is_recording else (self.source,)
-        for tool in (self.keep, *source, *self._wide_only, self.freeze, self.record):
+        for tool in (self.keep, *source, *self._wide_tools, self.freeze, self.record):
             if self._bar.needed_width() <= self._bar.width():
                 break
             if not tool.isHidden():
                 tool.hide()
-                self._crowded_out.append(tool)
+                self._tools_hidden_for_space.append(tool)
 
-    def _show_tools_with_room(self) -> None:
-        while self._crowded_out:
-            tool = self._crowded_out[-1]
+    def _hide_tools_without_room(self) -> None:
+        while self._tools_hidden_for_space:
+            tool = self._tools_hidden_for_space[-1]
             if self._bar.needed_width() + tool.sizeHint().width() + GAP > self._bar.width():
                 break
             tool.show()
-            del self._crowded_out[-1]
+            del self._tools_hidden_for_space[-1]
 
     def on_half_tick(self) -> None:
         """Refresh the tools at regular intervals while the bar is visible; called on every half tick."""
-        self._ticks += 1
-        if self._ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():
+        self._half_ticks += 1
+        if self._half_ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():
             self.refresh()

@@ -23,12 +23,13 @@ from nep.i18n import _
 
 SPEED_COMMANDS = ("run.full_speed", "run.slow", "run.very_slow")
 MIN_WIDTH_WITH_TEXTS_PX = 960  # width of the bar at 100 % text
-SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: room for the state and for a result
-MIN_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
-FIXED_ITEMS_PX = 150  # speed button, mark and the gaps between all items
+STATE_WIDTH_PX, RESULT_WIDTH_PX = 190, 230  # at 100 % text: room for the state and for a result
+MIN_RESULT_WIDTH_PX = 110  # minimum width of a successful result; it is elided to this
+FIXED_ITEMS_WIDTH_PX = 150  # speed button, mark and the gaps between all items
 MIN_TEXT_WIDTH_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
 MIN_STATE_TEXT_PX = 30  # px at 100 % text
-WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and share of the bar: state next to an alert
+MAX_STATE_WIDTH_PX = 300  # at 100 % text: width of the state next to an alert
+STATE_WIDTH_SHARE = 0.2  # width of the state next to an alert as a share of the bar
 MIN_BANNER_WIDTH_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
 BANNER_EDGE, GAP = 3, 8
 QWIDGETSIZE_MAX = 16777215  # Qt's constant for "no limit"
@@ -167,13 +168,13 @@ class RunStateLabel(QWidget):
         into two lines in a small font.
         """
         bold, body, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
-        title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
+        title, detail_role = [(self._title, bold, self.colour_role)], "textSecondary"
         if not self._detail:
             return title
-        both = paint.height_of(bold) + 2 * paint.height_of(small)
-        if paint.width_of(body, self._detail) <= width or both > self.height():
-            return [*title, (self._detail, body, quiet)]
-        return [*title, *((line, small, quiet) for line in paint.two_lines(small, self._detail, width))]
+        three_lines_height = paint.height_of(bold) + 2 * paint.height_of(small)
+        if paint.width_of(body, self._detail) <= width or three_lines_height > self.height():
+            return [*title, (self._detail, body, detail_role)]
+        return [*title, *((line, small, detail_role) for line in paint.two_lines(small, self._detail, width))]
 
 
 class StopResultLabel(QWidget):
@@ -182,9 +183,9 @@ class StopResultLabel(QWidget):
     While a behaviour runs, a less prominent style shows the result of the previous Stop.
     """
 
-    def __init__(self, theme: Theme, *, compact: bool = False) -> None:
+    def __init__(self, theme: Theme, *, is_compact: bool = False) -> None:
         super().__init__()
-        self._theme, self._compact = theme, compact
+        self._theme, self._is_compact = theme, is_compact
         self._appearance, self._text = "", ""
         self._status: StopStatus = "off"
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
@@ -210,12 +211,12 @@ class StopResultLabel(QWidget):
         """Show the result of the last Stop, or hide the widget if there is none."""
         appearance, text = "", ""
         if view.state == "unanswered":
-            appearance, text = "error", (view.compact_text if self._compact else view.result or "")
+            appearance, text = "error", (view.compact_text if self._is_compact else view.result or "")
         elif view.state == "stopping" and view.result:
             appearance, text = "counting", view.result
         elif view.result:
             appearance, text = view.result_status, view.result
-        elif view.last_stop and not self._compact:
+        elif view.last_stop and not self._is_compact:
             appearance, text = "reminder", view.last_stop
         status = view.last_stop_status if appearance == "reminder" else view.result_status
         if (appearance, text, status) != (self._appearance, self._text, self._status):
@@ -229,23 +230,23 @@ class StopResultLabel(QWidget):
             self.update()
 
     def _font(self) -> QFont:
-        if self._compact or self._appearance == "reminder":
-            font = self._theme.font("small" if self._compact else "body")
+        if self._is_compact or self._appearance == "reminder":
+            font = self._theme.font("small" if self._is_compact else "body")
             font.setWeight(font.Weight.Medium)
             return font
         return self._theme.font("button")
 
     def _icon_size(self) -> int:
-        return 14 if self._compact else 16 if self._appearance == "reminder" else 20
+        return 14 if self._is_compact else 16 if self._appearance == "reminder" else 20
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self._text)
         if self._appearance == "counting":
-            return QSize(round(width) + 10, 44 if not self._compact else 28)
-        width += self._icon_size() + (6 if self._compact or self._appearance == "reminder" else 10)
+            return QSize(round(width) + 10, 44 if not self._is_compact else 28)
+        width += self._icon_size() + (6 if self._is_compact or self._appearance == "reminder" else 10)
         if self._appearance != "reminder":
-            width += 17 if self._compact else 28
-        min_height = 28 if self._compact else 44
+            width += 17 if self._is_compact else 28
+        min_height = 28 if self._is_compact else 44
         return QSize(round(width) + 2, max(min_height, round(paint.height_of(self._font())) + 10))
 
     def minimumSizeHint(self) -> QSize:
@@ -262,9 +263,9 @@ class StopResultLabel(QWidget):
             self._paint_reminder(painter, rect)
         else:
             status = theme.status(self._status)
-            radius = theme.radius("small" if self._compact else "large")
+            radius = theme.radius("small" if self._is_compact else "large")
             paint.box(painter, rect, radius, theme.colour(status.tint or "panel"))
-            self._paint_line(painter, rect.adjusted(8 if self._compact else 13, 0, 0, 0))
+            self._paint_line(painter, rect.adjusted(8 if self._is_compact else 13, 0, 0, 0))
         painter.end()
 
     def _paint_reminder(self, painter: QPainter, rect: QRectF) -> None:
@@ -282,7 +283,7 @@ class StopResultLabel(QWidget):
         side = self._icon_size()
         icon_area = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
         paint_icon(painter, icon_area, status.icon, theme.colour(status.colour))
-        text_left = side + (6 if self._compact or self._appearance == "reminder" else 10)
+        text_left = side + (6 if self._is_compact or self._appearance == "reminder" else 10)
         paint.text_line(
             painter, rect.adjusted(text_left, 0, 0, 0), self._text, self._font(), theme.colour(status.colour)
         )
@@ -323,11 +324,11 @@ class RunBar(Bar):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
         self.setAccessibleName(_("Run and stop"))
-        self.run = RunButton(theme, _("Run"), "play", widest=max(_("Resume"), _("Restart"), key=len))
+        self.run = RunButton(theme, _("Run"), "play", longest_text=max(_("Resume"), _("Restart"), key=len))
         self.pause = RunButton(theme, _("Pause"), "pause")
         self.step = RunButton(theme, _("Step"), "step-forward")
         self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)
-        self._paces = Menu(theme, self, _("Speed"))
+        self._speed_menu = Menu(theme, self, _("Speed"))
         self.mark = RunStateIcon(theme)
         self.sentence = RunStateLabel(theme)
         self.result = StopResultLabel(theme)
@@ -338,9 +339,9 @@ class RunBar(Bar):
         self.restart.hide()
         self.restart.allow_shrinking(96)
         self.stop = StopButton(theme)
-        self._fitted: RunView | None = None
+        self._fitted_view: RunView | None = None
         self._build(theme)
-        self.pace.clicked.connect(lambda: open_below(self._paces, self.pace))
+        self.pace.clicked.connect(lambda: open_below(self._speed_menu, self.pace))
         theme.changed.connect(self._fit)
 
     def _build(self, theme: Theme) -> None:
@@ -365,7 +366,7 @@ class RunBar(Bar):
     def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions and fill the menu of speeds."""
         bind_run_buttons(self, actions)
-        self._paces.addActions([actions[name] for name in SPEED_COMMANDS])
+        self._speed_menu.addActions([actions[name] for name in SPEED_COMMANDS])
 
     def banner_area(self) -> QRect:
         """Return the area for an alert, to the right of the run state.
@@ -390,7 +391,7 @@ class RunBar(Bar):
         if self.mark.state == "unanswered":
             return self.sentence.full_width()
         scaled = self._theme.scaled
-        return max(scaled(SENTENCE_PX), min(scaled(WIDE_SENTENCE_PX), SENTENCE_SHARE * self.width()))
+        return max(scaled(STATE_WIDTH_PX), min(scaled(MAX_STATE_WIDTH_PX), STATE_WIDTH_SHARE * self.width()))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -401,35 +402,36 @@ class RunBar(Bar):
         # which may be an error.
         scaled, buttons = self._theme.scaled, (self.run, self.pause, self.step)
         buttons_width = sum(each.full_width() for each in buttons)
-        needed = (
+        needed_width = (
             buttons_width
             + self.stop.sizeHint().width()
-            + FIXED_ITEMS_PX
-            + scaled(SENTENCE_PX)
-            + scaled(RESULT_PX)
+            + FIXED_ITEMS_WIDTH_PX
+            + scaled(STATE_WIDTH_PX)
+            + scaled(RESULT_WIDTH_PX)
         )
-        icon_only = self.width() < max(scaled(MIN_WIDTH_WITH_TEXTS_PX), needed)
+        is_icon_only = self.width() < max(scaled(MIN_WIDTH_WITH_TEXTS_PX), needed_width)
         self.run.set_icon_only(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
-        self.pause.set_icon_only(icon_only)
-        self.step.set_icon_only(icon_only)
+        self.pause.set_icon_only(is_icon_only)
+        self.step.set_icon_only(is_icon_only)
         visible_widgets = (
             *buttons,
             self.stop,
             *(each for each in (self.restart, self.confirm) if each.isVisibleTo(self)),
         )
-        rest = self.width() - FIXED_ITEMS_PX - sum(each.sizeHint().width() for each in visible_widgets)
-        result_width = max(scaled(MIN_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
+        used_width = FIXED_ITEMS_WIDTH_PX + sum(each.sizeHint().width() for each in visible_widgets)
+        state_width = min(self.sentence.full_width(), scaled(STATE_WIDTH_PX))
+        result_width = max(scaled(MIN_RESULT_WIDTH_PX), self.width() - used_width - state_width)
         self.result.setMaximumWidth(
             round(result_width) if self.result.appearance in {"ok", "off"} else QWIDGETSIZE_MAX
         )
 
     def show_view(self, view: RunView) -> None:
         """Show a run state. While running, Run is replaced by Restart; while paused, by Resume."""
-        restarts = view.can_restart and not view.can_run
+        can_only_restart = view.can_restart and not view.can_run
         self.run.set_label(_(view.run_label), "rotate-ccw" if view.run_label == RESTART else "play")
-        self.run.set_filled(view.can_run or (restarts and view.is_edited))
-        self.run.setEnabled(view.can_run or restarts)
-        paint.show_when(self.restart, view.is_edited and not restarts)
+        self.run.set_filled(view.can_run or (can_only_restart and view.is_edited))
+        self.run.setEnabled(view.can_run or can_only_restart)
+        paint.show_when(self.restart, view.is_edited and not can_only_restart)
         self.pause.setEnabled(view.can_pause)
         self.step.setEnabled(view.can_step)
         self.pace.setChecked(view.is_slow)
@@ -438,9 +440,9 @@ class RunBar(Bar):
         self.result.show_view(view)
         self.confirm.set_label(view.confirm_label or "")
         paint.show_when(self.confirm, view.confirm_label is not None)
-        self.stop.show_state(_(view.stop_label), ring=view.state == "stopping")
-        if view != self._fitted:  # because this method is called on every tick
-            self._fitted = view
+        self.stop.show_state(_(view.stop_label), has_ring=view.state == "stopping")
+        if view != self._fitted_view:  # because this method is called on every tick
+            self._fitted_view = view
             self._fit()
 
 
@@ -452,12 +454,12 @@ class ToolBar(Bar):
         self.setAccessibleName(_("Tools, run and stop"))
         self.mark = RunStateIcon(theme)
         self.text_label = label("", "body", role="textSecondary")
-        self.result = StopResultLabel(theme, compact=True)
+        self.result = StopResultLabel(theme, is_compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
         self.confirm.allow_shrinking(96)
         self.run = Button(theme, _("Run"), "play", kind="run", size="small")
-        self.run.fill_icon = True
+        self.run.has_filled_icon = True
         self.pause = IconButton(theme, "pause", _("Pause"))
         self.step = IconButton(theme, "step-forward", _("Step"))
         self.restart = IconButton(theme, "rotate-ccw", _("Restart"))
@@ -546,7 +548,7 @@ class ToolBar(Bar):
         self.step.setVisible(view.can_step and view.state in {"running", "paused"})
         self.confirm.set_label(view.confirm_label or "")
         paint.show_when(self.confirm, view.confirm_label is not None)
-        self.stop.show_state(_(view.stop_label), ring=view.state == "stopping")
+        self.stop.show_state(_(view.stop_label), has_ring=view.state == "stopping")
 
 
 def bind_run_buttons(bar: RunBar | ToolBar, actions: Actions) -> None:

@@ -39,13 +39,13 @@ class StatusFormatter:
     show; only `replayed_recording` returns several.
 
     Attributes:
-        window_ms: Duration in ms of the last refresh of the window.
+        refresh_ms: Moving average of the duration of a refresh of the window in ms.
     """
 
     def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
         self._session = session
         self._clock = clock
-        self.window_ms = 0.0
+        self.refresh_ms = 0.0
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> StatusEntry:
@@ -74,8 +74,9 @@ class StatusFormatter:
             link for link in all_links if link.state != "away"
         ] or all_links  # Health also shows robots that have left
         if not links:
-            coming = self._session.starting_robots
-            return "circle-dashed", connected_text((), coming) if coming else _("No robot"), "off"
+            starting_robots = self._session.starting_robots
+            text = connected_text((), starting_robots) if starting_robots else _("No robot")
+            return "circle-dashed", text, "off"
         topics, now = self._session.live.topics, time.monotonic()
         link_items = [(link, health_items(link, topics, now, age_text)) for link in links]
         problem_statuses = [
@@ -86,7 +87,9 @@ class StatusFormatter:
             text = _("{robot}: needs attention ({count})")
             if len(links) > 1:
                 text = ngettext(
-                    "{robots} robot: {count} warning", "{robots} robots: {count} warnings", len(links)
+                    "{robots} robots: {count} warning",
+                    "{robots} robots: {count} warnings",
+                    len(problem_statuses),
                 )
             return (
                 icon,
@@ -115,15 +118,16 @@ class StatusFormatter:
         if document.dirty:
             text = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
             return "save", text, None
-        if document.saved_at is None:
+        if document.saved_s is None:
             return EMPTY_ENTRY
-        saved_time = self._clock(document.saved_at)
+        saved_time = self._clock(document.saved_s)
         return "save", _("Saved {clock}").format(clock=f"{saved_time.tm_hour}:{saved_time.tm_min:02d}"), None
 
     def topics(self) -> StatusEntry:
         """Return the number of active topics."""
-        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
-        return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
+        topic_count = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
+        text = ngettext("{count} active topic", "{count} active topics", topic_count)
+        return "", text.format(count=topic_count), None
 
     def remote_access(self) -> StatusEntry:
         """Return a `StatusEntry` about the computers that can connect to this master."""
@@ -159,23 +163,23 @@ class StatusFormatter:
         graph = self._session.live.graph
         if graph is None:
             return EMPTY_ENTRY
-        live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
-        nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
+        topic_count = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
+        node_count, messages_per_s = len(graph.nodes), self._session.traffic.messages_per_s
         parts = [
-            ngettext("{count} node", "{count} nodes", nodes).format(count=nodes),
-            ngettext("{count} topic", "{count} topics", live).format(count=live),
+            ngettext("{count} node", "{count} nodes", node_count).format(count=node_count),
+            ngettext("{count} topic", "{count} topics", topic_count).format(count=topic_count),
         ]
-        if rate is not None:
-            parts.append(_("{count} messages/s").format(count=group_digits(round(rate))))
+        if messages_per_s is not None:
+            parts.append(_("{count} messages/s").format(count=group_digits(round(messages_per_s))))
         return "", ", ".join(parts), None
 
     def lost(self) -> StatusEntry:
         """Return the number of messages lost during the last 30 s; empty for 0."""
-        lost = self._session.traffic.lost_30s
-        if not lost:
+        lost_count = self._session.traffic.lost_30s
+        if not lost_count:
             return EMPTY_ENTRY
-        text = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
-        return "triangle-alert", text.format(count=group_digits(lost)), "warn"
+        text = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost_count)
+        return "triangle-alert", text.format(count=group_digits(lost_count)), "warn"
 
     def recording(self) -> StatusEntry:
         """Return duration, size and losses of the current recording; empty if there is none."""
@@ -185,12 +189,12 @@ class StatusFormatter:
             return EMPTY_ENTRY
         if state.phase == "starting":
             return "circle-dot", _("Starting to record"), "recording"
-        lost = state.lost + state.unwritten_count
-        losses = ngettext("{count} lost", "{count} lost", lost).format(count=group_digits(lost))
+        lost_count = state.lost + state.unwritten_count
+        losses = ngettext("{count} lost", "{count} lost", lost_count).format(count=group_digits(lost_count))
         text = _("Recording {time}, {size}, {losses}").format(
             time=length_text(recordings.elapsed_s),
             size=size_text(state.size_bytes),
-            losses=losses if lost else _("none lost"),
+            losses=losses if lost_count else _("none lost"),
         )
         return (
             ("triangle-alert", text, "warn") if state.unwritten_count else ("circle-dot", text, "recording")
@@ -204,13 +208,14 @@ class StatusFormatter:
         remaining = length_text(math.ceil(acting.arming.remaining_s))
         repeated = acting.outbox.repeated_messages
         replay = self._session.replay
-        played = (
+        played_topics = (
             replay.sending.outbox.active_topics if replay is not None and replay.sending is not None else ()
         )
-        if played:
+        if played_topics:
             template = ngettext("Sending {count} topic of the recording, armed {time}",
-                            "Sending {count} topics of the recording, armed {time}", len(played))  # fmt: skip
-            text = template.format(count=len(played), time=remaining)
+                                "Sending {count} topics of the recording, armed {time}",
+                                len(played_topics))  # fmt: skip
+            text = template.format(count=len(played_topics), time=remaining)
         elif len(repeated) == 1:
             text = _("Sending “{name}”, armed {time}").format(name=repeated[0].order.name, time=remaining)
         elif repeated:
@@ -232,16 +237,18 @@ class StatusFormatter:
     def replayed_recording(self) -> tuple[StatusEntry, ...]:
         """Return entries about the opened recording: name, time range, contents and losses."""
         replay = self._session.replay
-        if replay is None or replay.opened is None:
+        if replay is None or replay.opened_recording is None:
             return ()
-        recorded = replay.opened.recording
-        name = _("{name}, {size}").format(name=replay.name, size=size_text(recorded.size_bytes))
+        recording = replay.opened_recording.recording
+        name = _("{name}, {size}").format(name=replay.name, size=size_text(recording.size_bytes))
         begin, end = (clock_text(each, digits=0) for each in (replay.start_ns, replay.end_ns))
         when = _("{date}, {begin} to {end}").format(date=date_text(replay.start_ns), begin=begin, end=end)
-        count, messages = len(recorded.topics), recorded.message_count
-        topics = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
-        message_count = ngettext("{count} message", "{count} messages", messages).format(
-            count=group_digits(messages)
+        topic_count, message_count = len(recording.topics), recording.message_count
+        topics_text = ngettext("{count} topic", "{count} topics", topic_count).format(
+            count=group_digits(topic_count)
+        )
+        messages_text = ngettext("{count} message", "{count} messages", message_count).format(
+            count=group_digits(message_count)
         )
         lost: StatusEntry = EMPTY_ENTRY
         if replay.lost:
@@ -250,7 +257,7 @@ class StatusFormatter:
         return (
             ("history", name, None),
             ("", when, None),
-            ("", _("{topics}, {messages}").format(topics=topics, messages=message_count), None),
+            ("", _("{topics}, {messages}").format(topics=topics_text, messages=messages_text), None),
             lost,
         )
 
@@ -273,10 +280,10 @@ class StatusFormatter:
             None,
         )
 
-    def window(self) -> StatusEntry:
-        """Return the duration of the last refresh of the window."""
-        spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
-        return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
+    def refresh_duration(self) -> StatusEntry:
+        """Return the average duration of a refresh of the window."""
+        duration_text = f"{round(self.refresh_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
+        return "", _("Refresh {spent} ms of {most} ms").format(spent=duration_text, most=TICK_MS), None
 
 
 class StatusBar(QWidget):
@@ -303,7 +310,7 @@ class StatusBar(QWidget):
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
 
-    def _add_items(self, items: list[tuple[StatusItem, Separator]], count: int, *, right: bool) -> None:
+    def _add_items(self, items: list[tuple[StatusItem, Separator]], count: int, *, is_right: bool) -> None:
         while len(items) < count:
             item, line = StatusItem(self._theme), Separator(self._theme, upright=True)
             item.pressed.connect(self.pressed)
@@ -311,9 +318,9 @@ class StatusBar(QWidget):
             row = QHBoxLayout(container)
             row.setContentsMargins(0, 0, 0, 0)
             row.setSpacing(10)
-            for widget in (line, item) if right else (item, line):
+            for widget in (line, item) if is_right else (item, line):
                 row.addWidget(widget)
-            index = self._row.count() if right else len(items)
+            index = self._row.count() if is_right else len(items)
             self._row.insertWidget(index, container)
             items.append((item, line))
 
@@ -324,9 +331,9 @@ class StatusBar(QWidget):
             left: Entries on the left, from left to right.
             right: Entries on the right, from left to right.
         """
-        for entries, items, at_right in ((left, self._left, False), (right, self._right, True)):
+        for entries, items, is_right in ((left, self._left, False), (right, self._right, True)):
             visible_entries = [entry for entry in entries if entry[1]]
-            self._add_items(items, len(visible_entries), right=at_right)
+            self._add_items(items, len(visible_entries), is_right=is_right)
             for index, (item, line) in enumerate(items):
                 entry = visible_entries[index] if index < len(visible_entries) else EMPTY_ENTRY
                 item.set(*entry)
@@ -334,8 +341,8 @@ class StatusBar(QWidget):
                 container = item.parentWidget()
                 if container is not None:
                     container.setVisible(bool(entry[1]))
-                    container.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
-                paint.show_when(line, bool(entry[1]) and (at_right or index < len(visible_entries) - 1))
+                    container.setContentsMargins(10 if (is_right or index) else 0, 0, 0, 0)
+                paint.show_when(line, bool(entry[1]) and (is_right or index < len(visible_entries) - 1))
 
     def items(self) -> list[StatusItem]:
         """Return the visible items, from left to right."""

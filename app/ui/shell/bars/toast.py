@@ -26,7 +26,7 @@ class Toast(FloatingCard):
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
         self._theme = theme
-        self._run: Callable[[], object] | None = None
+        self._button_callback: Callable[[], object] | None = None
         self._until: Callable[[], bool] | None = None
         self._label = label("", "bodyLarge", wrap=True)
         self.button = Button(theme, "", kind="ghost", size="small")
@@ -70,7 +70,7 @@ class Toast(FloatingCard):
         self._label.setText(text)
         self.setAccessibleName(text)
         paint.announce(self, text)
-        self._run = run
+        self._button_callback = run
         self.button.set_label(button)
         paint.show_when(self.button, bool(button and run))
         self.show()
@@ -99,9 +99,9 @@ class Toast(FloatingCard):
             self.move(max(MARGIN, left), window.height() - self.height() - BOTTOM_MARGIN)
 
     def _fit(self, room: int) -> None:
-        aside = self.sizeHint().width() - self._label.sizeHint().width()
-        line = paint.width_of(self._label.font(), self._label.text()) + 2
-        width = min(room, round(line) + aside)
+        other_width = self.sizeHint().width() - self._label.sizeHint().width()
+        text_width = paint.width_of(self._label.font(), self._label.text()) + 2
+        width = min(room, round(text_width) + other_width)
         layout = self.layout()
         height = layout.totalHeightForWidth(width) if layout is not None else 0
         self.resize(width, max(height, layout.minimumSize().height() if layout is not None else 0))
@@ -121,10 +121,10 @@ class Toast(FloatingCard):
             self.hide()
 
     def _on_button_pressed(self) -> None:
-        run, self._run = self._run, None
+        callback, self._button_callback = self._button_callback, None
         self.hide()
-        if run is not None:
-            run()
+        if callback is not None:
+            callback()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self._theme

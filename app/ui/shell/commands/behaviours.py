@@ -165,7 +165,7 @@ class BehaviourCommands:
         self, shell: Shell, session: Session, files: DocumentController, dialogs: FileDialogs
     ) -> None:
         self._shell, self._session, self._files = shell, session, files
-        self._versions: version_history.VersionHistorySheet | None = None
+        self._version_sheet: version_history.VersionHistorySheet | None = None
         self.pictures = ImageCommands(shell, session, dialogs)
         self.printing = PrintCommands(shell, session, dialogs)
 
@@ -180,21 +180,22 @@ class BehaviourCommands:
         else:
             self._files.run_after_flush(partial(self._replace_run, runs.run))
 
-    def _replace_run(self, begin: Callable[[], object]) -> None:
+    def _replace_run(self, start: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
         session = self._session
-        runs, displayed, running = session.runs, session.document, session.runs.document
+        runs, current_document, running_document = session.runs, session.document, session.runs.document
         was_active = runs.active
-        begin()
+        start()
         if (
             was_active
-            and running is not None
-            and running is not displayed
-            and not runs.is_running_or_pending(running)
+            and running_document is not None
+            and running_document is not current_document
+            and not runs.is_running_or_pending(running_document)
         ):
             self._shell.show_toast(
                 _("Stopped “{stopped}” to run “{name}”").format(
-                    stopped=session.documents.title(running), name=session.documents.title(displayed)
+                    stopped=session.documents.title(running_document),
+                    name=session.documents.title(current_document),
                 )
             )
 
@@ -225,8 +226,8 @@ class BehaviourCommands:
 
     def try_stack(self, stack: Stack) -> None:
         """Run a single script, after the newest edit of the block editor was applied."""
-        try_it = partial(self._session.runs.try_stack, stack)
-        self._files.run_after_flush(partial(self._replace_run, try_it))
+        run_stack = partial(self._session.runs.try_stack, stack)
+        self._files.run_after_flush(partial(self._replace_run, run_stack))
 
     def restart(self) -> None:
         """Restart the running behaviour, after the newest edit of the block editor was applied."""
@@ -287,9 +288,11 @@ class BehaviourCommands:
         if isinstance(editor, SupportsRename):
             editor.rename_tab(self._session.document.key)
 
-    def rename_tab(self, to: TabName) -> bool:
+    def rename_tab(self, tab_name: TabName) -> bool:
         """Rename a behaviour; return False if there is no such tab."""
-        return self._apply_to_document(to.key, lambda document: self._files.rename(document, to.name))
+        return self._apply_to_document(
+            tab_name.key, lambda document: self._files.rename(document, tab_name.name)
+        )
 
     def duplicate_tab(self, key: str) -> bool:
         """Open a copy of a behaviour in a new tab; return False if there is no such behaviour."""
@@ -319,9 +322,11 @@ class BehaviourCommands:
 
         return self._apply_to_document(key, show)
 
-    def move_tab(self, to: TabPosition) -> bool:
+    def move_tab(self, tab_position: TabPosition) -> bool:
         """Move a tab to another position; return False if there is no such tab."""
-        return self._apply_to_document(to.key, lambda document: self._files.move(document, to.position))
+        return self._apply_to_document(
+            tab_position.key, lambda document: self._files.move(document, tab_position.position)
+        )
 
     def _apply_to_document(self, key: str, act: Callable[[Document], object]) -> bool:
         document = self._session.documents.find_by_key(key)
@@ -364,12 +369,12 @@ class BehaviourCommands:
         Args:
             block: Type of the block; "-" removes the highlight.
         """
-        shows = block != "-"
-        if shows:
+        has_block = block != "-"
+        if has_block:
             show_blocks_panel(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsPointAt):
-            editor.point_at(block if shows else "")
+            editor.point_at(block if has_block else "")
         return isinstance(editor, SupportsPointAt)
 
     def find_blocks(self, *, to_add: bool) -> None:
@@ -388,31 +393,31 @@ class BehaviourCommands:
         self._files.run_after_flush(self._show_versions)
 
     def _show_versions(self) -> None:
-        if self._versions is None:
-            self._versions = version_history.VersionHistorySheet(
+        if self._version_sheet is None:
+            self._version_sheet = version_history.VersionHistorySheet(
                 self._shell.theme, self._shell.surface, self._files.copy, self._files.save
             )
         document = self._session.document
         title = self._session.documents.title(document)
-        self._versions.show_for(document.name, document.path, document.workspace, title=title)
+        self._version_sheet.show_for(document.name, document.path, document.workspace, title=title)
 
     def clear_recent(self) -> None:
         """Clear the list of recent files and show a toast with an Undo button."""
-        before: list[RecentFile] = self._session.settings.all_recent_files
+        old_files: list[RecentFile] = self._session.settings.all_recent_files
         message = _("Recent files cleared")
         if not self._set_recent([]):
-            message = _("Can't save this change: the recent files will reappear when Studio restarts")
-        self._shell.show_toast(message, _("Undo"), lambda: self._set_recent(before))
+            message = _("This change couldn't be saved. The recent files will reappear when Studio restarts.")
+        self._shell.show_toast(message, _("Undo"), lambda: self._set_recent(old_files))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:
-        saved = True
+        is_saved = True
         try:
             self._session.settings.set_recent(files)
         except SettingsError as error:
             self._shell.log_problem(str(error))
-            saved = False
+            is_saved = False
         self._shell.show_recent()
-        return saved
+        return is_saved
 
     def restore_tabs(self, unsaved_work: Sequence[UnsavedWork], offer: ShowOffer) -> None:
         """Restore the tabs of the last session, and offer to recover unsaved changes.
@@ -421,18 +426,18 @@ class BehaviourCommands:
             unsaved_work: Changes that were not saved, for example because of a crash.
             offer: Shows the offer; called only if changes remain that the tabs don't contain.
         """
-        rest = self._session.tabs.restore(unsaved_work)
-        if not rest:
+        remaining_work = self._session.tabs.restore(unsaved_work)
+        if not remaining_work:
             return
 
         def discard() -> None:
-            for unsaved in rest:
+            for unsaved in remaining_work:
                 unsaved.journal.unlink(missing_ok=True)
 
         offer(
             _("Restore unsaved work?"),
-            unsaved_text(rest),
-            (_("Restore"), lambda: self._files.recover(rest)),
+            unsaved_text(remaining_work),
+            (_("Restore"), lambda: self._files.recover(remaining_work)),
             (_("Discard"), discard),
         )
 

@@ -32,7 +32,7 @@ class Commands:
     """Handlers, actions, menus and shortcuts of a window."""
 
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
-        keys = Shortcuts(session.settings, shell.log_problem, COMMANDS)
+        shortcuts = Shortcuts(session.settings, shell.log_problem, COMMANDS)
         self.session = session
         self.files = DocumentController(
             session, dialogs, shell.show_toast, partial(show_blocks_panel, shell), shell.editor
@@ -40,8 +40,8 @@ class Commands:
         self.behaviours = BehaviourCommands(shell, session, self.files, dialogs)
         session.alarms.run_behaviour = self.behaviours.run_named
         self.robots = RobotCommands(shell, session, self.files, self.behaviours.undo)
-        self.view = ViewCommands(shell, session, self.files, keys)
-        self.shortcuts = keys
+        self.view = ViewCommands(shell, session, self.files, shortcuts)
+        self.shortcuts = shortcuts
         self.recording = RecordCommands(shell, session, dialogs)
         self.variables = VariableCommands(shell, session, self.files)
         self.replay = ReplayCommands(shell, session, dialogs)
@@ -62,14 +62,14 @@ class Commands:
             ActingCommands(shell),
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._handlers)
-        self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.disabled_reason, keys)
+        self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.disabled_reason, shortcuts)
         menus = self.actions.fill_menu_bar(shell.menu_bar, MENUS)
         self.menus = DynamicMenus(shell, session, self.actions, menus, self.view, self.files.open)
         self.view.set_actions(self.actions, self.entries)
         self.actions.select("run.full_speed")
         self.actions["run.from_start"].setChecked(session.fleet.resets_at_start)
         self.stop_keys = StopKeys(
-            shell.surface, lambda: keys.shortcuts_of(STOP_COMMAND), self.actions[STOP_COMMAND].trigger
+            shell.surface, lambda: shortcuts.shortcuts_of(STOP_COMMAND), self.actions[STOP_COMMAND].trigger
         )
 
     def run(self, name: str) -> bool:

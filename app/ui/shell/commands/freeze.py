@@ -35,6 +35,6 @@ def all_frozen(bench: Workbench | None) -> bool:
 
 def toggle_freeze(bench: Workbench | None) -> None:
     """Freeze all panels, or unfreeze them if all are frozen."""
-    on = not all_frozen(bench)
+    should_freeze = not all_frozen(bench)
     for button in freeze_buttons(bench):
-        button.setChecked(on)
+        button.setChecked(should_freeze)

@@ -37,11 +37,11 @@ class DynamicMenus:
         self._shell, self._session, self.actions = shell, session, actions
         self._view, self._open_file = view, open_file
         theme, surface = shell.theme, shell.surface
-        self._recent = Menu(theme, surface, _("Recent"))
-        menus["File"].insertMenu(actions["file.save"], self._recent)
-        self._panels = Menu(theme, surface, _("Panels"))
-        self._layouts = menus["View/Layouts"]
-        menus["View"].insertMenu(self._layouts.menuAction(), self._panels)
+        self._recent_menu = Menu(theme, surface, _("Recent"))
+        menus["File"].insertMenu(actions["file.save"], self._recent_menu)
+        self._panel_menu = Menu(theme, surface, _("Panels"))
+        self._layout_submenu = menus["View/Layouts"]
+        menus["View"].insertMenu(self._layout_submenu.menuAction(), self._panel_menu)
         for name, menu in menus.items():
             if "/" in name:
                 continue
@@ -60,7 +60,7 @@ class DynamicMenus:
     def open_panel_menu(self, anchor: QWidget) -> None:
         """Open a menu with the panels below a button; open panels are checked."""
         self._list_panels()
-        open_below(self._panels, anchor)
+        open_below(self._panel_menu, anchor)
 
     def _refresh(self, menu: str) -> None:
         self.actions.disable_unavailable()
@@ -68,22 +68,22 @@ class DynamicMenus:
             self._list_recent()
         elif menu == "View":
             self._list_panels()
-            self._list_layouts(self._layouts)
+            self._list_layouts(self._layout_submenu)
 
     def _list_recent(self) -> None:
-        self._recent.clear()
-        recent = recent_titles(self._session.settings.all_recent_files)
-        self._recent.menuAction().setVisible(bool(recent))
-        for file in recent:
+        self._recent_menu.clear()
+        recent_files = recent_titles(self._session.settings.all_recent_files)
+        self._recent_menu.menuAction().setVisible(bool(recent_files))
+        for file in recent_files:
             label = file.name
             if not file.exists:
                 label = _("{file} (missing)").format(file=file.name)
-            entry = self._recent.addAction(plain.escape_menu_text(label))
+            entry = self._recent_menu.addAction(plain.escape_menu_text(label))
             entry.setToolTip(plain.tip(str(file.path)))
             entry.setEnabled(file.exists)
             entry.triggered.connect(lambda _on=False, path=file.path: self._open_file(path))
-        self._recent.addSeparator()
-        self._recent.addAction(self.actions["file.forget_recent"])
+        self._recent_menu.addSeparator()
+        self._recent_menu.addAction(self.actions["file.forget_recent"])
 
     def _list_layouts(self, menu: Menu) -> None:
         menu.clear()
@@ -106,37 +106,37 @@ class DynamicMenus:
             menu.addAction(self.actions[name])
 
     def _list_panels(self) -> None:
-        self._panels.clear()
+        self._panel_menu.clear()
         shell = self._shell
-        self._panels.menuAction().setVisible(shell.bench is not None)
+        self._panel_menu.menuAction().setVisible(shell.bench is not None)
         if shell.bench is None:
             return
         self.actions.select(f"layout.{shell.current_layout}")
-        opened = shell.bench.open_names()
+        open_keys = shell.bench.open_names()
         for panel in sorted(shell.panels.values(), key=lambda panel: _(panel.title)):
             if panel.name == "behaviour" and shell.current_layout != "behaviour":
                 continue
-            entry = self._panels.addAction(shell.theme.icon(panel.icon), _(panel.title))
+            entry = self._panel_menu.addAction(shell.theme.icon(panel.icon), _(panel.title))
             entry.setCheckable(True)
-            entry.setChecked(panel.name in opened)
+            entry.setChecked(panel.name in open_keys)
             entry.triggered.connect(lambda on=False, name=panel.name: self._set_panel_open(name, on))
-            for key in opened:
+            for key in open_keys:
                 name, number = parse_key(key)
                 if name == panel.name and number > 1:
                     self._add_extra_panel(panel, key, number)
 
     def _add_extra_panel(self, panel: Panel, key: str, number: int) -> None:
         title = numbered_title(_(panel.title), number)
-        entry = self._panels.addAction(self._shell.theme.icon(panel.icon), title)
+        entry = self._panel_menu.addAction(self._shell.theme.icon(panel.icon), title)
         entry.setCheckable(True)
         entry.setChecked(True)
         entry.triggered.connect(lambda on=False, key=key: self._set_panel_open(key, on))
 
-    def _set_panel_open(self, name: str, on: bool) -> None:
+    def _set_panel_open(self, name: str, is_open: bool) -> None:
         bench = self._shell.bench
         if bench is None:
             return
-        if on:
+        if is_open:
             bench.open(name)
         else:
             bench.docks[name].close()

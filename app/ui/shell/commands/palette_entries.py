@@ -38,7 +38,7 @@ class PaletteEntries:
         self._shell, self._session, self._shortcuts = shell, session, shortcuts
         self._palette_commands = [command for command in commands if command.in_palette]
         self._disabled_reason = disabled_reason
-        self._topics: list[Entry] = []
+        self._cached_topic_entries: list[Entry] = []
         self._topic_revisions = (-1, -1)
 
     def all(self) -> list[Entry]:
@@ -56,20 +56,20 @@ class PaletteEntries:
     def _commands(self) -> list[Entry]:
         entries = []
         for command in self._palette_commands:
-            key, reason = self._shortcuts.first(command.id), self._disabled_reason(command.id)
+            key, reason = self._shortcuts.first_shortcut(command.id), self._disabled_reason(command.id)
             icon = command.icon or "chevrons-right"
             entries.append(Entry(f"command:{command.id}", command.label, icon, _(command.menu), key, reason))
         return entries
 
     def _panels(self) -> list[Entry]:
         bench = self._shell.bench
-        opened: Sequence[str] = bench.open_names() if bench is not None else ()
+        open_keys: Sequence[str] = bench.open_names() if bench is not None else ()
         entries = []
         for panel in sorted(self._shell.panels.values(), key=lambda panel: _(panel.title)):
-            position = opened.index(panel.name) + 1 if panel.name in opened else 0
-            key = self._shortcuts.first(f"panel.{position}") if 0 < position < 10 else ""
+            position = open_keys.index(panel.name) + 1 if panel.name in open_keys else 0
+            key = self._shortcuts.first_shortcut(f"panel.{position}") if 0 < position < 10 else ""
             entries.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
-            if panel.allows_multiple and panel.name in opened:
+            if panel.allows_multiple and panel.name in open_keys:
                 label = _("Another panel: {panel}").format(panel=_(panel.title))
                 entries.append(Entry(f"another:{panel.name}", label, "plus"))
         return entries
@@ -106,9 +106,9 @@ class PaletteEntries:
             self._topic_revisions = topics.revision, networks.revision
             current_topics = [
                 *topics.existing_topics(),
-                *(topic for topic in networks.topics if topic.gone_since is None),
+                *(topic for topic in networks.topics if topic.gone_since_s is None),
             ]
-            self._topics = [
+            self._cached_topic_entries = [
                 Entry(
                     f"topic:{topic.key}",
                     topic_label(topic.key),
@@ -117,4 +117,4 @@ class PaletteEntries:
                 )
                 for topic in current_topics
             ]
-        return self._topics
+        return self._cached_topic_entries

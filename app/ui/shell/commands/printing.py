@@ -140,8 +140,8 @@ def printer_names() -> list[str]:
 
 def default_page_layout() -> QPageLayout:
     """Return a portrait page layout: Letter on systems with US units, else A4."""
-    inches = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
-    size = QPageSize.PageSizeId.Letter if inches else QPageSize.PageSizeId.A4
+    is_imperial = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
+    size = QPageSize.PageSizeId.Letter if is_imperial else QPageSize.PageSizeId.A4
     return QPageLayout(QPageSize(size), QPageLayout.Orientation.Portrait, QMarginsF())
 
 

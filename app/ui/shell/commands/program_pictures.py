@@ -62,10 +62,10 @@ class ImageCommands:
         """Ask for a file and format, then save the image."""
         suggestion = suggested_path(self._session.document)
 
-        def take(path: Path, kind: FileKind) -> None:
+        def save_image(path: Path, kind: FileKind) -> None:
             self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_IMAGE_KINDS)
 
-        self._dialogs.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, take)
+        self._dialogs.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, save_image)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Save an image of the blocks, adding the file extension if it is missing.

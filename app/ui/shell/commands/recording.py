@@ -136,12 +136,12 @@ class RecordCommands:
         """Ask for the folder in which recordings are saved."""
         recordings = self._recordings
 
-        def take(folder: Path) -> None:
+        def set_folder(folder: Path) -> None:
             recordings.set_folder(folder)
             self._shell.show_toast(_("Recordings are saved in {folder}").format(folder=folder))
 
         start_folder = recordings.folder
-        self._dialogs.select_folder(str(start_folder if start_folder.is_dir() else Path.home()), take)
+        self._dialogs.select_folder(str(start_folder if start_folder.is_dir() else Path.home()), set_folder)
 
     def _on_saved(self, path: Path, kind: str) -> None:
         if kind == "kept":

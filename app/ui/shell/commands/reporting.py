@@ -90,10 +90,10 @@ class ReportCommands:
 
         Studio itself sends no request.
         """
-        opened = open_externally(QUrl(page))
+        is_opened = open_externally(QUrl(page))
         message = (
             _("This is NEP Studio {version}. The newest version is shown in your browser.")
-            if opened
+            if is_opened
             else _("This is NEP Studio {version}. You'll find newer versions at {page}")
         )
         self._shell.show_toast(message.format(version=__version__, page=page))

@@ -60,7 +60,7 @@ class RobotCommands:
         """Toggle the setting that virtual robots return to their start position before each run."""
         fleet = self._session.fleet
         try:
-            fleet.set_resets_at_start(begins=not fleet.resets_at_start)
+            fleet.set_resets_at_start(is_enabled=not fleet.resets_at_start)
         except SettingsError as error:
             self._shell.log_problem(str(error))
 

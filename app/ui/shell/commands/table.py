@@ -31,7 +31,7 @@ from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
-LOOK, RECORD = lazy("Appearance"), lazy("Record")
+APPEARANCE_MENU, RECORD_MENU = lazy("Appearance"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 RUN_DISABLED_REASONS = {
     "stopping": lazy("Stopping robots"),
@@ -101,7 +101,7 @@ def _custom_layout_disabled_reason(handlers: Handlers) -> str:
 def _previous_layout_disabled_reason(handlers: Handlers) -> str:
     if handlers.shell.current_layout != START_PAGE:
         return _("Only on the start page")
-    return "" if handlers.shell.return_layout else _("Nothing open")
+    return "" if handlers.shell.return_layout else _("Nothing is open")
 
 
 def _freeze_disabled_reason(handlers: Handlers) -> str:
@@ -123,8 +123,8 @@ def _loaded_recording_disabled_reason(handlers: Handlers) -> str:
 
 
 def _room_disabled_reason(handlers: Handlers) -> str:
-    has_virtual = any(link.is_virtual for link in handlers.session.fleet.connected)
-    return "" if has_virtual else _("No virtual robots")
+    has_virtual_robot = any(link.is_virtual for link in handlers.session.fleet.connected)
+    return "" if has_virtual_robot else _("No virtual robots")
 
 
 def _virtual_robot_disabled_reason(handlers: Handlers) -> str:
@@ -159,7 +159,7 @@ def _panel_command(number: int) -> C:
     )
 
 
-def _edit_command(edit: Edit, text: str, key: str, icon: str, *, above: bool = False) -> C:
+def _edit_command(edit: Edit, text: str, key: str, icon: str, *, has_separator: bool = False) -> C:
     # A menu entry only; the focused widget handles its key.
     return C(
         f"edit.{edit}",
@@ -168,7 +168,7 @@ def _edit_command(edit: Edit, text: str, key: str, icon: str, *, above: bool = F
         "Edit",
         icon=icon,
         displayed_key=key,
-        separator_above=above,
+        separator_above=has_separator,
         disabled_reason=lambda do: do.editing.disabled_reason(edit),
         in_palette=False,
         in_shortcuts=False,
@@ -221,7 +221,7 @@ COMMANDS: tuple[C, ...] = (
       disabled_reason=_editor_disabled_reason),
     C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
       "rotate-cw", disabled_reason=_editor_disabled_reason),
-    _edit_command("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
+    _edit_command("cut", lazy("Cut"), "Ctrl+X", "scissors", has_separator=True),
     _edit_command("copy", lazy("Copy"), "Ctrl+C", "copy"),
     _edit_command("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
     _edit_command("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
@@ -254,9 +254,9 @@ COMMANDS: tuple[C, ...] = (
       icon="folder-open", submenu=lazy("Layouts")),
     C("layout.reset", lazy("Reset panels"), lambda do: do.view.reset_layout(), "View",
       disabled_reason=_panels_disabled_reason),
-    C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
+    C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.focus_next(1), "View", ("F6",),
       disabled_reason=_panels_disabled_reason),
-    C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.next(-1), "View",
+    C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.focus_next(-1), "View",
       ("Shift+F6",), disabled_reason=_panels_disabled_reason),
     *map(_panel_command, range(1, 10)),
     C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.switch_tab(1), "View", ("Ctrl+Tab",),
@@ -275,11 +275,11 @@ COMMANDS: tuple[C, ...] = (
     C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.add_bookmark(), icon="bookmark",
       disabled_reason=_loaded_recording_disabled_reason),
     C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
-      submenu=LOOK),
+      submenu=APPEARANCE_MENU),
     C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme",
-      submenu=LOOK),
+      submenu=APPEARANCE_MENU),
     C("theme.system", lazy("Match system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
-      group="theme", submenu=LOOK),
+      group="theme", submenu=APPEARANCE_MENU),
     C("text.larger", lazy("Larger text"),
       lambda do: do.view.set_text_size(do.shell.theme.text_percent + TEXT_SIZE_STEP_PERCENT), "View",
       ("Ctrl++", "Ctrl+="),
@@ -292,9 +292,9 @@ COMMANDS: tuple[C, ...] = (
     C("text.normal", lazy("Normal text"), lambda do: do.view.set_text_size(100), "View", ("Ctrl+0",)),
     C("theme.contrast", lazy("High contrast"), lambda do: do.view.update_contrast(), "View",
       is_checkable=True,
-      submenu=LOOK, separator_above=True),
+      submenu=APPEARANCE_MENU, separator_above=True),
     C("theme.motion", lazy("Reduce motion"), lambda do: do.view.update_motion(), "View", is_checkable=True,
-      submenu=LOOK),
+      submenu=APPEARANCE_MENU),
     C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_resume(), "Run", ("F5",), "play",
       lazy("Runs the behaviour, or restarts it"), disabled_reason=_run_disabled_reason),
     C("run.restart", lazy("Restart"), lambda do: do.behaviours.restart(), "Run", ("Ctrl+F5",), "rotate-ccw",
@@ -350,17 +350,17 @@ COMMANDS: tuple[C, ...] = (
     C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
       tip=lazy("Shows the services that programs offer")),
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
-      ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), submenu=RECORD),
+      ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), submenu=RECORD_MENU),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
       in_shortcuts=False, disabled_reason=_recording_disabled_reason),
     C("recording.sheet", lazy("Choose topics to record"), lambda do: do.recording.open_sheet(), "View",
-      icon="list-checks", submenu=RECORD),
+      icon="list-checks", submenu=RECORD_MENU),
     C("recording.keep", lazy("Save the last seconds"), lambda do: do.recording.save_last(), "View", ("F9",),
-      "history", lazy("Saves what just happened as a recording"), submenu=RECORD, separator_above=True),
+      "history", lazy("Saves what just happened as a recording"), submenu=RECORD_MENU, separator_above=True),
     C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.ask_folder(), "View",
-      icon="folder-open", submenu=RECORD, separator_above=True),
+      icon="folder-open", submenu=RECORD_MENU, separator_above=True),
     C("recording.show", lazy("Recordings"), lambda do: do.recording.show(), "View", icon="film",
-      submenu=RECORD, in_palette=False),
+      submenu=RECORD_MENU, in_palette=False),
     C("help.first_steps", lazy("First steps"), lambda do: do.view.show_first_steps(), "Help",
       icon="lightbulb"),
     C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),

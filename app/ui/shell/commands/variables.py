@@ -61,9 +61,11 @@ class VariableCommands:
 
     def _free_name(self, *, is_list: bool) -> str:
         # Suggests a name so that none has to be typed: "count", "count 2", "count 3".
-        first = pgettext("variable", "list") if is_list else pgettext("variable", "count")
+        base_name = pgettext("variable", "list") if is_list else pgettext("variable", "count")
         return next(
-            n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.rejection_reason(n)
+            name
+            for name in chain([base_name], (f"{base_name} {n}" for n in count(2)))
+            if not self.rejection_reason(name)
         )
 
     def ask_rename(self, id: str) -> None:
@@ -71,16 +73,16 @@ class VariableCommands:
 
         def ask_name() -> None:
             workspace = self._workspace()
-            old = workspace.variables.get(id)
-            if old is None:
+            old_name = workspace.variables.get(id)
+            if old_name is None:
                 return
             has_name = id not in workspace.nameless_variables
             self._get_name_sheet().ask(
-                _("New name for “{name}”").format(name=old) if has_name else _("Variable name"),
-                _("Rename") if has_name else _("Name it"),
-                lambda name: "" if name == old else self.rejection_reason(name, id),
+                _("New name for “{name}”").format(name=old_name) if has_name else _("Variable name"),
+                _("Rename") if has_name else _("Name the variable"),
+                lambda name: "" if name == old_name else self.rejection_reason(name, id),
                 lambda name: self._edit({"do": "rename", "id": id, "name": name}),
-                old if has_name else "",
+                old_name if has_name else "",
             )
 
         self._run_after_flush(ask_name)
@@ -114,9 +116,9 @@ class VariableCommands:
 
         def show() -> None:
             uses = uses_of(self._workspace(), id)
-            before = self._last_found_ids.get(id, "")
+            last_id = self._last_found_ids.get(id, "")
             if uses:
-                index = (uses.index(before) + 1) % len(uses) if before in uses else 0
+                index = (uses.index(last_id) + 1) % len(uses) if last_id in uses else 0
                 self._last_found_ids = {id: uses[index]}
                 self._edit({"do": "show", "id": uses[index]})
 
@@ -126,21 +128,23 @@ class VariableCommands:
         """Ask for a value and assign it to a variable of the running program."""
         runs = self._session.runs
         name = self._workspace().variables.get(id)
-        now = runs.values.get(id)
+        current_value = runs.values.get(id)
         if name is None or not runs.active:
             return
 
-        def take(text: str) -> None:
+        def set_value(text: str) -> None:
             if not runs.set_variable(id, parse_value(text)):
                 self._shell.show_toast(_("The behaviour ended: “{name}” wasn't changed").format(name=name))
 
-        is_number = now is not None and now.kind == "number"
+        is_number = current_value is not None and current_value.kind == "number"
         self._get_name_sheet().ask(
             _("New value for “{name}”").format(name=name),
             _("Apply"),
             lambda words: separator_problem(words) if is_number else "",
-            take,
-            now.text if now is not None and now.kind in ("number", "text", "boolean") else "",
+            set_value,
+            current_value.text
+            if current_value is not None and current_value.kind in ("number", "text", "boolean")
+            else "",
         )
 
     def rejection_reason(self, name: str, own_id: str = "") -> str:
@@ -180,14 +184,16 @@ class VariableCommands:
 def uses_of(workspace: Workspace, id: str) -> list[str]:
     """Return the ids of the blocks that set, change or read a variable, in the order of the page."""
     block_ids: list[str] = []
-    waiting: list[PlacedBlock] = [
+    pending_blocks: list[PlacedBlock] = [
         block for script in reversed(workspace.scripts) for block in reversed(script)
     ]
-    while waiting:
-        block = waiting.pop()
+    while pending_blocks:
+        block = pending_blocks.pop()
         if any(_refers_to(value, id) for value in block.fields.values()):
             block_ids.append(block.id)
-        waiting += [each for chain in reversed(list(block.inputs.values())) for each in reversed(chain)]
+        pending_blocks += [
+            each for chain in reversed(list(block.inputs.values())) for each in reversed(chain)
+        ]
     return block_ids
 
 

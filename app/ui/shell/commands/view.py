@@ -33,7 +33,7 @@ from app.ui.shell.hint_ring import HintRing
 from app.ui.speaker import has_voice_engine, voice_text
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
-from app.ui.widgets.file_dialogs import LAYOUTS, FileKind
+from app.ui.widgets.file_dialogs import LAYOUT_FILTER, FileKind
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.errors import NepError
 from nep.i18n import _, format_list, language
@@ -59,7 +59,7 @@ else:
     )
 
 TEXT_SIZE_STEP_PERCENT = 25
-MAX_NAMED = 4
+MAX_LISTED_PANELS = 4
 
 
 @runtime_checkable
@@ -74,7 +74,7 @@ class SupportsRobotChoice(Protocol):
 class SupportsDiagnosis(Protocol):
     """Interface of the panel of the connection doctor."""
 
-    def set_stalled_panel(self, asker: PanelWidget | None) -> None:
+    def set_stalled_panel(self, stalled_panel: PanelWidget | None) -> None:
         """Set the panel whose missing data is to be diagnosed; None for a general check."""
 
 
@@ -110,8 +110,8 @@ class ViewCommands:
         self._shortcut_sheet: shortcuts.ShortcutSheet | None = None
         self._name_sheet: name_sheet.NameSheet | None = None
         self._settings_sheet: settings_sheet.SettingsSheet | None = None
-        self._ring: HintRing | None = None
-        self._guide: guide.GuideSheet | None = None
+        self._hint_ring: HintRing | None = None
+        self._guide_sheet: guide.GuideSheet | None = None
 
     def set_actions(self, actions: Actions, entries: PaletteEntries) -> None:
         """Connect the actions and the command palette.
@@ -159,7 +159,7 @@ class ViewCommands:
         if kind == "command":
             self._actions.run(name)
         elif kind in {"panel", "another"}:
-            self._open_panel(name, one_more=kind == "another")
+            self._open_panel(name, is_additional=kind == "another")
         elif kind == "topic":
             if shell.bench is None:
                 self.show_layout("developer")
@@ -174,9 +174,11 @@ class ViewCommands:
         elif kind in {"file", "example"}:
             (self._files.open if kind == "file" else self._files.open_example)(Path(name))
 
-    def _open_panel(self, name: str, *, one_more: bool) -> None:
+    def _open_panel(self, name: str, *, is_additional: bool) -> None:
         bench = self._shell.bench
-        dock = bench.open_another(name) if one_more and bench is not None else self._shell.open_panel(name)
+        dock = (
+            bench.open_another(name) if is_additional and bench is not None else self._shell.open_panel(name)
+        )
         if dock is not None and self._shell.bench is not None:
             self._shell.bench.focus_panel(dock)
 
@@ -189,35 +191,35 @@ class ViewCommands:
             dock.panel.show_topic(topic)
             self._select_topic(topic)
 
-    def new_alarm(self, about: AlarmCondition | None = None) -> None:
+    def new_alarm(self, condition: AlarmCondition | None = None) -> None:
         """Create an alarm and open it for editing.
 
         An alarm on a number stays off until the user has confirmed the limit.
 
         Args:
-            about: Condition of the alarm; None lets the user choose one.
+            condition: Condition of the alarm; None lets the user choose one.
         """
         dock = self._shell.open_panel("alarms")
         if dock is None or not isinstance(dock.panel, SupportsAlarms):
             return
-        if about is None:
+        if condition is None:
             dock.panel.add_alarm()
             return
-        rule = self._session.alarms.create(about)
-        needs_limit = about.kind in NUMBER_KINDS  # the limit has to be entered first
+        rule = self._session.alarms.create(condition)
+        needs_limit = condition.kind in NUMBER_KINDS  # the limit has to be entered first
         if needs_limit:
             self._session.alarms.set_rule(replace(rule, is_enabled=False))
         dock.panel.edit(rule.id, "limit" if needs_limit else "")
 
-    def new_value_alarm(self, about: tuple[str, str]) -> None:
+    def new_value_alarm(self, topic_field: tuple[str, str]) -> None:
         """Create an alarm on a field of a topic: on a limit for a number, else on any change.
 
         For a number, the alarm stays off until the user has confirmed the limit.
 
         Args:
-            about: Topic and field path; "" is the path of the whole payload.
+            topic_field: Topic and field path; "" is the path of the whole payload.
         """
-        topic, path = about
+        topic, path = topic_field
         topic_state = self._session.topics.get(topic)
         newest = topic_state.newest if topic_state is not None else None
         value: object = None
@@ -318,10 +320,10 @@ class ViewCommands:
             return
 
         def save(name: str) -> None:
-            saved = arrangements.save_as(bench, base, name)
+            is_saved = arrangements.save_as(bench, base, name)
             message = (
                 _("Saved layout “{name}”")
-                if saved
+                if is_saved
                 else _("Can't save layout “{name}”. It will be lost when Studio closes.")
             )
             shell.show_toast(message.format(name=name))
@@ -331,14 +333,14 @@ class ViewCommands:
     def rename_layout(self) -> None:
         """Ask for a new name and rename the current custom layout."""
         arrangements = self._shell.saved_layouts
-        old = arrangements.custom_name(self._shell.current_layout)
-        if old:
+        old_name = arrangements.custom_name(self._shell.current_layout)
+        if old_name:
             self._get_name_sheet().ask(
-                _("New name for “{name}”").format(name=old),
+                _("New name for “{name}”").format(name=old_name),
                 _("Rename"),
-                lambda name: arrangements.rejection_reason(name, old),
-                lambda name: arrangements.rename(old, name),
-                old,
+                lambda name: arrangements.rejection_reason(name, old_name),
+                lambda name: arrangements.rename(old_name, name),
+                old_name,
             )
 
     def delete_layout(self) -> None:
@@ -346,11 +348,11 @@ class ViewCommands:
         arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.custom_name(shell.current_layout)
         if name:
-            saved, undo = arrangements.delete(shell.bench, name)
+            is_saved, undo = arrangements.delete(shell.bench, name)
             message = (
                 _("Deleted the layout “{name}”")
-                if saved
-                else _("Can't save this change: “{name}” will reappear when Studio restarts")
+                if is_saved
+                else _("This change couldn't be saved. “{name}” will reappear when Studio restarts.")
             )
             shell.show_toast(message.format(name=name), _("Undo"), undo)
 
@@ -367,11 +369,12 @@ class ViewCommands:
                 write_atomically(path, encode_layout(name, base, bench.save()))
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
-                shell.show_toast(_("can't write {file}: {reason}").format(file=path.name, reason=reason))
+                message = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
+                shell.show_toast(f"{message[:1].upper()}{message[1:]}")
             else:
                 shell.show_toast(_("Saved the layout to {file}").format(file=path.name))
 
-        kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
+        kind = FileKind(LAYOUT_FILTER[0], LAYOUT_FILTER[1].lstrip("*"))
         suggestion = Path.home() / f"{file_stem(name)}{kind.suffix}"
         self._files.dialogs.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
@@ -389,7 +392,7 @@ class ViewCommands:
             reason = f"{reason[:1].lower()}{reason[1:]}"
             shell.show_toast(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
             return
-        layouts, before = shell.saved_layouts, shell.saved_layouts.custom_name(imported_layout.base)
+        layouts, previous_name = shell.saved_layouts, shell.saved_layouts.custom_name(imported_layout.base)
         if not layouts.can_restore(
             shell.show_layout(imported_layout.base), imported_layout.base, imported_layout.saved
         ):
@@ -397,7 +400,7 @@ class ViewCommands:
                 _("Can't open {file}: {reason}").format(file=path.name, reason=_("the file is damaged"))
             )
             return
-        name, _is_kept = layouts.import_layout(
+        name, _is_saved = layouts.import_layout(
             imported_layout.name, imported_layout.base, imported_layout.saved
         )
         self.show_custom_layout(name)
@@ -405,14 +408,14 @@ class ViewCommands:
         def undo() -> None:
             bench = shell.bench if shell.current_layout == imported_layout.base else None
             layouts.delete(bench, name)
-            if before and bench is not None:
-                layouts.switch(bench, imported_layout.base, before)
+            if previous_name and bench is not None:
+                layouts.switch(bench, imported_layout.base, previous_name)
 
         message = _("Opened the layout “{name}”").format(name=name)
         if imported_layout.unknown_panels:
-            left_out = format_list(list(imported_layout.unknown_panels[:MAX_NAMED]))
+            unknown_panels = format_list(list(imported_layout.unknown_panels[:MAX_LISTED_PANELS]))
             message = _("{opened}. Unknown panels were skipped: {panels}").format(
-                opened=message, panels=left_out
+                opened=message, panels=unknown_panels
             )
         shell.show_toast(message, _("Undo"), undo)
 
@@ -423,8 +426,8 @@ class ViewCommands:
     def _update_theme_actions(self) -> None:
         theme = self._shell.theme
         self._actions.select(f"theme.{theme.mode}")
-        self._actions["theme.motion"].setChecked(theme.reduced_motion)
-        self._actions["theme.contrast"].setChecked(theme.high_contrast)
+        self._actions["theme.motion"].setChecked(theme.is_motion_reduced)
+        self._actions["theme.contrast"].setChecked(theme.is_high_contrast)
 
     def set_theme(self, mode: Mode) -> None:
         """Set and save the theme mode: "light", "dark" or "system"."""
@@ -454,13 +457,13 @@ class ViewCommands:
 
     def open_guide(self) -> None:
         """Open the guide at the last selected entry of its list."""
-        if self._guide is None:
+        if self._guide_sheet is None:
             shell = self._shell
-            self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
-        self._guide.open()
+            self._guide_sheet = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
+        self._guide_sheet.open()
 
     def _guide_pages(self) -> Sequence[guide.GuidePage]:
-        return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first)
+        return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first_shortcut)
 
     def show_examples(self) -> None:
         """Show all examples on the start page."""
@@ -469,15 +472,15 @@ class ViewCommands:
 
     def point_at(self, command: str) -> bool:
         """Highlight the button of a command; return False if no such button is visible."""
-        if self._ring is None:
-            self._ring = HintRing(self._shell.theme, self._shell.surface)
-        return self._ring.point_at(command)
+        if self._hint_ring is None:
+            self._hint_ring = HintRing(self._shell.theme, self._shell.surface)
+        return self._hint_ring.point_at(command)
 
-    def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
+    def open_doctor(self, stalled_panel: PanelWidget | None = None, topic: str = "") -> None:
         """Run the connection doctor and show its panel.
 
         Args:
-            asker: Panel whose missing data is to be diagnosed, or None.
+            stalled_panel: Panel whose missing data is to be diagnosed, or None.
             topic: Topic to check first, or "".
         """
         self._session.doctor.expect_topic(topic)
@@ -485,7 +488,7 @@ class ViewCommands:
             self.show_layout("developer")
         dock = self._shell.open_panel("doctor")
         if dock is not None and isinstance(dock.panel, SupportsDiagnosis):
-            dock.panel.set_stalled_panel(asker)
+            dock.panel.set_stalled_panel(stalled_panel)
 
     def open_log_folder(self) -> None:
         """Open the folder of log files, creating it if necessary."""

@@ -49,9 +49,9 @@ class AboutSheet(Overlay):
         column.setSpacing(12)
         header = QHBoxLayout()
         header.addWidget(label(TITLE, "heading", wrap=True), 1)
-        self._close = IconButton(theme, "x", _("Close"), "Esc")
-        self._close.clicked.connect(self.dismiss)
-        header.addWidget(self._close)
+        self._close_button = IconButton(theme, "x", _("Close"), "Esc")
+        self._close_button.clicked.connect(self.dismiss)
+        header.addWidget(self._close_button)
         column.addLayout(header)
         lines = QVBoxLayout()
         lines.setSpacing(6)
@@ -83,7 +83,7 @@ class AboutSheet(Overlay):
         self._notify(_("Copied version information"))
 
     def initial_focus(self) -> QWidget:
-        return self._close
+        return self._close_button
 
     def preferred_size(self, room: QSize) -> QSize:
         width = min(room.width(), round(self.theme.scaled(WIDTH)))

@@ -19,9 +19,9 @@ from app.ui.widgets.lists.fuzzy import Entry, Finder, Match
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy, ngettext
 
-WIDTH, TOP, FIELD, FOOTER_HEIGHT = 640, 128, 56, 36
+WIDTH, TOP, FIELD_HEIGHT, FOOTER_HEIGHT = 640, 128, 56, 36
 MAX_VISIBLE_ROWS = 9.5
-MAX_RESULTS, MAX_RESULTS_EMPTY, MAX_LAST_SHOWN, MAX_LAST_SAVED = 40, 8, 5, 12
+MAX_RESULTS, MAX_RESULTS_WITHOUT_QUERY, MAX_LAST_USED_SHOWN, MAX_LAST_USED_SAVED = 40, 8, 5, 12
 
 
 class _Field(QLineEdit):
@@ -44,7 +44,7 @@ class _Field(QLineEdit):
         font.setWeight(font.Weight.Normal)
         font.setPixelSize(round(self._theme.scaled(17)))
         self.setFont(font)
-        self.setFixedHeight(round(self._theme.scaled(FIELD)))
+        self.setFixedHeight(round(self._theme.scaled(FIELD_HEIGHT)))
         right = round(paint.key_width(self._theme, shortcut_text("Esc"))) + 26
         self.setTextMargins(round(self._theme.scaled(20)) + 28, 0, right, 0)
 
@@ -82,12 +82,12 @@ class _Footer(QWidget):
         font, quiet = theme.font("body"), theme.colour("textSecondary")
         middle, x = self.height() / 2, 18.0
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.TopEdge, theme.colour("border"))
-        count = paint.width_of(font, self.result_text)
+        result_width = paint.width_of(font, self.result_text)
         for keys, hint in self.KEY_HINTS:
             text = _(hint)
             caps = [shortcut_text(key) for key in keys]
             width = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, text)
-            if x + width > self.width() - count - 40:
+            if x + width > self.width() - result_width - 40:
                 break
             for cap in caps:
                 x = paint.key_cap(painter, theme, x + paint.key_width(theme, cap), middle, cap).right()
@@ -106,7 +106,7 @@ class CommandPalette(Overlay):
     Args:
         theme: Theme.
         window: Window that the palette covers.
-        offers: Returns the entries; called whenever the palette opens.
+        get_entries: Returns the entries; called whenever the palette opens.
         run: Runs an entry.
         rebind: Asks for a new shortcut for a command, given by its name.
     """
@@ -117,13 +117,12 @@ class CommandPalette(Overlay):
         self,
         theme: Theme,
         window: QWidget,
-        offers: Callable[[], Sequence[Entry]],
+        get_entries: Callable[[], Sequence[Entry]],
         run: Callable[[Entry], object],
         rebind: Callable[[str], object],
     ) -> None:
-        # `offers` returns the entries and is called whenever the palette opens.
         super().__init__(theme, window, _("Command palette"))
-        self._offers, self._run, self._rebind = offers, run, rebind
+        self._get_entries, self._run, self._rebind = get_entries, run, rebind
         self._finder = Finder(())
         self.last_used_ids: list[str] = []
         self.on_last_used_changed: Callable[[Sequence[str]], object] = lambda _ids: None
@@ -156,7 +155,7 @@ class CommandPalette(Overlay):
         if self.isVisible():
             self.dismiss()
             return
-        self._finder = Finder(self._offers())
+        self._finder = Finder(self._get_entries())
         self.field.blockSignals(True)
         self.field.clear()
         self.field.blockSignals(False)
@@ -166,7 +165,7 @@ class CommandPalette(Overlay):
     def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         rows = min(self.rows.content_height(), round(scaled(40) * MAX_VISIBLE_ROWS)) + 8
-        content_height = rows if self.rows.lines.lines else self.no_result_label.sizeHint().height()
+        content_height = rows if self.rows.line_model.lines else self.no_result_label.sizeHint().height()
         height = self.field.height() + content_height + self.foot.height() + 2
         return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), height))
 
@@ -199,16 +198,19 @@ class CommandPalette(Overlay):
         # The last used entries, then the first ones of each kind.
         entries = self._finder.entries
         entries_by_id = {entry.id: entry for entry in entries if entry.id in self.last_used_ids}
-        last = [entries_by_id[id] for id in self.last_used_ids if id in entries_by_id][:MAX_LAST_SHOWN]
-        lines: list[Line] = [Heading(_(GROUP_TITLES["recent"])), *map(Match, last)] if last else []
-        kinds: dict[str, list[Match]] = {}
+        last_used = [entries_by_id[id] for id in self.last_used_ids if id in entries_by_id]
+        last_used = last_used[:MAX_LAST_USED_SHOWN]
+        lines: list[Line] = [Heading(_(GROUP_TITLES["recent"])), *map(Match, last_used)] if last_used else []
+        matches_by_kind: dict[str, list[Match]] = {}
         for entry in entries:
-            of_kind = kinds.setdefault(entry.kind, [])
-            if entry not in last and (entry.kind == "command" or len(of_kind) < MAX_RESULTS_EMPTY):
-                of_kind.append(Match(entry))
-        for kind, of_kind in kinds.items():
-            if of_kind:
-                lines += [Heading(_(GROUP_TITLES[kind])), *of_kind]
+            matches = matches_by_kind.setdefault(entry.kind, [])
+            if entry not in last_used and (
+                entry.kind == "command" or len(matches) < MAX_RESULTS_WITHOUT_QUERY
+            ):
+                matches.append(Match(entry))
+        for kind, matches in matches_by_kind.items():
+            if matches:
+                lines += [Heading(_(GROUP_TITLES[kind])), *matches]
         self.foot.result_text = ngettext("{count} result", "{count} results", len(entries)).format(
             count=len(entries)
         )
@@ -222,12 +224,12 @@ class CommandPalette(Overlay):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.field and event.type() == QEvent.Type.KeyPress:
-            pressed = cast("QKeyEvent", event)
-            is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
-            if is_unmodified and self.rows.handle_key(pressed.key()):
+            key_event = cast("QKeyEvent", event)
+            is_unmodified = not key_event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+            if is_unmodified and self.rows.handle_key(key_event.key()):
                 return True
-            if pressed.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-                if pressed.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            if key_event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+                if key_event.modifiers() & Qt.KeyboardModifier.ControlModifier:
                     self.rebind()
                 else:
                     self.run_selected()
@@ -242,7 +244,8 @@ class CommandPalette(Overlay):
         if entry.reason:
             paint.announce(self.field, entry.reason)
             return
-        self.last_used_ids = [entry.id, *(id for id in self.last_used_ids if id != entry.id)][:MAX_LAST_SAVED]
+        used_ids = [entry.id, *(id for id in self.last_used_ids if id != entry.id)]
+        self.last_used_ids = used_ids[:MAX_LAST_USED_SAVED]
         self.on_last_used_changed(self.last_used_ids)
         self.dismiss()
         self._run(entry)

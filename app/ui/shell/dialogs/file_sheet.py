@@ -40,14 +40,20 @@ from app.ui.text.dates import date_time_text
 from app.ui.text.numbers import size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
-from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_SUFFIXES, FileKind, pictures_folder, resolve_kind
+from app.ui.widgets.file_dialogs import (
+    BEHAVIOUR_FILTER,
+    PICTURE_SUFFIXES,
+    FileKind,
+    pictures_folder,
+    resolve_kind,
+)
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import FieldContextMenu
 from nep.i18n import _, lazy
 
 WIDTH, HEIGHT, LOCATIONS_WIDTH, FOLDER_NAME_WIDTH = 860, 560, 190, 200
-NAME, CHANGED, SIZE = range(3)
+NAME_COLUMN, MODIFIED_COLUMN, SIZE_COLUMN = range(3)
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,7 @@ class FileQuestion:
     icon: str = "blocks"
     is_saving: bool = False
     selects_folder: bool = False
-    kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOURS[0], SUFFIX),)
+    kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOUR_FILTER[0], SUFFIX),)
 
 
 OPEN_QUESTION = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours or folders here."))
@@ -97,12 +103,12 @@ class FolderLocation:
     folder: Path
 
 
-def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocation, ...]:
+def known_locations(backup_folder: Path, recent_files: Iterable[Path]) -> tuple[FolderLocation, ...]:
     """Return the folders to list as locations, without missing ones and duplicates.
 
     Args:
-        studio: Folder in which Studio stores backups.
-        recent: Recent files, whose folders are included.
+        backup_folder: Folder in which Studio stores backups.
+        recent_files: Recent files, whose folders are included.
     """
     kinds = QStandardPaths.StandardLocation
     candidates = [
@@ -110,8 +116,11 @@ def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocatio
         FolderLocation(_("Desktop"), "monitor", _standard_folder(kinds.DesktopLocation)),
         FolderLocation(_("Documents"), "file-text", _standard_folder(kinds.DocumentsLocation)),
         FolderLocation(_("Images"), "image", Path(pictures_folder())),
-        FolderLocation(_("Backed up by Studio"), "archive", studio),
-        *(FolderLocation(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
+        FolderLocation(_("Backed up by Studio"), "archive", backup_folder),
+        *(
+            FolderLocation(path.parent.name or str(path.parent), "history", path.parent)
+            for path in recent_files
+        ),
     ]
     locations: list[FolderLocation] = []
     for location in candidates:
@@ -128,28 +137,28 @@ class _Row(QTreeWidgetItem):
     """Row of a file or folder. Folders precede files in every sort order."""
 
     def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
-        changed = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
+        modified = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
         is_behaviour = not entry.is_folder and entry.path.name.lower().endswith(SUFFIX)
         name = entry.path.name[: -len(SUFFIX)] if is_behaviour else entry.path.name
-        size = "" if entry.is_folder else size_text(entry.size)
-        super().__init__([name, date_time_text(changed, now), size])
+        size = "" if entry.is_folder else size_text(entry.size_bytes)
+        super().__init__([name, date_time_text(modified, now), size])
         self.entry = entry
-        self.setIcon(NAME, theme.icon("folder" if entry.is_folder else icon, "textSecondary"))
-        self.setTextAlignment(SIZE, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.setToolTip(NAME, plain.tip(entry.path.name))
+        self.setIcon(NAME_COLUMN, theme.icon("folder" if entry.is_folder else icon, "textSecondary"))
+        self.setTextAlignment(SIZE_COLUMN, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setToolTip(NAME_COLUMN, plain.tip(entry.path.name))
 
     def __lt__(self, other: QTreeWidgetItem) -> bool:
         tree = self.treeWidget()
         if not isinstance(other, _Row) or tree is None:
             return False
-        descending = tree.header().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
+        is_descending = tree.header().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
         if self.entry.is_folder != other.entry.is_folder:
-            return self.entry.is_folder != descending
+            return self.entry.is_folder != is_descending
         column = tree.sortColumn()
-        if column == CHANGED:
+        if column == MODIFIED_COLUMN:
             return self.entry.changed_s < other.entry.changed_s
-        if column == SIZE:
-            return self.entry.size < other.entry.size
+        if column == SIZE_COLUMN:
+            return self.entry.size_bytes < other.entry.size_bytes
         return self.entry.path.name.casefold() < other.entry.path.name.casefold()
 
 
@@ -181,8 +190,8 @@ class FileSheet(Overlay):
         self.folder_name = QLineEdit()
         self.folder_name.setPlaceholderText(_("Folder name"))
         self.folder_name.setAccessibleName(_("Folder name"))
-        self.make_folder = Button(theme, _("Create"), size="small")
-        self.make_folder.clicked.connect(self._create_folder)
+        self.create_button = Button(theme, _("Create"), size="small")
+        self.create_button.clicked.connect(self._create_folder)
         self.location_list = ScrollColumn(_("Locations"), gap=2)
         self.list = QTreeWidget()
         self.name = QLineEdit()
@@ -216,11 +225,11 @@ class FileSheet(Overlay):
         tree.setUniformRowHeights(True)
         tree.setHeaderLabels([_("Name"), _("Modified"), _("Size")])
         tree.setSortingEnabled(True)
-        tree.sortByColumn(NAME, Qt.SortOrder.AscendingOrder)
+        tree.sortByColumn(NAME_COLUMN, Qt.SortOrder.AscendingOrder)
         tree.header().setHighlightSections(False)
         tree.header().setStretchLastSection(False)
-        tree.header().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        for column in (CHANGED, SIZE):
+        tree.header().setSectionResizeMode(NAME_COLUMN, QHeaderView.ResizeMode.Stretch)
+        for column in (MODIFIED_COLUMN, SIZE_COLUMN):
             tree.header().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         tree.itemActivated.connect(self._on_activated)
         tree.currentItemChanged.connect(lambda item, _before: self._on_selected(item))
@@ -228,27 +237,27 @@ class FileSheet(Overlay):
         tree.installEventFilter(self)
 
     def _lay_out(self) -> None:
-        header = self.make_header(self.heading)
+        header = self.create_header(self.heading)
         path_row = QHBoxLayout()
         path_row.setSpacing(8)
         path_row.addWidget(self.up)
         path_row.addWidget(self.path, 1)
-        for widget in (self.folder_name, self.make_folder, self.new_folder):
+        for widget in (self.folder_name, self.create_button, self.new_folder):
             path_row.addWidget(widget)
         right = QVBoxLayout()
         right.setSpacing(8)
         right.addLayout(path_row)
         right.addWidget(self.list, 1)
         right.addWidget(self.hint)
-        self._naming = QWidget()
-        naming = QHBoxLayout(self._naming)
+        self._name_row = QWidget()
+        naming = QHBoxLayout(self._name_row)
         naming.setContentsMargins(0, 0, 0, 0)
         naming.setSpacing(8)
         naming.addWidget(label(_("Name"), "bodyLarge", role="textSecondary"))
         naming.addWidget(self.name, 1)
         naming.addWidget(self.suffix_label)
         naming.addWidget(self.kind)
-        right.addWidget(self._naming)
+        right.addWidget(self._name_row)
         footer = QHBoxLayout()
         footer.setSpacing(8)
         footer.addStretch(1)
@@ -304,12 +313,12 @@ class FileSheet(Overlay):
             kinds: Formats that are offered.
             callback: Called with the path and the format.
         """
-        endings = tuple(dict.fromkeys(each.suffix for each in kinds))
+        suffixes = tuple(dict.fromkeys(each.suffix for each in kinds))
         question = FileQuestion(
             title,
             SAVE_QUESTION.verb,
             SAVE_QUESTION.empty,
-            suffixes=endings,
+            suffixes=suffixes,
             icon="image",
             is_saving=True,
             kinds=tuple(kinds),
@@ -337,8 +346,8 @@ class FileSheet(Overlay):
     def _on_kind_changed(self) -> None:
         # Removes a typed file extension, because it would override the chosen format.
         name = self.name.text()
-        typed = next((each for each in self.question.suffixes if name.lower().endswith(each)), "")
-        self.name.setText(name[: len(name) - len(typed)])
+        typed_suffix = next((each for each in self.question.suffixes if name.lower().endswith(each)), "")
+        self.name.setText(name[: len(name) - len(typed_suffix)])
         self.suffix_label.setText(self._kind.suffix)
         self._validate()
 
@@ -347,7 +356,7 @@ class FileSheet(Overlay):
         heading = _(question.heading)
         self.heading.setText(heading)
         self.setAccessibleName(heading)
-        paint.show_when(self._naming, question.is_saving)
+        paint.show_when(self._name_row, question.is_saving)
         self._show_folder_field(False)
         self._show_locations()
         self.go_to(folder if folder.is_dir() else Path.home())
@@ -399,7 +408,7 @@ class FileSheet(Overlay):
                 _("Can't open “{folder}”: {reason}.").format(folder=folder.name, reason=reason), "error"
             )
             return
-        before, self.folder = self.folder, folder
+        previous_folder, self.folder = self.folder, folder
         self.path.setText(str(folder))
         self.up.setEnabled(folder.parent != folder)
         now = dt.datetime.now().astimezone()
@@ -410,10 +419,10 @@ class FileSheet(Overlay):
         self.list.setIconSize(QSize(side, side))
         for entry in entries:
             row = _Row(self.theme, entry, now, self.question.icon)
-            row.setSizeHint(NAME, QSize(0, row_height))
+            row.setSizeHint(NAME_COLUMN, QSize(0, row_height))
             self.list.addTopLevelItem(row)
         self.list.sortItems(self.list.sortColumn(), self.list.header().sortIndicatorOrder())
-        previous_row = next((row for row in self._rows() if row.entry.path == before), None)
+        previous_row = next((row for row in self._rows() if row.entry.path == previous_folder), None)
         if previous_row is not None:
             self.list.setCurrentItem(previous_row)
         self.list.blockSignals(False)
@@ -433,7 +442,7 @@ class FileSheet(Overlay):
 
     def _on_selected(self, item: QTreeWidgetItem | None) -> None:
         if self.is_saving and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
-            self.name.setText(item.text(NAME))
+            self.name.setText(item.text(NAME_COLUMN))
         self._validate()
 
     def _on_activated(self, item: QTreeWidgetItem) -> None:
@@ -453,7 +462,7 @@ class FileSheet(Overlay):
     def _show_folder_field(self, visible: bool) -> None:
         # The text field replaces the "New folder" button.
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDTH)))
-        for widget in (self.folder_name, self.make_folder):
+        for widget in (self.folder_name, self.create_button):
             paint.show_when(widget, visible and self._can_create_folders)
         paint.show_when(self.new_folder, self._can_create_folders and not visible)
 
@@ -484,13 +493,13 @@ class FileSheet(Overlay):
         if not self.is_saving:
             return selected.path if selected is not None and not selected.is_folder else None
         name = self.name.text().strip()
-        ending = next((e for e in self.question.suffixes if name.lower().endswith(e)), self._kind.suffix)
-        if name.lower().endswith(ending):
-            name = name[: -len(ending)]
+        suffix = next((e for e in self.question.suffixes if name.lower().endswith(e)), self._kind.suffix)
+        if name.lower().endswith(suffix):
+            name = name[: -len(suffix)]
         path = parse_absolute_path(name)
         if path is not None:
-            return path.with_name(f"{path.name}{ending}") if path.parent.is_dir() else None
-        return self.folder / f"{name}{ending}" if name and not name_problem(name) else None
+            return path.with_name(f"{path.name}{suffix}") if path.parent.is_dir() else None
+        return self.folder / f"{name}{suffix}" if name and not name_problem(name) else None
 
     def _validate(self) -> None:
         # Shows the effect of the button, such as overwriting a file, and sets its text.
@@ -502,14 +511,14 @@ class FileSheet(Overlay):
         wants_folder = self.question.selects_folder
         opens_folder = not self.is_saving and not wants_folder and selected is not None and selected.is_folder
         parent_folder = target if wants_folder else target.parent if target else self.folder
-        writable = not self._can_create_folders or os.access(parent_folder or self.folder, os.W_OK)
-        self.done.setEnabled((target is not None and writable) or opens_folder)
+        is_writable = not self._can_create_folders or os.access(parent_folder or self.folder, os.W_OK)
+        self.done.setEnabled((target is not None and is_writable) or opens_folder)
         problem = self._problem() if self.is_saving else ""
         if problem:
             self._set_status(problem, "error")
-        elif not writable:
+        elif not is_writable:
             self._set_status(
-                _("You don't have permission to save in this folder. Choose another one."), "error"
+                _("You don't have permission to save in this folder. Choose another folder."), "error"
             )
         elif already_exists and target is not None:
             name = target.name.removesuffix(SUFFIX)
@@ -518,7 +527,7 @@ class FileSheet(Overlay):
             )
         elif wants_folder and target is not None:
             name = target.name or str(target)
-            self._set_status(_("Images will be saved in “{folder}”.").format(folder=name), "text")
+            self._set_status(_("Files will be saved in “{folder}”.").format(folder=name), "text")
         elif not self.list.topLevelItemCount():
             self._set_status(_(self.question.empty), "textSecondary")
         else:

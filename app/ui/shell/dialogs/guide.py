@@ -97,8 +97,8 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
     pages = []
     language_folder = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
     for path in sorted((folder / ENGLISH).glob("*.md")):
-        translated = language_folder / path.name
-        text = read_regular_file(translated if translated.is_file() else path).decode("utf-8")
+        translated_path = language_folder / path.name
+        text = read_regular_file(translated_path if translated_path.is_file() else path).decode("utf-8")
         text = _KEY_PATTERN.sub(lambda found: f"**{shortcut_text(key_of(found[1])) or '-'}**", text)
         title = text.partition("\n")[0].lstrip("# ")
         pages.append(GuidePage(title, text, (language_folder, folder / ENGLISH)))
@@ -131,7 +131,7 @@ class PageView(QTextBrowser):
     def loadResource(self, kind: int, name: QUrl | str) -> object:
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
-        path = self._page.picture(QUrl(name).toString(), dark=self._theme.dark)
+        path = self._page.picture(QUrl(name).toString(), dark=self._theme.is_dark)
         return QImage(str(path)) if path is not None else QImage()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -213,7 +213,7 @@ class GuideSheet(Overlay):
         theme.changed.connect(self._restyle)
 
     def _lay_out(self) -> None:
-        header = self.make_header(label(_("Guide"), "heading"))
+        header = self.create_header(label(_("Guide"), "heading"))
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(self.search)
@@ -299,12 +299,13 @@ class GuideSheet(Overlay):
             cursor.setPosition(block.position())
             if cursor.currentTable() is None:
                 block_format = block.blockFormat()
-                heading = block_format.headingLevel()
-                picture = "\ufffc" in block.text()
+                heading_level = block_format.headingLevel()
+                has_image = "\ufffc" in block.text()
                 block_format.setBottomMargin(self.theme.scaled(4 if block.textList() is not None else 10))
-                block_format.setTopMargin(self.theme.scaled(12 if heading > 1 else 6 if picture else 0))
+                top_margin = 12 if heading_level > 1 else 6 if has_image else 0
+                block_format.setTopMargin(self.theme.scaled(top_margin))
                 # above an image the larger line height would look like a gap
-                percent = 100.0 if picture else LINE_HEIGHT_PERCENT
+                percent = 100.0 if has_image else LINE_HEIGHT_PERCENT
                 block_format.setLineHeight(percent, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
                 cursor.setBlockFormat(block_format)
             for part in [each.fragment() for each in cast("Iterable[QTextBlock.iterator]", block)]:

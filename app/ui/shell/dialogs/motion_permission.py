@@ -19,7 +19,7 @@ from nep.i18n import _
 
 WIDTH = 480
 TOP_SHARE = 0.42  # below every Stop: those of the run bar and of the robots
-TILE, EDGE, BETWEEN = 40, 20, 10
+TILE_SIZE, MARGIN, BUTTON_GAP = 40, 20, 10
 
 
 class _Tile(QWidget):
@@ -28,13 +28,13 @@ class _Tile(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.setFixedSize(TILE, TILE)
+        self.setFixedSize(TILE_SIZE, TILE_SIZE)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         rect = QRectF(self.rect())
         paint.box(painter, rect, theme.radius("panel"), theme.colour("warnTint"), theme.colour("warnBorder"))
-        inset = TILE * 0.24
+        inset = TILE_SIZE * 0.24
         paint_icon(painter, rect.adjusted(inset, inset, -inset, -inset), "footprints", theme.colour("warn"))
         painter.end()
 
@@ -59,7 +59,7 @@ class MotionPermissionCard(QWidget):
         self._last_revision = permission.revision
         self._previous_focus: QWidget | None = None
         self._report_error = report_error
-        self._always_for = ""
+        self._always_text = ""
         self.title = label("", "heading", wrap=True)
         self.message = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always_switch = Switch(theme, "")
@@ -89,13 +89,13 @@ class MotionPermissionCard(QWidget):
         top.addWidget(_Tile(theme), 0, Qt.AlignmentFlag.AlignTop)
         top.addLayout(text_column, 1)
         footer = QHBoxLayout()
-        footer.setSpacing(BETWEEN)
+        footer.setSpacing(BUTTON_GAP)
         footer.addWidget(self.always_switch)
         footer.addStretch(1)
         footer.addWidget(self.cancel_button)
         footer.addWidget(self.allow_button)
         column = QVBoxLayout(self)
-        column.setContentsMargins(EDGE, 18, EDGE, 16)
+        column.setContentsMargins(MARGIN, 18, MARGIN, 16)
         column.setSpacing(16)
         column.addLayout(top)
         column.addLayout(footer)
@@ -112,10 +112,10 @@ class MotionPermissionCard(QWidget):
         names = list(question.names)
         self.title.setText(plain.make_breakable(question.title))
         self.message.setText(plain.make_breakable(question.message))
-        self._always_for = _("Always for these")
+        self._always_text = _("Always for these")
         if len(names) == 1:
-            self._always_for = _("Always for {robot}").format(robot=names[0])
-        self.always_switch.setAccessibleName(self._always_for)
+            self._always_text = _("Always for {robot}").format(robot=names[0])
+        self.always_switch.setAccessibleName(self._always_text)
         self.always_switch.setChecked(False)
         self.allow_button.set_label(_("Allow motion"))
         self.setAccessibleName(question.title)
@@ -138,7 +138,7 @@ class MotionPermissionCard(QWidget):
     def _answer(self, *, is_allowed: bool) -> None:
         try:
             self._permission.answer(
-                is_allowed=is_allowed, always=is_allowed and self.always_switch.isChecked()
+                is_allowed=is_allowed, is_permanent=is_allowed and self.always_switch.isChecked()
             )
         except SettingsError as error:
             self._report_error(error.sentence)
@@ -162,9 +162,9 @@ class MotionPermissionCard(QWidget):
 
     def _set_always_text(self, width: int) -> None:
         # The robot's name is on the switch only if it fits there; the title always contains it.
-        self.always_switch.setText(self._always_for)
+        self.always_switch.setText(self._always_text)
         buttons = self.cancel_button.sizeHint().width() + self.allow_button.sizeHint().width()
-        if self.always_switch.sizeHint().width() > width - 2 * EDGE - 2 * BETWEEN - buttons:
+        if self.always_switch.sizeHint().width() > width - 2 * MARGIN - 2 * BUTTON_GAP - buttons:
             self.always_switch.setText(_("Always"))
         self.always_switch.updateGeometry()
 

@@ -51,8 +51,8 @@ class NameSheet(Overlay):
         self,
         question: str,
         verb: str,
-        refusal: Callable[[str], str],
-        take: Callable[[str], object],
+        rejection_reason: Callable[[str], str],
+        callback: Callable[[str], object],
         name: str = "",
     ) -> None:
         """Open the sheet to ask for a name.
@@ -60,11 +60,11 @@ class NameSheet(Overlay):
         Args:
             question: Title of the sheet.
             verb: Text of the button.
-            refusal: Returns the reason why a name is invalid, as a sentence, or "".
-            take: Called with the name if it is valid.
+            rejection_reason: Returns the reason why a name is invalid, as a sentence, or "".
+            callback: Called with the name if it is valid.
             name: Initial text.
         """
-        self._rejection_reason, self._callback = refusal, take
+        self._rejection_reason, self._callback = rejection_reason, callback
         self.setAccessibleName(question)
         self.heading.setText(question)
         self.field.setAccessibleName(question)

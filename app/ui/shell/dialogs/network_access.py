@@ -37,12 +37,12 @@ class NetworkAccessSheet(Overlay):
         self.setting_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.copy = IconButton(theme, "copy", _("Copy setting"))
         self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.setting_label.text()))
-        self.yes = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
-        self.no = Button(theme, _("Cancel"), size="form")
-        self.end = Button(theme, _("This computer only"), "lock", size="form")
-        self.yes.clicked.connect(self._allow_access)
-        self.no.clicked.connect(self.dismiss)
-        self.end.clicked.connect(self._revoke_access)
+        self.allow_button = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
+        self.cancel_button = Button(theme, _("Cancel"), size="form")
+        self.revoke_button = Button(theme, _("This computer only"), "lock", size="form")
+        self.allow_button.clicked.connect(self._allow_access)
+        self.cancel_button.clicked.connect(self.dismiss)
+        self.revoke_button.clicked.connect(self._revoke_access)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -64,12 +64,12 @@ class NetworkAccessSheet(Overlay):
         row = QHBoxLayout()
         row.setSpacing(8)
         row.addStretch(1)
-        for button in (self.end, self.no, self.yes):
+        for button in (self.revoke_button, self.cancel_button, self.allow_button):
             row.addWidget(button)
         column.addLayout(row)
 
     def initial_focus(self) -> QWidget:
-        return self.no
+        return self.cancel_button
 
     def preferred_size(self, room: QSize) -> QSize:
         layout = self.layout()
@@ -102,10 +102,10 @@ class NetworkAccessSheet(Overlay):
         self._show_setting(access.hosts[0] if is_open else addresses[0].host if addresses else "")
         for widget in (self.setting_label, self.copy, self.setting_title):
             paint.show_when(widget, is_open or can_open)
-        paint.show_when(self.yes, can_open and not is_open)
-        paint.show_when(self.end, is_open and access.is_local)
-        is_notice = self.yes.isHidden() and self.end.isHidden()
-        self.no.set_label(_("Close") if is_notice else _("Cancel"))
+        paint.show_when(self.allow_button, can_open and not is_open)
+        paint.show_when(self.revoke_button, is_open and access.is_local)
+        is_notice = self.allow_button.isHidden() and self.revoke_button.isHidden()
+        self.cancel_button.set_label(_("Close") if is_notice else _("Cancel"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:

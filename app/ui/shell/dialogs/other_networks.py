@@ -21,7 +21,7 @@ from nep.i18n import _, lazy, ngettext
 WIDTH = 560
 SWITCH_WIDTH = 132
 REFRESH_MS = 300
-SIDE, GAP, SCROLL_BAR = 19, 12, 10
+SIDE_MARGIN, GAP, SCROLL_BAR_WIDTH = 19, 12, 10
 INTRODUCTION = lazy(
     "Studio shows its own network. Turn on another network to see its topics and nodes as "
     "well. Studio only receives there and sends nothing."
@@ -40,7 +40,7 @@ class OtherNetworksSheet(Overlay):
         self._content = QWidget()
         self._content.setProperty("bare", "true")
         content_column = QVBoxLayout(self._content)
-        content_column.setContentsMargins(SIDE, 0, SIDE, 0)
+        content_column.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         content_column.setSpacing(GAP)
         content_column.addWidget(self.introduction)
         for row in self.rows:
@@ -53,8 +53,8 @@ class OtherNetworksSheet(Overlay):
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
         self._area.setWidget(self._content)
-        self._header = self.make_header(label(_("Other networks"), "heading"))
-        self._header.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._header = self.create_header(label(_("Other networks"), "heading"))
+        self._header.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
         column.setSpacing(10)
@@ -69,12 +69,13 @@ class OtherNetworksSheet(Overlay):
         return self.rows[0].switch
 
     def preferred_size(self, room: QSize) -> QSize:
-        min_width = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
+        row_width = max(row.minimumSizeHint().width() for row in self.rows)
+        min_width = row_width + 2 + 2 * SIDE_MARGIN + SCROLL_BAR_WIDTH
         width = min(room.width(), max(round(self.theme.scaled(WIDTH)), min_width))
-        inner = width - 2 - 2 * SIDE - SCROLL_BAR
-        height = self.introduction.heightForWidth(inner)
+        content_width = width - 2 - 2 * SIDE_MARGIN - SCROLL_BAR_WIDTH
+        height = self.introduction.heightForWidth(content_width)
         # measured per row, because layout items are updated late after a change of text
-        height += sum(row.height_for(inner) + 1 + 2 * GAP for row in self.rows)
+        height += sum(row.height_for(content_width) + 1 + 2 * GAP for row in self.rows)
         return QSize(width, min(room.height(), height + self._header.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:

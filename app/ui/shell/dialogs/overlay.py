@@ -49,22 +49,22 @@ class StopButtonWatcher(QObject):
     def __init__(self, window: QWidget, parent: QObject) -> None:
         super().__init__(parent)
         self._window = window
-        self._watched: list[QWidget] = []
+        self._watched_widgets: list[QWidget] = []
 
     def watch(self) -> None:
         """Observe all Stop buttons, including hidden ones, until `unwatch` is called."""
         self.unwatch()
         for stop in self._window.findChildren(StopButton):
             widget: QWidget | None = stop
-            while widget is not None and widget is not self._window and widget not in self._watched:
-                self._watched.append(widget)
+            while widget is not None and widget is not self._window and widget not in self._watched_widgets:
+                self._watched_widgets.append(widget)
                 widget.installEventFilter(self)
                 widget = widget.parentWidget()
 
     def unwatch(self) -> None:
         """Stop observing the buttons."""
-        watched, self._watched = self._watched, []
-        for widget in watched:
+        widgets, self._watched_widgets = self._watched_widgets, []
+        for widget in widgets:
             if isValid(widget):
                 widget.removeEventFilter(self)
 
@@ -85,7 +85,7 @@ class Scrim(QWidget):
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
         self._theme = theme
-        self.strength = 0.0
+        self.opacity = 0.0
         self.surface: QWidget | None = None
         self.hide()
 
@@ -103,9 +103,9 @@ class Scrim(QWidget):
         self.setMask(region)
         self.update()
 
-    def set_opacity(self, strength: float) -> None:
+    def set_opacity(self, opacity: float) -> None:
         """Set the opacity, from 0 (transparent) to 1."""
-        self.strength = strength
+        self.opacity = opacity
         self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -114,9 +114,9 @@ class Scrim(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        dark = self._theme.colour("scrim")
-        dark.setAlphaF(dark.alphaF() * self.strength)
-        painter.fillRect(self.rect(), dark)
+        scrim_colour = self._theme.colour("scrim")
+        scrim_colour.setAlphaF(scrim_colour.alphaF() * self.opacity)
+        painter.fillRect(self.rect(), scrim_colour)
         if self.surface is not None:
             self._paint_shadow(painter, QRectF(self.surface.geometry()))
         painter.end()
@@ -124,13 +124,13 @@ class Scrim(QWidget):
     def _paint_shadow(self, painter: QPainter, rect: QRectF) -> None:
         # Painted as many thin boxes, because QGraphicsDropShadowEffect would repaint the sheet on every key.
         steps = SHADOW_PX // 2
-        shade = self._theme.colour("shadow")
-        shade.setAlphaF(min(1.0, shade.alphaF() * self.strength * 2.2 / steps))
+        shadow_colour = self._theme.colour("shadow")
+        shadow_colour.setAlphaF(min(1.0, shadow_colour.alphaF() * self.opacity * 2.2 / steps))
         radius = self._theme.radius("palette")
         for step in range(steps):
-            out = 2.0 * step - SHADOW_PX / 2
-            box = rect.translated(0, SHADOW_OFFSET_PX).adjusted(-out, -out, out, out)
-            paint.box(painter, box, radius + max(0.0, out), shade)
+            outset = 2.0 * step - SHADOW_PX / 2
+            box = rect.translated(0, SHADOW_OFFSET_PX).adjusted(-outset, -outset, outset, outset)
+            paint.box(painter, box, radius + max(0.0, outset), shadow_colour)
 
 
 class Overlay(QWidget):
@@ -155,15 +155,15 @@ class Overlay(QWidget):
         self._scrim = Scrim(theme, window)
         self._scrim.surface = self
         self._scrim.pressed.connect(self.dismiss)
-        self._stops = StopButtonWatcher(window, self)
-        self._stops.changed.connect(self._on_stop_moved)
+        self._stop_watcher = StopButtonWatcher(window, self)
+        self._stop_watcher.changed.connect(self._on_stop_moved)
         self._previous_focus: QWidget | None = None
-        self._opening = QVariantAnimation(self)
-        self._opening.setStartValue(0.0)
-        self._opening.setEndValue(1.0)
-        self._opening.setEasingCurve(QEasingCurve.Type.OutCubic)
-        self._opening.valueChanged.connect(self._set_progress)
-        self._opening.finished.connect(self._finish_opening)
+        self._open_animation = QVariantAnimation(self)
+        self._open_animation.setStartValue(0.0)
+        self._open_animation.setEndValue(1.0)
+        self._open_animation.setEasingCurve(QEasingCurve.Type.OutCubic)
+        self._open_animation.valueChanged.connect(self._set_progress)
+        self._open_animation.finished.connect(self._finish_opening)
         theme.changed.connect(self.place)
         self.hide()
 
@@ -186,7 +186,7 @@ class Overlay(QWidget):
         self._previous_focus = QApplication.focusWidget()
         window = self.covered_window()
         window.installEventFilter(self)
-        self._stops.watch()
+        self._stop_watcher.watch()
         self.place()
         self._scrim.show()
         self._scrim.raise_()
@@ -194,8 +194,8 @@ class Overlay(QWidget):
         if duration:
             self.setGraphicsEffect(QGraphicsOpacityEffect(self))
             self._set_progress(0.0)
-            self._opening.setDuration(duration)
-            self._opening.start()
+            self._open_animation.setDuration(duration)
+            self._open_animation.start()
         else:
             self._scrim.set_opacity(1.0)
         self.show()
@@ -205,7 +205,7 @@ class Overlay(QWidget):
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
 
-    def make_header(self, heading: QWidget) -> QHBoxLayout:
+    def create_header(self, heading: QWidget) -> QHBoxLayout:
         """Return a layout for the top of the sheet, with a heading and a close button."""
         close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.dismiss)
@@ -223,8 +223,8 @@ class Overlay(QWidget):
         if isinstance(application, QApplication):
             application.focusChanged.disconnect(self._focus_changed)
         self.covered_window().removeEventFilter(self)
-        self._stops.unwatch()
-        self._opening.stop()
+        self._stop_watcher.unwatch()
+        self._open_animation.stop()
         self._finish_opening()
         before = self._previous_focus
         if had_focus and before is not None and isValid(before) and before.isVisible():
@@ -245,10 +245,10 @@ class Overlay(QWidget):
         """
         window = self.covered_window()
         geometry = self._geometry_at(self.top)
-        stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
-        covered = [stop for stop in stops if stop.intersects(geometry)]
-        if covered:
-            geometry = self._geometry_at(max(stop.bottom() for stop in covered) + STOP_GAP)
+        stop_rects = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
+        covered_stops = [stop for stop in stop_rects if stop.intersects(geometry)]
+        if covered_stops:
+            geometry = self._geometry_at(max(stop.bottom() for stop in covered_stops) + STOP_GAP)
         if geometry != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
             self.setGeometry(geometry)
             self._scrim.cover()
@@ -304,18 +304,18 @@ class Overlay(QWidget):
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         if new is None or QApplication.activePopupWidget() is not None or new.window() is not self.window():
             return
-        above: QWidget | None = new
-        while above is not None and not (isinstance(above, Overlay) and above.is_nested):
-            above = above.parentWidget()
-        if above is None and new is not self and not self.isAncestorOf(new):
+        ancestor: QWidget | None = new
+        while ancestor is not None and not (isinstance(ancestor, Overlay) and ancestor.is_nested):
+            ancestor = ancestor.parentWidget()
+        if ancestor is None and new is not self and not self.isAncestorOf(new):
             self.dismiss()
 
-    def _set_progress(self, share: object) -> None:
-        strength = float(share) if isinstance(share, float) else 1.0
-        self._scrim.set_opacity(strength)
+    def _set_progress(self, progress: object) -> None:
+        opacity = float(progress) if isinstance(progress, float) else 1.0
+        self._scrim.set_opacity(opacity)
         effect = self.graphicsEffect()
         if isinstance(effect, QGraphicsOpacityEffect):
-            effect.setOpacity(max(0.01, strength))
+            effect.setOpacity(max(0.01, opacity))
 
     def _finish_opening(self) -> None:
         self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None removes the effect

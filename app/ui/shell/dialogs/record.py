@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from app.ui.panels.base import ShowToast
     from nep.recordings.recorder import TopicSelection
 
-WIDTH, HEIGHT, SIDE = 640, 812, 20
+WIDTH, HEIGHT, SIDE_MARGIN = 640, 812, 20
 MIN_DOCKED_WIDTH = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
 TOP_OFFSET = 88
 REFRESH_MS = 300
@@ -106,31 +106,31 @@ class RecordSheet(Overlay):
         # `save_last` saves the contents of the flight recorder.
         super().__init__(theme, window, _("Record"))
         self._session, self._recordings, self._show_toast = session, session.recordings, show_toast
-        self._last_state: object = None
-        self._included: set[str] = set()
-        self._last_size: tuple[float, int] | None = None
-        self._speed: float | None = None
-        self._make_meters()
-        self._make_form()
-        self._make_flight_recorder(save_last)
-        self._make_footer()
+        self._last_topics_state: object = None
+        self._included_topics: set[str] = set()
+        self._last_sample: tuple[float, int] | None = None
+        self._write_bandwidth_Bps: float | None = None
+        self._create_meters()
+        self._create_form()
+        self._create_flight_recorder(save_last)
+        self._create_footer()
         self._arrange()
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
         self._timer.timeout.connect(self.show_state)
         self.closed.connect(self._timer.stop)
 
-    def _make_meters(self) -> None:
+    def _create_meters(self) -> None:
         self.length = RecordMeter(_("Length"))
         self.current_size = RecordMeter(_("Current size"))
         self.write_errors = RecordMeter(_("Write errors"))
         self.disk = RecordMeter(_("Free space"))
-        self.at_end = RecordMeter(_("Expected"))
+        self.expected_size = RecordMeter(_("Expected"))
         self._meters = Card(self.theme)
         row = QHBoxLayout(self._meters)
         row.setContentsMargins(1, 1, 1, 1)
         row.setSpacing(0)
-        meters = (self.length, self.current_size, self.write_errors, self.disk, self.at_end)
+        meters = (self.length, self.current_size, self.write_errors, self.disk, self.expected_size)
         for index, meter in enumerate(meters):
             if index:
                 self._end_line = Separator(self.theme, upright=True)
@@ -138,7 +138,7 @@ class RecordSheet(Overlay):
             row.addWidget(meter, 1)
         self._show_end(None)
 
-    def _make_form(self) -> None:
+    def _create_form(self) -> None:
         theme = self.theme
         self.name = self._field(_("Name"), _("default: date and time"))
         self.note = self._field(_("Note"), _("subject"))
@@ -159,23 +159,23 @@ class RecordSheet(Overlay):
         self.table.opened.connect(self._toggle_topic)
         self.table.order_changed.connect(self._show_topics)
         self.table.setMinimumHeight(MIN_TABLE_HEIGHT)
-        self.later = label(
+        self.new_topics_hint = label(
             _("New matching topics are recorded from their first message."), "small", role="textTertiary",
             wrap=True,
         )  # fmt: skip
 
         self.limit_minutes = NumberEdit(
-            theme, MIN_MINUTES, MAX_MINUTES, pgettext("minutes", "min"), 1, empty=True
+            theme, MIN_MINUTES, MAX_MINUTES, pgettext("minutes", "min"), 1, may_be_empty=True
         )
         self.limit_minutes.setAccessibleName(_("Stop after (minutes)"))
-        self.limit_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
+        self.limit_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, may_be_empty=True)
         self.limit_gb.setAccessibleName(_("Stop at (GB)"))
         for field, name in ((self.limit_minutes, "max_minutes"), (self.limit_gb, "max_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDTH)))
-            field.number.connect(lambda value, name=name: self._update_limits(**{name: value}))
+            field.number_entered.connect(lambda value, name=name: self._update_limits(**{name: value}))
             field.cleared.connect(lambda name=name: self._update_limits(**{name: None}))
             field.problem_changed.connect(self._show_limits_problem)
-        self.ends_words = label("", "small", role="textSecondary", wrap=True)
+        self.limits_hint = label("", "small", role="textSecondary", wrap=True)
 
     def _field(self, name: str, example: str) -> QLineEdit:
         field = QLineEdit()
@@ -186,28 +186,28 @@ class RecordSheet(Overlay):
         FieldContextMenu(self.theme, field)
         return field
 
-    def _make_flight_recorder(self, save_last: Callable[[], None]) -> None:
+    def _create_flight_recorder(self, save_last: Callable[[], None]) -> None:
         theme = self.theme
         self.ring = Switch(theme, _("Flight recorder"))
         self.ring.clicked.connect(self._toggle_flight_recorder)
         self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"))
         self.seconds.setAccessibleName(_("Seconds to keep"))
-        self.seconds.number.connect(lambda value: self._update_flight_recorder(seconds=round(value)))
+        self.seconds.number_entered.connect(lambda value: self._update_flight_recorder(seconds=round(value)))
         self.size_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1)
         self.size_gb.setAccessibleName(_("Maximum size on disk (GB)"))
-        self.size_gb.number.connect(lambda value: self._update_flight_recorder(size_gb=value))
+        self.size_gb.number_entered.connect(lambda value: self._update_flight_recorder(size_gb=value))
         for field in (self.seconds, self.size_gb):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDTH)))
             field.problem_changed.connect(self._show_flight_recorder_problem)
         self.ring_topics = PatternField(theme, _("Topics to keep"), _("all topics; or /arm/* *camera*"))
         self.ring_topics.editing_finished.connect(self._apply_flight_recorder_topics)
         self.ring_bar = ValueBar(theme)
-        self.ring_words = label("", "small", role="textSecondary", wrap=True)
+        self.ring_text = label("", "small", role="textSecondary", wrap=True)
         self.keep = Button(theme, "", "history", size="small")
         assign_command(self.keep, "recording.keep")
         self.keep.clicked.connect(save_last)
 
-    def _make_footer(self) -> None:
+    def _create_footer(self) -> None:
         theme = self.theme
         self.foot = label(
             _("At most 1 s of data is lost in a power failure"), "small", role="textTertiary", wrap=True
@@ -238,7 +238,7 @@ class RecordSheet(Overlay):
         title = label(_("Stop"), "body", role="textSecondary")
         title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDTH)))
         labels = [label(_("after")), label(_("or at"))]
-        return _flow(title, labels[0], self.limit_minutes, labels[1], self.limit_gb, self.ends_words)
+        return _flow(title, labels[0], self.limit_minutes, labels[1], self.limit_gb, self.limits_hint)
 
     def _flight_recorder_card(self) -> Card:
         box = Card(self.theme, fill="sunken")
@@ -248,22 +248,22 @@ class RecordSheet(Overlay):
         labels = [label(each) for each in (_("keeps the last"), _("using up to"), _("on disk"))]
         self.ring_bar.setFixedWidth(round(self.theme.scaled(BAR_WIDTH)))
         settings_row = _flow(self.ring, labels[0], self.seconds, labels[1], self.size_gb, labels[2])
-        state_row = _flow(self.ring_bar, self.ring_words, self.keep)
+        state_row = _flow(self.ring_bar, self.ring_text, self.keep)
         rows.addLayout(settings_row)
         rows.addWidget(self.ring_topics)
         rows.addLayout(state_row)
         return box
 
-    def _make_scroll_area(self) -> QScrollArea:
+    def _create_scroll_area(self) -> QScrollArea:
         self._content = QWidget()
         self._content.setProperty("bare", "true")
         column = QVBoxLayout(self._content)
-        column.setContentsMargins(SIDE, 0, SIDE, 4)
+        column.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 4)
         column.setSpacing(12)
         column.addWidget(self._meters)
         column.addLayout(self._form_rows())
         column.addWidget(self.table, 1)
-        column.addWidget(self.later)
+        column.addWidget(self.new_topics_hint)
         column.addLayout(self._limits_row())
         column.addWidget(self._flight_recorder_card())
         area = QScrollArea()
@@ -275,11 +275,11 @@ class RecordSheet(Overlay):
         return area
 
     def _arrange(self) -> None:
-        self._area = self._make_scroll_area()
-        header = self.make_header(label(_("Record"), "heading"))
-        header.setContentsMargins(SIDE, 0, 12, 0)
+        self._area = self._create_scroll_area()
+        header = self.create_header(label(_("Record"), "heading"))
+        header.setContentsMargins(SIDE_MARGIN, 0, 12, 0)
         footer = QHBoxLayout()
-        footer.setContentsMargins(SIDE, 0, SIDE, 0)
+        footer.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         footer.setSpacing(8)
         footer.addWidget(self.foot, 1)
         footer.addWidget(self.bookmark)
@@ -373,7 +373,7 @@ class RecordSheet(Overlay):
     def choice(self) -> RecordingChoice:
         """Topics and limits of the current recording or, if there is none, of the next one."""
         recordings = self._recordings
-        return recordings.recorded if recordings.is_recording else recordings.choice
+        return recordings.active_choice if recordings.is_recording else recordings.choice
 
     def _selection(self) -> TopicSelection | None:
         choice = self.choice
@@ -385,7 +385,7 @@ class RecordSheet(Overlay):
             return None
 
     def _is_included(self, topic: str) -> bool:
-        return topic in self._included
+        return topic in self._included_topics
 
     def _show_settings(self) -> None:
         choice, settings = self.choice, self._recordings.ring_settings
@@ -405,7 +405,7 @@ class RecordSheet(Overlay):
         self.ring_topics.set_invalid(bool(settings.problem))
         self.seconds.show_number(settings.seconds)
         self.size_gb.show_number(settings.size_gb)
-        self._last_state = None
+        self._last_topics_state = None
 
     def _show_pattern_problem(self, problem: str) -> None:
         self.pattern_error.setText(problem)
@@ -424,31 +424,35 @@ class RecordSheet(Overlay):
         self._show_meters()
         self._show_topics()
         self._show_flight_recorder()
-        no_master = self._session.master.kind != "connected"
+        is_master_missing = self._session.master.kind != "connected"
         self.foot.setText(
             _("Waiting for a master; recording starts when one appears")
-            if no_master
+            if is_master_missing
             else _("At most 1 s of data is lost in a power failure")
         )
 
     def _show_meters(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         if not recordings.is_recording:
-            self._last_size = self._speed = None
+            self._last_sample = self._write_bandwidth_Bps = None
             for meter in (self.length, self.current_size, self.write_errors, self.disk):
                 meter.set_value("")
             self._show_end(None)
             return
         elapsed = recordings.elapsed_s
-        if self._last_size is None or state.size_bytes < self._last_size[1]:
-            self._last_size = (elapsed, state.size_bytes)
-        elif elapsed - self._last_size[0] >= 1.0 and state.size_bytes != self._last_size[1]:
-            self._speed = (state.size_bytes - self._last_size[1]) / (elapsed - self._last_size[0])
-            self._last_size = (elapsed, state.size_bytes)
-        speed = self._speed
-        begins = state.phase == "starting"
-        self.length.set_value(length_text(elapsed), _("starting") if begins else _("recording"), "error")
-        written = _("{speed} written").format(speed=bandwidth_text(speed)) if speed is not None else ""
+        if self._last_sample is None or state.size_bytes < self._last_sample[1]:
+            self._last_sample = (elapsed, state.size_bytes)
+        elif elapsed - self._last_sample[0] >= 1.0 and state.size_bytes != self._last_sample[1]:
+            self._write_bandwidth_Bps = (state.size_bytes - self._last_sample[1]) / (
+                elapsed - self._last_sample[0]
+            )
+            self._last_sample = (elapsed, state.size_bytes)
+        bandwidth = self._write_bandwidth_Bps
+        is_starting = state.phase == "starting"
+        self.length.set_value(length_text(elapsed), _("starting") if is_starting else _("recording"), "error")
+        written = (
+            _("{speed} written").format(speed=bandwidth_text(bandwidth)) if bandwidth is not None else ""
+        )
         self.current_size.set_value(size_text(state.size_bytes), written)
         count = ngettext("{count} message", "{count} messages", state.unwritten_count)
         self.write_errors.set_value(
@@ -456,52 +460,54 @@ class RecordSheet(Overlay):
             _("the disk is too slow") if state.unwritten_count else _("all data written"),
             "warn" if state.unwritten_count else "ok",
         )
-        self._show_end(recordings.recorded.expected_end(elapsed, state.size_bytes, speed))
+        self._show_end(recordings.active_choice.expected_end(elapsed, state.size_bytes, bandwidth))
         free = state.free_bytes
         if free is None:
             self.disk.set_value("")
             return
-        left_s = free / speed if speed else MAX_DISPLAYED_S
-        full = _("full in {time}").format(time=age_text(left_s)) if left_s < MAX_DISPLAYED_S else ""
-        self.disk.set_value(size_text(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
+        remaining_s = free / bandwidth if bandwidth else MAX_DISPLAYED_S
+        full_text = (
+            _("full in {time}").format(time=age_text(remaining_s)) if remaining_s < MAX_DISPLAYED_S else ""
+        )
+        self.disk.set_value(size_text(free), full_text, "warn" if free < LOW_DISK_BYTES else "textSecondary")
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
         # Only for a recording with limits and a known data rate.
-        for widget in (self._end_line, self.at_end):
+        for widget in (self._end_line, self.expected_size):
             widget.setVisible(end is not None)
         if end is not None:
             at_s, size_bytes = end
-            self.at_end.set_value(size_text(size_bytes), _("at {time}").format(time=length_text(at_s)))
+            self.expected_size.set_value(size_text(size_bytes), _("at {time}").format(time=length_text(at_s)))
 
     def _show_limits_problem(self, message: str) -> None:
         # Explains the limits, or what is wrong with them.
-        both = bool(self.limit_minutes.text() and self.limit_gb.text())
-        none = not (self.limit_minutes.text() or self.limit_gb.text())
-        usual = _("whichever comes first") if both else _("no limit") if none else ""
-        self.ends_words.setText(message or usual)
-        set_role(self.ends_words, "error" if message else "textSecondary")
+        has_both = bool(self.limit_minutes.text() and self.limit_gb.text())
+        has_none = not (self.limit_minutes.text() or self.limit_gb.text())
+        default_hint = _("whichever comes first") if has_both else _("no limit") if has_none else ""
+        self.limits_hint.setText(message or default_hint)
+        set_role(self.limits_hint, "error" if message else "textSecondary")
 
     def _show_topics(self) -> None:
         topics = sorted(self._session.topics.existing_topics(), key=lambda topic: topic.name)
         state = (self._session.topics.revision, self.choice)
-        if state != self._last_state:
-            self._last_state = state
+        if state != self._last_topics_state:
+            self._last_topics_state = state
             selection = self._selection()
-            self._included = {
+            self._included_topics = {
                 each.name for each in topics if selection is not None and selection.has(each.name)
             }
             self.model.set_rows(self.table.order.sort(topics))
             self.table.viewport().update()
         else:
             self.table.refresh_visible()
-        included = [each for each in topics if each.name in self._included]
+        included = [each for each in topics if each.name in self._included_topics]
         bandwidth = sum(each.bandwidth_Bps or 0.0 for each in included)
         count = ngettext("{count} of {all}", "{count} of {all}", len(topics))
         text = count.format(count=group_digits(len(included)), all=group_digits(len(topics)))
         if bandwidth:
             text = _("{topics}, {bandwidth}").format(topics=text, bandwidth=bandwidth_text(bandwidth))
         self.count.setText(text)
-        self.later.setVisible(self.choice.mode != "chosen")
+        self.new_topics_hint.setVisible(self.choice.mode != "chosen")
 
     def _show_flight_recorder(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
@@ -510,7 +516,7 @@ class RecordSheet(Overlay):
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)
-            self.ring_words.setText(_("Starting…") if settings.is_on else _("Off: nothing is saved."))
+            self.ring_text.setText(_("Starting…") if settings.is_on else _("Off: nothing is saved."))
             return
         self.ring_bar.set_fraction(state.ring_s / settings.seconds)
         text = _("{count} s buffered, {size} of {most}").format(
@@ -518,13 +524,13 @@ class RecordSheet(Overlay):
             size=size_text(state.ring_bytes),
             most=size_text(settings.size_gb * _BYTES_PER_GB),
         )
-        self.ring_words.setText(text)
+        self.ring_text.setText(text)
 
     def _set_mode(self, mode: str) -> None:
         recordings = self._recordings
         choice = replace(recordings.choice, mode=mode)
         if mode == "chosen" and not choice.topics:
-            choice = replace(choice, topics=tuple(sorted(self._included)))
+            choice = replace(choice, topics=tuple(sorted(self._included_topics)))
         recordings.set_choice(choice)
         self._show_settings()
         self.show_state()
@@ -535,9 +541,9 @@ class RecordSheet(Overlay):
         if recordings.is_recording or recordings.choice.mode != "chosen":
             return
         topics = recordings.choice.topics
-        rest = tuple(each for each in topics if each != topic)
+        other_topics = tuple(each for each in topics if each != topic)
         recordings.set_choice(
-            replace(recordings.choice, topics=rest if topic in topics else (*topics, topic))
+            replace(recordings.choice, topics=other_topics if topic in topics else (*topics, topic))
         )
         self.show_state()
 
@@ -550,8 +556,8 @@ class RecordSheet(Overlay):
         self._show_limits_problem("")
 
     def _apply_patterns(self) -> None:
-        included, unwanted = self.patterns.patterns()
-        choice = replace(self._recordings.choice, patterns=included, excluded=unwanted)
+        included, excluded = self.patterns.patterns()
+        choice = replace(self._recordings.choice, patterns=included, excluded=excluded)
         self._show_pattern_problem(choice.problem)
         self._recordings.set_choice(choice)
         self.show_state()
@@ -567,16 +573,16 @@ class RecordSheet(Overlay):
         self._show_flight_recorder()
 
     def _apply_flight_recorder_topics(self) -> None:
-        included, unwanted = self.ring_topics.patterns()
-        problem = replace(self._recordings.ring_settings, patterns=included, excluded=unwanted).problem
+        included, excluded = self.ring_topics.patterns()
+        problem = replace(self._recordings.ring_settings, patterns=included, excluded=excluded).problem
         self.ring_topics.set_invalid(bool(problem))
         if problem:
             self._show_flight_recorder_problem(problem)
         else:
-            self._update_flight_recorder(patterns=included, excluded=unwanted)
+            self._update_flight_recorder(patterns=included, excluded=excluded)
 
     def _show_flight_recorder_problem(self, message: str) -> None:
-        self.ring_words.setText(message or self.ring_words.text())
+        self.ring_text.setText(message or self.ring_text.text())
 
     def _add_bookmark(self) -> None:
         self._recordings.client.add_bookmark("")

@@ -33,7 +33,7 @@ from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from app.ui.widgets.inputs.fields import LongTextField
 from nep.i18n import _, lazy
 
-WIDTH, SIDE, SCROLL_BAR = 620, 19, 10
+WIDTH, SIDE_MARGIN, SCROLL_BAR_WIDTH = 620, 19, 10
 POLL_MS = 50
 ICON_SIZE = 15
 ZIP_KIND = FileKind(lazy("Zip file"), FILE_SUFFIX)
@@ -100,8 +100,8 @@ class ReportSheet(Overlay):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._header = self.make_header(label(_("Report a problem"), "heading"))
-        self._header.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._header = self.create_header(label(_("Report a problem"), "heading"))
+        self._header.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         self._content = QWidget()
         self._content.setProperty("bare", "true")
         self._fill(QVBoxLayout(self._content))
@@ -112,7 +112,7 @@ class ReportSheet(Overlay):
         self._area.viewport().setAutoFillBackground(False)
         self._area.setWidget(self._content)
         self._footer = QHBoxLayout()
-        self._footer.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._footer.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         self._footer.setSpacing(10)
         self._footer.addStretch(1)
         self._footer.addWidget(self.write)
@@ -123,13 +123,13 @@ class ReportSheet(Overlay):
         column.addLayout(self._header)
         column.addWidget(self._area, 1)
         self._state_layout = QHBoxLayout()
-        self._state_layout.setContentsMargins(SIDE, 0, SIDE, 0)
+        self._state_layout.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 0)
         self._state_layout.addWidget(self.state)
         column.addLayout(self._state_layout)
         column.addLayout(self._footer)
 
     def _fill(self, column: QVBoxLayout) -> None:
-        column.setContentsMargins(SIDE, 0, SIDE, 4)
+        column.setContentsMargins(SIDE_MARGIN, 0, SIDE_MARGIN, 4)
         column.setSpacing(6)
         column.addWidget(self.introduction)
         column.addSpacing(6)
@@ -140,12 +140,12 @@ class ReportSheet(Overlay):
         column.addLayout(self.list)
         column.addSpacing(6)
         column.addWidget(label(_("Not included"), "title"))
-        left_out = QVBoxLayout()
-        left_out.setSpacing(4)
+        excluded_column = QVBoxLayout()
+        excluded_column.setSpacing(4)
         self._excluded_rows = [_PartRow(self.theme, _(text), "x") for text in EXCLUDED_PARTS]
         for line in self._excluded_rows:
-            left_out.addWidget(line)
-        column.addLayout(left_out)
+            excluded_column.addWidget(line)
+        column.addLayout(excluded_column)
         column.addSpacing(6)
         column.addWidget(self.work)
         column.addWidget(self.names)
@@ -180,14 +180,14 @@ class ReportSheet(Overlay):
         return self.description.edit
 
     def preferred_size(self, room: QSize) -> QSize:
-        buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
+        buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE_MARGIN + 40
         width = min(room.width(), max(round(self.theme.scaled(WIDTH)), buttons))
         layout = self._content.layout()
-        inner = width - 2 - SCROLL_BAR
-        content_height = layout.totalHeightForWidth(inner) if layout is not None else 0
+        content_width = width - 2 - SCROLL_BAR_WIDTH
+        content_height = layout.totalHeightForWidth(content_width) if layout is not None else 0
         footer_height = self._footer.sizeHint().height()
         if self.state.text():
-            footer_height += self.state.heightForWidth(width - 2 - 2 * SIDE) + 10
+            footer_height += self.state.heightForWidth(width - 2 - 2 * SIDE_MARGIN) + 10
         height = content_height + self._header.sizeHint().height() + footer_height + 14 + 2 * 10 + 16 + 4
         return QSize(width, min(room.height(), height))
 
@@ -215,11 +215,11 @@ class ReportSheet(Overlay):
         parts = self._parts
         if parts is None or self._writer is not None:
             return
-        happened = self.description.text()
+        description = self.description.text()
         behaviours = tuple(self._behaviours()) if self.work.isChecked() else ()
         # A copy, because settings may change while the thread reads them.
         parts_copy = replace(parts, settings=dict(parts.settings))
-        self._writer = ReportWriter(path, lambda: create_report(parts_copy, happened, behaviours))
+        self._writer = ReportWriter(path, lambda: create_report(parts_copy, description, behaviours))
         self._set_status(_("Writing the report."))
         self._poll_timer.start()
 
@@ -233,7 +233,7 @@ class ReportSheet(Overlay):
             self._set_status(f"{writer.problem[:1].upper()}{writer.problem[1:]}.", "error")
             message = self.state.text()
         else:
-            message = _("The report is in {file}").format(file=without_home(str(writer.path)))
+            message = _("Report saved to {file}").format(file=without_home(str(writer.path)))
             self._set_status(message, path=writer.path)
             self.description.set_text("")
         if self.isVisible():

@@ -46,15 +46,16 @@ class SettingsSheet(Overlay):
         window: QWidget,
         state: WindowState,
         settings: Settings,
-        files: FileDialogs,
-        voice: Callable[[], str],
+        dialogs: FileDialogs,
+        get_voice_text: Callable[[], str],
         *,
         restart: Callable[[], object] | None = None,
     ) -> None:
-        # `voice` describes the speech output and is called whenever the sheet opens. `restart` restarts
-        # Studio and reopens all documents; None if that is impossible.
+        # `get_voice_text` describes the speech output and is called whenever the sheet opens. `restart`
+        # restarts Studio and reopens all documents; None if that is impossible.
         super().__init__(theme, window, _("Settings"))
-        self._state, self._settings, self._files, self._voice = state, settings, files, voice
+        self._state, self._settings, self._dialogs = state, settings, dialogs
+        self._get_voice_text = get_voice_text
         self.language = self._language_input()
         self.restart_hint = label(_("Applies after restarting Studio"), "body", role="textSecondary")
         self.restart = Button(theme, _("Restart now"), "rotate-ccw", size="form")
@@ -67,9 +68,9 @@ class SettingsSheet(Overlay):
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
-        wishes = [(preference, _(PREFERENCE_LABELS[preference]), None) for preference in PREFERENCES]
-        self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
-        self.motion = Segments(theme, wishes, check=True, size="form", name=_("Reduce motion"))
+        preferences = [(preference, _(PREFERENCE_LABELS[preference]), None) for preference in PREFERENCES]
+        self.contrast = Segments(theme, preferences, check=True, size="form", name=_("High contrast"))
+        self.motion = Segments(theme, preferences, check=True, size="form", name=_("Reduce motion"))
         self.robots = Switch(theme, _("Reopen at startup"))
         self.voice = label("", "body", role="textSecondary", wrap=True)
         self.shortcuts = Button(theme, _("Change shortcuts"), "keyboard", size="form")
@@ -98,7 +99,7 @@ class SettingsSheet(Overlay):
         return segments
 
     def _lay_out(self) -> None:
-        header = self.make_header(label(_("Settings"), "heading"))
+        header = self.create_header(label(_("Settings"), "heading"))
         header.setContentsMargins(19, 0, 19, 0)
         self._content = QWidget()
         self._content.setProperty("bare", "true")
@@ -119,9 +120,9 @@ class SettingsSheet(Overlay):
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(12)
         grid.setColumnStretch(1, 1)
-        pictures = QHBoxLayout()
-        pictures.addWidget(self.folder, 1)
-        pictures.addWidget(self.choose)
+        folder_row = QHBoxLayout()
+        folder_row.addWidget(self.folder, 1)
+        folder_row.addWidget(self.choose)
         language_row = QHBoxLayout()
         language_row.addWidget(self.language)
         language_row.addWidget(self.restart_hint)
@@ -138,7 +139,7 @@ class SettingsSheet(Overlay):
             (_("Virtual robots"), self.robots),
             (_("Robot voice"), voice_row),
             (_("Keyboard"), self.shortcuts),
-            (_("Images"), pictures),
+            (_("Images"), folder_row),
         )
         for row, (text, control) in enumerate(rows):
             caption = label(text, "bodyLarge", role="textSecondary")
@@ -161,7 +162,7 @@ class SettingsSheet(Overlay):
 
     def open(self) -> None:
         """Update the sheet to the current settings and open it."""
-        self.voice.setText(self._voice())
+        self.voice.setText(self._get_voice_text())
         self._show()
         super().open()
 
@@ -169,9 +170,9 @@ class SettingsSheet(Overlay):
         theme = self.theme
         language = self._selected_language()
         self.language.set_value(language)
-        is_new = language != i18n.language()
-        self.restart_hint.setVisible(is_new and not self._can_restart)
-        self.restart.setVisible(is_new and self._can_restart)
+        is_changed = language != i18n.language()
+        self.restart_hint.setVisible(is_changed and not self._can_restart)
+        self.restart.setVisible(is_changed and self._can_restart)
         self.mode.set_value(theme.mode)
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
@@ -208,7 +209,7 @@ class SettingsSheet(Overlay):
 
     def _ask_folder(self) -> None:
         before = str(snapshots.folder(self._settings))
-        self._files.select_folder(before, self.save_folder)
+        self._dialogs.select_folder(before, self.save_folder)
 
     def save_folder(self, folder: Path) -> None:
         """Set and save the folder for images."""

@@ -45,7 +45,7 @@ class ShortcutSheet(Overlay):
         super().__init__(theme, window, _("Keyboard shortcuts"))
         self._shortcuts = shortcuts
         self._recorded_command = ""
-        self._offer: tuple[str, str] | None = None  # command, and the key that another command holds
+        self._pending_assignment: tuple[str, str] | None = None  # command, and the key that another one holds
         self.field = SearchField(theme, _("Find a command or key"))
         self.rows = EntryList(theme, _("Keyboard shortcuts"))
         self.hint = label(_(HINT), "body", role="textSecondary", wrap=True)
@@ -63,7 +63,7 @@ class ShortcutSheet(Overlay):
         shortcuts.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        header = self.make_header(label(_("Keyboard shortcuts"), "heading"))
+        header = self.create_header(label(_("Keyboard shortcuts"), "heading"))
         footer = QHBoxLayout()
         footer.setSpacing(8)
         footer.addWidget(self.hint, 1)
@@ -72,9 +72,9 @@ class ShortcutSheet(Overlay):
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 14)
         column.setSpacing(10)
-        for part, sides in ((header, 19), (self.field, 19), (self.rows, 0), (footer, 19)):
+        for part, margin in ((header, 19), (self.field, 19), (self.rows, 0), (footer, 19)):
             row = QHBoxLayout()
-            row.setContentsMargins(sides, 0, sides, 0)
+            row.setContentsMargins(margin, 0, margin, 0)
             if isinstance(part, QWidget):
                 row.addWidget(part)
             else:
@@ -132,10 +132,10 @@ class ShortcutSheet(Overlay):
             group_name = command.menu or GROUP_LABELS.get(command.id.partition(".")[0], "View")
             group = groups.setdefault(_(group_name), [])
             group.append(Entry(f"command:{command.id}", command.label, "", note, keys))
-        for number, fixed in enumerate(FIXED_KEYS):
-            keys = "\n".join(fixed.key.split(", "))
-            groups.setdefault(_(fixed.scope), []).append(
-                Entry(f"fixed:{number}", _(fixed.label), "", _("always"), keys)
+        for number, fixed_key in enumerate(FIXED_KEYS):
+            keys = "\n".join(fixed_key.keys.split(", "))
+            groups.setdefault(_(fixed_key.scope), []).append(
+                Entry(f"fixed:{number}", _(fixed_key.label), "", _("always"), keys)
             )
         return [(heading, entry) for heading, entries in groups.items() for entry in entries]
 
@@ -155,10 +155,10 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._set_status(_("The shortcut of “{command}” wasn't changed.").format(command=entry.text))
+            self._set_status(_("The shortcut of “{command}” can't be changed.").format(command=entry.text))
             return
-        self._recorded_command, self._offer = entry.name, None
-        self.rows.delegate.waiting = entry.id
+        self._recorded_command, self._pending_assignment = entry.name, None
+        self.rows.delegate.waiting_entry_id = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
         message = _("Press the new shortcut for “{command}”. Esc cancels.")
@@ -166,8 +166,8 @@ class ShortcutSheet(Overlay):
         self.rows.viewport().update()
 
     def _stop_recording(self, message: str = "") -> None:
-        self._recorded_command = self.rows.delegate.waiting = ""
-        self._offer = None
+        self._recorded_command = self.rows.delegate.waiting_entry_id = ""
+        self._pending_assignment = None
         paint.show_when(self.swap, False)
         self._set_status(message or _(HINT))
         self.rows.viewport().update()
@@ -181,19 +181,19 @@ class ShortcutSheet(Overlay):
         if watched is not self.field:
             return super().eventFilter(watched, event)
         if event.type() == QEvent.Type.ShortcutOverride and self._recorded_command:
-            pressed = cast("QKeyEvent", event)
-            if pressed.key() != Qt.Key.Key_F12:  # F12 triggers Stop even while a key is recorded
+            key_event = cast("QKeyEvent", event)
+            if key_event.key() != Qt.Key.Key_F12:  # F12 triggers Stop even while a key is recorded
                 event.accept()
                 return True
         if event.type() == QEvent.Type.KeyPress:
             return self._handle_key(cast("QKeyEvent", event))
         return super().eventFilter(watched, event)
 
-    def _handle_key(self, pressed: QKeyEvent) -> bool:
-        key = pressed.key()
+    def _handle_key(self, key_event: QKeyEvent) -> bool:
+        key = key_event.key()
         if self._recorded_command:
             if key not in MODIFIER_KEYS:
-                self._assign(pressed)
+                self._assign(key_event)
             return True
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.record()
@@ -201,15 +201,15 @@ class ShortcutSheet(Overlay):
         if key == Qt.Key.Key_Delete and not self.field.text():
             self._remove_shortcut()
             return True
-        is_unmodified = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        is_unmodified = not key_event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
         return is_unmodified and self.rows.handle_key(key)
 
-    def _assign(self, pressed: QKeyEvent) -> None:
-        name, key = self._recorded_command, format_key(pressed.keyCombination())
-        if pressed.key() == Qt.Key.Key_Escape:
+    def _assign(self, key_event: QKeyEvent) -> None:
+        name, key = self._recorded_command, format_key(key_event.keyCombination())
+        if key_event.key() == Qt.Key.Key_Escape:
             self._stop_recording()
             return
-        reason = self._shortcuts.rejection_reason(name, pressed.keyCombination())
+        reason = self._shortcuts.rejection_reason(name, key_event.keyCombination())
         if reason:
             self._set_status(reason)
             return
@@ -218,10 +218,11 @@ class ShortcutSheet(Overlay):
         if owner and owner != name:
             other = self._shortcuts.commands[owner].label
             message = _(
-                "{key} is already the shortcut of “{command}”. Swap them, or press Enter again to replace it."
+                "{key} is already the shortcut of “{command}”. Swap the shortcuts, or press Enter to choose "
+                "another one."
             )
             self._stop_recording(message.format(key=shortcut_text(key), command=other))
-            self._offer = (name, key)
+            self._pending_assignment = (name, key)
             paint.show_when(self.swap, True)
             return
         self._stop_recording(
@@ -230,8 +231,8 @@ class ShortcutSheet(Overlay):
         self._shortcuts.assign(name, key)
 
     def _swap(self) -> None:
-        if self._offer is not None:
-            name, key = self._offer
+        if self._pending_assignment is not None:
+            name, key = self._pending_assignment
             text = self._shortcuts.commands[name].label
             self._stop_recording(
                 _("The shortcut of “{command}” is now {key}.").format(command=text, key=shortcut_text(key))

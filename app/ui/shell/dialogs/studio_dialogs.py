@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from app.core.storage.settings import RecentFile, Settings, home
 from app.ui.shell.dialogs.file_sheet import FileQuestion, FileSheet, FolderLocation, known_locations
 from app.ui.theme.theme import Theme
-from app.ui.widgets.file_dialogs import LAYOUTS, FileKind, pictures_folder
+from app.ui.widgets.file_dialogs import LAYOUT_FILTER, FileKind, pictures_folder
 from nep.i18n import lazy
 
 RECORDING_QUESTION = FileQuestion(
@@ -19,7 +19,7 @@ RECORDING_QUESTION = FileQuestion(
 )  # fmt: skip
 LAYOUT_QUESTION = FileQuestion(
     lazy("Open a layout"), lazy("Open"), lazy("No layouts or folders here."),
-    suffixes=(LAYOUTS[1].lstrip("*"),), icon="layout-panel-left",
+    suffixes=(LAYOUT_FILTER[1].lstrip("*"),), icon="layout-panel-left",
 )  # fmt: skip
 
 

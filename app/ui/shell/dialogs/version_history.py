@@ -42,9 +42,9 @@ def difference_text(diff: Difference) -> str:
     The text is such as "14 blocks, 3 added, 1 removed since".
     """
     counts = (
-        (diff.added, ngettext("{count} added", "{count} added", diff.added)),
-        (diff.removed, ngettext("{count} removed", "{count} removed", diff.removed)),
-        (diff.changed, ngettext("{count} changed", "{count} changed", diff.changed)),
+        (diff.added_count, ngettext("{count} added", "{count} added", diff.added_count)),
+        (diff.removed_count, ngettext("{count} removed", "{count} removed", diff.removed_count)),
+        (diff.changed_count, ngettext("{count} changed", "{count} changed", diff.changed_count)),
     )
     changes = ", ".join(text.format(count=count) for count, text in counts if count)
     blocks = ngettext("{count} block", "{count} blocks", diff.block_count).format(
@@ -52,8 +52,8 @@ def difference_text(diff: Difference) -> str:
     )
     if changes:
         return _("{blocks}, {changes} since").format(blocks=blocks, changes=changes)
-    same = _("{blocks}, reordered") if diff.is_rearranged else _("{blocks}, unchanged since")
-    return same.format(blocks=blocks)
+    template = _("{blocks}, reordered") if diff.is_rearranged else _("{blocks}, unchanged since")
+    return template.format(blocks=blocks)
 
 
 class VersionHistorySheet(Overlay):
@@ -77,7 +77,7 @@ class VersionHistorySheet(Overlay):
         self._current_workspace: Mapping[str, object] = {}
         self._name = ""
         self._versions: dict[str, Version] = {}
-        self._unread: deque[str] = deque()
+        self._unread_ids: deque[str] = deque()
         self.heading = label("", "heading", wrap=True)
         self.rows = EntryList(theme, _("Earlier versions"))
         self.rows.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -92,7 +92,7 @@ class VersionHistorySheet(Overlay):
         self.button.clicked.connect(self.open_selected)
 
     def _lay_out(self) -> None:
-        header = self.make_header(self.heading)
+        header = self.create_header(self.heading)
         header.setContentsMargins(19, 0, 19, 0)
         self._footer = QWidget()
         self._footer.setProperty("bare", "true")
@@ -129,14 +129,14 @@ class VersionHistorySheet(Overlay):
         self._name, self._current_workspace = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
         own_versions = versions_of(path) if path is not None else []
-        others = namesakes_of(path) if path is not None else []
-        self._versions = {f"version:{each.copy}": each for each in (*own_versions, *others)}
-        self._unread = deque(self._versions)
+        namesakes = namesakes_of(path) if path is not None else []
+        self._versions = {f"version:{each.copy}": each for each in (*own_versions, *namesakes)}
+        self._unread_ids = deque(self._versions)
         lines: list[Line] = [self._version_entry(each, moment) for each in own_versions]
-        if others:
+        if namesakes:
             lines += [
                 Heading(_("Versions of other files named {name}").format(name=name)),
-                *(self._version_entry(each, moment) for each in others),
+                *(self._version_entry(each, moment) for each in namesakes),
             ]
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
@@ -168,15 +168,15 @@ class VersionHistorySheet(Overlay):
         layout = self.layout()
         if not self._versions or layout is None:
             return QSize(width, min(room.height(), round(scaled(EMPTY_HEIGHT))))
-        rest = layout.totalHeightForWidth(width) - self.rows.sizeHint().height()
-        height = rest + self.rows.content_height() + 8
+        other_height = layout.totalHeightForWidth(width) - self.rows.sizeHint().height()
+        height = other_height + self.rows.content_height() + 8
         return QSize(width, min(room.height(), round(scaled(MAX_HEIGHT)), height))
 
     def _read_next(self) -> None:
-        if not self._unread or not self.isVisible():
+        if not self._unread_ids or not self.isVisible():
             self._read_timer.stop()
             return
-        id = self._unread.popleft()
+        id = self._unread_ids.popleft()
         note = reason = ""
         try:
             version = self._versions[id]
@@ -190,7 +190,7 @@ class VersionHistorySheet(Overlay):
     @property
     def has_read_all(self) -> bool:
         """True once all versions were read and compared."""
-        return not self._unread
+        return not self._unread_ids
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self.rows and event.type() == QEvent.Type.KeyPress:

@@ -42,16 +42,16 @@ _log = logging.getLogger(__name__)
 class _Corner(QWidget):
     """Widget over a lower corner of a panel that paints the rounded corner of the frame."""
 
-    def __init__(self, theme: Theme, parent: QWidget, right: bool) -> None:
+    def __init__(self, theme: Theme, parent: QWidget, is_right: bool) -> None:
         super().__init__(parent)
-        self._theme, self._right = theme, right
+        self._theme, self._is_right = theme, is_right
         side = theme.radius("panel")
         self.setFixedSize(side, side)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         side = float(self.width())
-        centre = QPointF(0.0 if self._right else side, 0.0)
+        centre = QPointF(0.0 if self._is_right else side, 0.0)
         outside = QPainterPath()
         outside.addRect(QRectF(self.rect()))
         disc = QPainterPath()
@@ -159,8 +159,8 @@ class Dock(QDockWidget):
         panel: Panel, or its placeholder if the panel couldn't be created.
         number: Number among the docks of the same kind, counted from 1.
         key: Unique name in the workbench.
-        failed: True after an exception of the panel, which is then not refreshed any more.
-        front: True if the dock is open and isn't covered by another tab.
+        has_failed: True after an exception of the panel, which is then not refreshed any more.
+        is_front: True if the dock is open and isn't covered by another tab.
     """
 
     another_requested = Signal(str)
@@ -173,8 +173,8 @@ class Dock(QDockWidget):
         super().__init__(numbered_title(_(description.title), number))
         self.description, self.panel = description, panel
         self.number, self.key = number, format_key(description.name, number)
-        self.failed = False
-        self.front = False
+        self.has_failed = False
+        self.is_front = False
         self._last_displayed_s = -SUSPEND_DELAY_S
         self._theme, self._density = theme, density
         self.setObjectName(f"panel.{self.key}")
@@ -199,18 +199,18 @@ class Dock(QDockWidget):
         self._set_panel(panel)
         for widget in old:
             widget.deleteLater()
-        self.visibilityChanged.emit(self.front)  # the new title needs the tabs, too
+        self.visibilityChanged.emit(self.is_front)  # the new title needs the tabs, too
 
     def _restyle(self) -> None:
         self.panel.setFont(self.panel.text_font())
         self.title.updateGeometry()
 
     def _on_visibility_changed(self, visible: bool) -> None:
-        self.front = visible
+        self.is_front = visible
 
     def is_displayed(self) -> bool:
         """Return True if the panel is visible to the user: open, in front, and in a window on the screen."""
-        return self.front and self.isVisible() and is_on_screen(self.window())
+        return self.is_front and self.isVisible() and is_on_screen(self.window())
 
     def update_suspension(self, now: float) -> str | None:
         """Resume the panel if it is displayed; suspend it after it has been hidden for `SUSPEND_DELAY_S`.
@@ -223,7 +223,7 @@ class Dock(QDockWidget):
         Returns:
             The error message if the panel has just failed, else None.
         """
-        if self.failed:
+        if self.has_failed:
             return None
         if self.is_displayed():
             self._last_displayed_s = now
@@ -236,7 +236,7 @@ class Dock(QDockWidget):
         Returns:
             The error message if the panel has just failed, else None.
         """
-        if self.failed or not self.is_displayed():
+        if self.has_failed or not self.is_displayed():
             return None
         return self._try(self.panel.refresh)
 
@@ -245,7 +245,7 @@ class Dock(QDockWidget):
 
         There is no badge if the panel is in front, has failed, or has nothing new.
         """
-        if self.front or self.failed:
+        if self.is_front or self.has_failed:
             return None
         badges: list[tuple[str, str] | None] = []
         self._try(lambda: badges.append(self.panel.badge()))
@@ -255,7 +255,7 @@ class Dock(QDockWidget):
         try:
             act()
         except CAUGHT_ERRORS as error:  # no exception of a panel may close the window
-            self.failed = True
+            self.has_failed = True
             with suppress(*CAUGHT_ERRORS):  # a failed panel needs no subscriptions
                 self.panel.suspend()
             message = error_text(error)[:MAX_MESSAGE_LENGTH]
@@ -268,8 +268,8 @@ class Dock(QDockWidget):
 
     def retry(self) -> None:
         """Show a failed panel again and resume its refreshes. Has no effect if the panel hasn't failed."""
-        if self.failed:
-            self.failed = False
+        if self.has_failed:
+            self.has_failed = False
             self.body.show_panel()
 
     def saved_state(self) -> dict[str, object]:
@@ -332,19 +332,19 @@ class Dock(QDockWidget):
         if actions:
             menu.addSeparator()
         if self.description.allows_multiple:
-            more = menu.addAction(self._theme.icon("plus"), _("Open another panel to the side"))
-            more.triggered.connect(lambda: self.another_requested.emit(self.key))
+            another_action = menu.addAction(self._theme.icon("plus"), _("Open another panel to the side"))
+            another_action.triggered.connect(lambda: self.another_requested.emit(self.key))
         icon = self._theme.icon("picture-in-picture-2")
-        floating = menu.addAction(icon, _("Dock") if self.isFloating() else _("Float"))
-        floating.triggered.connect(self._float)
+        float_action = menu.addAction(icon, _("Dock") if self.isFloating() else _("Float"))
+        float_action.triggered.connect(self._float)
         menu.addAction(self._theme.icon("x"), _("Close")).triggered.connect(self.close)
         return menu
 
     def focus_target(self) -> QWidget:
         """Return the widget that gets the focus: focus proxy, first tab stop, or else the panel itself."""
-        about = focus_proxy(self.panel)
-        if about is not None and about.isVisible():
-            return about
+        proxy = focus_proxy(self.panel)
+        if proxy is not None and proxy.isVisible():
+            return proxy
         stops = tab_stops(self.panel, self.panel)
         first = next(stops, self.panel)
         if isinstance(first, QScrollArea):  # the first item inside is a better target than the whole area
@@ -395,7 +395,7 @@ def parse_key(key: str) -> tuple[str, int]:
     return key, 1
 
 
-def make_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
+def create_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
     """Return a dock with a new panel, or with a `FailedPanel` if the panel raises an exception."""
     try:
         return Dock(context.theme, description, description.make(context), density, number)

@@ -16,7 +16,7 @@ from app.ui.widgets import Chip, ElidedLabel, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
-ICON, GAP = 16, 7
+ICON_SIZE, GAP = 16, 7
 BADGE_SIZE = 18
 MIN_NAME_WIDTH = 56  # px at 100 %; if there is less room, the front panel is shown as an icon too
 
@@ -29,18 +29,18 @@ class TitleTab(PaintedButton):
 
     elides_text = True
 
-    def __init__(self, theme: Theme, text: str, icon: str, checked: bool) -> None:
+    def __init__(self, theme: Theme, text: str, icon: str, is_checked: bool) -> None:
         super().__init__(theme, text, checkable=True)
         self._icon = icon
         self._is_icon_only = False
         self.badge: tuple[str, str] | None = None
-        self.setChecked(checked)
+        self.setChecked(is_checked)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Show only the icon if `icon_only`, else the icon and the name."""
-        if icon_only != self._is_icon_only:
-            self._is_icon_only = icon_only
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Show only the icon if `is_icon_only`, else the icon and the name."""
+        if is_icon_only != self._is_icon_only:
+            self._is_icon_only = is_icon_only
             self.updateGeometry()
             self.update()
 
@@ -65,7 +65,7 @@ class TitleTab(PaintedButton):
 
     def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
-        return round(self._theme.scaled(ICON) + 16 + self._badge_room())
+        return round(self._theme.scaled(ICON_SIZE) + 16 + self._badge_room())
 
     def sizeHint(self) -> QSize:
         height = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
@@ -87,7 +87,7 @@ class TitleTab(PaintedButton):
         colour = theme.colour("text" if self.isChecked() else "textSecondary")
         room = rect.adjusted(0, 0, -self._badge_room(), 0)
         if self._is_icon_only:
-            side = theme.scaled(ICON)
+            side = theme.scaled(ICON_SIZE)
             icon_area = QRectF(0, 0, side, side)
             icon_area.moveCenter(room.center())
             if room.width() >= side or not self.badge:  # a badge is preferred over a clipped icon
@@ -145,8 +145,8 @@ class DockTitle(QWidget):
         self.show_title()
 
     def _fill(self) -> None:
-        comfortable = self._density == "comfortable"
-        self._row.setContentsMargins(13 if comfortable else 11, 1, 8 if comfortable else 6, 1)
+        is_comfortable = self._density == "comfortable"
+        self._row.setContentsMargins(13 if is_comfortable else 11, 1, 8 if is_comfortable else 6, 1)
         self._row.setSpacing(8)
         if self._title_widget is not None:
             self._row.setContentsMargins(6, 1, 6, 1)
@@ -188,34 +188,34 @@ class DockTitle(QWidget):
             if tab.isChecked():
                 tab.setText(self._panel.title())
 
-    def set_active(self, active: bool) -> None:
+    def set_active(self, is_active: bool) -> None:
         """Set whether the panel has the focus; its name is then painted in the primary text colour."""
-        set_role(self.name, "text" if active else "textSecondary")
+        set_role(self.name, "text" if is_active else "textSecondary")
 
-    def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
+    def set_tabs(self, tabs: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
         """Replace the tabs of the panels that share this place.
 
         Args:
-            names: Name, icon, True for this panel, and callback that shows the panel, for each tab.
+            tabs: Name, icon, True for this panel, and callback that shows the panel, for each tab.
         """
         row = self._tab_row
         for old in self._tabs:
             row.removeWidget(old)
             old.deleteLater()
         self._tabs = []
-        paint.show_when(self.name, not names and self._title_widget is None)
-        for index, (text, icon, is_current, bring) in enumerate(names):
+        paint.show_when(self.name, not tabs and self._title_widget is None)
+        for index, (text, icon, is_current, bring_to_front) in enumerate(tabs):
             tab = TitleTab(self._theme, text, icon, is_current)
-            tab.clicked.connect(lambda _on=False, bring=bring: bring())
+            tab.clicked.connect(lambda _on=False, bring_to_front=bring_to_front: bring_to_front())
             row.insertWidget(index, tab)
             self._tabs.append(tab)
         if self._title_widget is not None:
             self._shared.setFixedHeight(self._shared_height())
-            paint.show_when(self._shared, bool(names))
+            paint.show_when(self._shared, bool(tabs))
             self.updateGeometry()
         else:
             right = self._row.contentsMargins().right()
-            self._row.setContentsMargins(5 if names else self._left_margin(), 1, right, 1)
+            self._row.setContentsMargins(5 if tabs else self._left_margin(), 1, right, 1)
         self.fit_tabs()
 
     @property
@@ -240,15 +240,15 @@ class DockTitle(QWidget):
         chip_texts_width = sum(chip.full_width() - chip.icon_only_width() for chip in chips)
         full_width = sum(tab.full_width() for tab in self._tabs)
         background_width = sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
-        front = background_width + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
-        silent = full_width > room and (full_width <= room + chip_texts_width or front > room)
-        room += chip_texts_width if silent else 0
-        icon_only = full_width > room
+        front_width = background_width + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
+        shrinks_chips = full_width > room and (full_width <= room + chip_texts_width or front_width > room)
+        room += chip_texts_width if shrinks_chips else 0
+        is_icon_only = full_width > room
         is_narrow = room - background_width < self._theme.scaled(MIN_NAME_WIDTH)
         for chip in chips:
-            chip.set_icon_only(silent)
+            chip.set_icon_only(shrinks_chips)
         for tab in self._tabs:
-            tab.set_icon_only(icon_only and (not tab.isChecked() or is_narrow))
+            tab.set_icon_only(is_icon_only and (not tab.isChecked() or is_narrow))
 
     def _other_widgets(self) -> list[QWidget]:
         row = self._tab_row

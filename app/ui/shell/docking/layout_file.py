@@ -91,26 +91,30 @@ def decode_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile
         raise LayoutFileError(_("it was saved by a newer version of Studio; update Studio to open it"))
     base, saved = content.get("base"), content.get("arrangement")
     if not isinstance(base, str) or base not in {layout.name for layout in LAYOUTS}:
-        raise LayoutFileError(_("it belongs to a layout that this version of Studio doesn't have"))
-    opened = saved.get("open") if isinstance(saved, dict) else None
-    if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
+        raise LayoutFileError(_("it is based on a layout that this version of Studio doesn't have"))
+    open_keys = saved.get("open") if isinstance(saved, dict) else None
+    if (
+        not isinstance(saved, dict)
+        or not isinstance(open_keys, list)
+        or not isinstance(saved.get("docks"), str)
+    ):
         raise LayoutFileError(_("the file is damaged"))
     if content.get("sum") != _checksum(saved):
         raise LayoutFileError(_("the file is damaged"))
-    keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
+    keys = list(dict.fromkeys(key for key in open_keys if isinstance(key, str)))
     known_keys = [key for key in keys if parse_key(key)[0] in panels]
-    unknown = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known_keys))
-    about = saved.get("panels")
+    unknown_names = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known_keys))
+    states = saved.get("panels")
     panel_states = {
         key: each
-        for key, each in (about if isinstance(about, dict) else {}).items()
+        for key, each in (states if isinstance(states, dict) else {}).items()
         if parse_key(key)[0] in panels and isinstance(each, dict)
     }
     return LayoutFile(
         _layout_name(content.get("name"), stem),
         base,
         {**saved, "open": known_keys, "panels": panel_states},
-        unknown,
+        unknown_names,
     )
 
 

@@ -17,13 +17,13 @@ class DockColumn:
         width: Width in px at 100 % text size; 0 takes the remaining space.
         rows: Names of the panels that share a place, and height in px, for each row from top to bottom.
         max_share: Maximum width as a share of the window's width.
-        share: Minimum width as a share of the window's width, for large windows.
+        min_share: Minimum width as a share of the window's width, for large windows.
     """
 
     width: int
     rows: tuple[tuple[tuple[str, ...], int], ...]
     max_share: float = 1.0
-    share: float = 0.0
+    min_share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        DockColumn(640, ((("topics",), 780),), max_share=0.62, share=0.43),
-        DockColumn(330, ((("inspector",), 780),), max_share=0.28, share=0.22),
+        DockColumn(640, ((("topics",), 780),), max_share=0.62, min_share=0.43),
+        DockColumn(330, ((("inspector",), 780),), max_share=0.28, min_share=0.22),
         DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     (

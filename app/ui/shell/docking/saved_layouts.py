@@ -44,7 +44,7 @@ class SavedLayouts:
         for key, saved in self._state.layouts().items():
             if key.startswith(CUSTOM_PREFIX) and isinstance(saved, Mapping) and saved.get("base") in bases:
                 layouts.append(CustomLayout(key.removeprefix(CUSTOM_PREFIX), str(saved["base"])))
-        return tuple(sorted(layouts, key=lambda own: own.name.lower()))
+        return tuple(sorted(layouts, key=lambda layout: layout.name.lower()))
 
     def named(self, name: str) -> CustomLayout | None:
         """Return the custom layout with this name, or None."""
@@ -58,12 +58,12 @@ class SavedLayouts:
         layout = self.named(name) if name else None
         return name if layout is not None and layout.base == base else ""
 
-    def rejection_reason(self, name: str, but: str = "") -> str:
+    def rejection_reason(self, name: str, allowed_name: str = "") -> str:
         """Return why a name for a custom layout is invalid, as a sentence; "" if it is valid.
 
         Args:
             name: Name to check.
-            but: Existing name that is allowed, because that layout is being renamed.
+            allowed_name: Existing name that is allowed, because that layout is being renamed.
         """
         name = name.strip()
         if not name:
@@ -73,7 +73,7 @@ class SavedLayouts:
         taken_names = {_(layout.title).lower() for layout in LAYOUTS} | {
             custom.name.lower() for custom in self.all()
         }
-        is_taken = name.lower() in taken_names - {but.lower()}
+        is_taken = name.lower() in taken_names - {allowed_name.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
     def restore(self, bench: Workbench, base: str) -> None:
@@ -84,11 +84,11 @@ class SavedLayouts:
             bench.reset_layout()
             return
         try:
-            restored = bench.restore(saved)
+            is_restored = bench.restore(saved)
         except Exception as error:  # noqa: BLE001  whatever was in the file, the window opens
-            restored = False
+            is_restored = False
             self._report_error(f"{type(error).__name__}: {error}")
-        if not restored:
+        if not is_restored:
             bench.reset_layout()
             message = _("Can't restore the layout “{name}”; using its default.")
             self._report_error(message.format(name=name or _(layout_named(base).title)))
@@ -120,9 +120,9 @@ class SavedLayouts:
         Returns:
             False if the layout can't be saved and exists only until Studio closes.
         """
-        saved = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
+        is_saved = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
         self._set_current(base, name.strip())
-        return saved
+        return is_saved
 
     def can_restore(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
         """Return True if a workbench can restore an imported arrangement.
@@ -146,11 +146,11 @@ class SavedLayouts:
             the layout was saved.
         """
         name = name.strip()[:MAX_NAME_LENGTH].strip()
-        free, number = name, 2
-        while self.rejection_reason(free):
-            ending = f" {number}"
-            free, number = f"{name[: MAX_NAME_LENGTH - len(ending)]}{ending}", number + 1
-        return free, self._state.save_layouts({CUSTOM_PREFIX + free: {**saved, "base": base}})
+        free_name, number = name, 2
+        while self.rejection_reason(free_name):
+            suffix = f" {number}"
+            free_name, number = f"{name[: MAX_NAME_LENGTH - len(suffix)]}{suffix}", number + 1
+        return free_name, self._state.save_layouts({CUSTOM_PREFIX + free_name: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:
         """Rename a custom layout. Has no effect if there is no layout with the old name."""
@@ -181,14 +181,14 @@ class SavedLayouts:
         if is_current and bench is not None:
             self.switch(bench, base, "")
         saved = dict(self._state.layout_state(CUSTOM_PREFIX + name))
-        deleted = self._state.delete_layout(CUSTOM_PREFIX + name)
+        is_saved = self._state.delete_layout(CUSTOM_PREFIX + name)
 
         def undo() -> None:
             self._state.save_layouts({CUSTOM_PREFIX + name: saved})
             if is_current and bench is not None:
                 self.switch(bench, base, name)
 
-        return deleted, undo
+        return is_saved, undo
 
     def _set_current(self, base: str, name: str) -> None:
         self._current[base] = name

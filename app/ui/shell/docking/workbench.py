@@ -11,7 +11,7 @@ from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered_title
-from app.ui.shell.docking.dock import Dock, format_key, make_dock, parse_key
+from app.ui.shell.docking.dock import Dock, create_dock, format_key, parse_key
 from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit, shrink_above
 from app.ui.theme.theme import Theme
@@ -50,17 +50,17 @@ class Workbench(QMainWindow):
         self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
         self.docks: dict[str, Dock] = {}
         self._prepared_docks: dict[str, Dock] = {}  # created in advance
-        self._floating: list[Dock] = []
+        self._floating_docks: list[Dock] = []
         self._tab_groups: dict[Dock, list[Dock]] = {}  # panels of a shared place in tab order
-        self._folded: tuple[Fold, ...] = ()  # active folds, because of a small window or large text
+        self._active_folds: tuple[Fold, ...] = ()  # active folds, because of a small window or large text
         self._unfolded_state = QByteArray()  # state before folding
-        self._arranged = False
+        self._is_arranged = False
         self._has_moved_separator = False  # the user has moved a separator
         self._focus_order: list[str] = []  # panels by last focus, latest at the end
         self._split_pair: tuple[Dock, Dock] | None = None  # two docks to be resized to equal sizes
         self._bottom_heights: dict[str, int] = {}  # last heights of closed panels below all others
         self._deleted_states: dict[str, Mapping[str, object]] = {}  # states of panels that a reset deleted
-        self._reopened: Dock | None = None  # dock whose height is to be restored
+        self._reopened_dock: Dock | None = None  # dock whose height is to be restored
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
         # the style caches the separator width from before the property was set
@@ -86,7 +86,7 @@ class Workbench(QMainWindow):
         """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._prepared_docks:
-            self._prepared_docks[name] = dock = make_dock(description, self._context, self._layout.density)
+            self._prepared_docks[name] = dock = create_dock(description, self._context, self._layout.density)
             dock.update_suspension(0.0)
 
     def reset_layout(self) -> None:
@@ -100,20 +100,20 @@ class Workbench(QMainWindow):
                 self._delete_dock(old)  # otherwise a plot would keep its subscriptions
         self._split_pair = None
         # All columns first, then the rows of each: otherwise the rows would extend across the columns.
-        waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
+        pending_columns: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
         for column in self._layout.columns:
             rows = [names for names, _ in column.rows if any(n in self._panels for n in names)]
             rows = [names for names in rows if not set(names) <= self._layout.deferred_panels]
             top_dock = self._add_docks(rows[0], None, last) if rows else None
             if top_dock is not None:
-                waiting.append((top_dock, rows[1:]))
+                pending_columns.append((top_dock, rows[1:]))
                 last = top_dock
-        for top_dock, rows in waiting:
+        for top_dock, rows in pending_columns:
             above = top_dock
             for names in rows:
                 above = self._add_docks(names, above, None) or above
-        self._arranged, self._has_moved_separator, self._folded = True, False, ()
+        self._is_arranged, self._has_moved_separator, self._active_folds = True, False, ()
         self._resize_docks()
         self._size_timer.start(0)
         self._update_folds()
@@ -141,18 +141,18 @@ class Workbench(QMainWindow):
 
     def _resize_docks(self) -> None:
         # Has no effect if the user has moved a separator.
-        halves, self._split_pair = self._split_pair, None
-        if halves is not None:
-            orientation = HORIZONTAL if halves[0].y() == halves[1].y() else VERTICAL
-            self.resizeDocks(halves, [1, 1], orientation)
-        reopened, self._reopened = self._reopened, None
-        if reopened is not None and self._has_moved_separator:
+        split_pair, self._split_pair = self._split_pair, None
+        if split_pair is not None:
+            orientation = HORIZONTAL if split_pair[0].y() == split_pair[1].y() else VERTICAL
+            self.resizeDocks(split_pair, [1, 1], orientation)
+        reopened_dock, self._reopened_dock = self._reopened_dock, None
+        if reopened_dock is not None and self._has_moved_separator:
             gap = self._theme.size("gap", self._layout.density)
-            below = self._resize_bottom_dock(self._theme.scaled(1))
-            shrink_above(self, self.docks.values(), MAIN_AREA, gap, below=below + gap)
-        if self._arranged and not self._has_moved_separator and not self._fold_timer.isActive():
+            bottom_height = self._resize_bottom_dock(self._theme.scaled(1))
+            shrink_above(self, self.docks.values(), MAIN_AREA, gap, bottom_height=bottom_height + gap)
+        if self._is_arranged and not self._has_moved_separator and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
-            below = self._resize_bottom_dock(scale)
+            bottom_height = self._resize_bottom_dock(scale)
             fit(
                 self,
                 self._layout,
@@ -160,7 +160,7 @@ class Workbench(QMainWindow):
                 gap,
                 scale,
                 self._folded_names(),
-                below=below + gap if below else 0,
+                bottom_height=bottom_height + gap if bottom_height else 0,
             )
 
     def _resize_bottom_dock(self, scale: float) -> int:
@@ -196,7 +196,7 @@ class Workbench(QMainWindow):
         if description is None or number > (MAX_PANELS_PER_KIND if description.allows_multiple else 1):
             return None
         dock = self._prepared_docks.pop(key, None)
-        dock = dock or make_dock(description, self._context, self._layout.density, number)
+        dock = dock or create_dock(description, self._context, self._layout.density, number)
         dock.another_requested.connect(self.open_another)
         dock.closed.connect(self._on_dock_closed)
         dock.dockLocationChanged.connect(self._schedule_tabs)
@@ -228,7 +228,7 @@ class Workbench(QMainWindow):
             self._size_timer.start(0)
         # otherwise Qt gives the dock half of its previous height
         if dock.isHidden() and name in self._layout.bottom_heights:
-            self._reopened = dock
+            self._reopened_dock = dock
             self._size_timer.start(0)
         dock.retry()
         dock.show()
@@ -257,12 +257,12 @@ class Workbench(QMainWindow):
             a toast explains.
         """
         name = parse_key(key)[0]
-        free = (
+        free_numbers = (
             number
             for number in range(1, MAX_PANELS_PER_KIND + 1)
             if not self._is_open(format_key(name, number))
         )
-        number = next(free, 0)
+        number = next(free_numbers, 0)
         if not number:
             message = _("The maximum of {count} panels of this kind is already open")
             self._context.show_toast(message.format(count=MAX_PANELS_PER_KIND))
@@ -297,10 +297,9 @@ class Workbench(QMainWindow):
 
     def recently_used(self) -> tuple[str, ...]:
         """Return the keys of the open docks, most recently used first."""
-        opened = self.open_names()
-        return tuple(
-            sorted(opened, key=lambda key: -self._focus_order.index(key) if key in self._focus_order else 1)
-        )
+        open_keys = self.open_names()
+        order = self._focus_order
+        return tuple(sorted(open_keys, key=lambda key: -order.index(key) if key in order else 1))
 
     def _on_dock_closed(self, key: str) -> None:
         # An additional panel is deleted unless it is reopened immediately.
@@ -324,11 +323,11 @@ class Workbench(QMainWindow):
     def _delete_dock(self, dock: Dock) -> None:
         self.docks.pop(dock.key, None)
         self._tab_groups.pop(dock, None)
-        for together in self._tab_groups.values():
-            if dock in together:
-                together.remove(dock)
+        for tab_group in self._tab_groups.values():
+            if dock in tab_group:
+                tab_group.remove(dock)
         self._focus_order = [key for key in self._focus_order if key != dock.key]
-        self._floating = [each for each in self._floating if each is not dock]
+        self._floating_docks = [each for each in self._floating_docks if each is not dock]
         self._split_pair = None
         dock.dispose()
         self.removeDockWidget(dock)
@@ -342,25 +341,26 @@ class Workbench(QMainWindow):
         self._tabs_timer.start(0)
 
     def _update_tabs(self) -> None:
-        later = {name: index for index, name in enumerate(n for f in self._folded for n in f.panels)}
-        order = sorted(self.docks.values(), key=lambda dock: later.get(dock.key, -1))
+        folded_names = [name for fold in self._active_folds for name in fold.panels]
+        fold_order = {name: index for index, name in enumerate(folded_names)}
+        order = sorted(self.docks.values(), key=lambda dock: fold_order.get(dock.key, -1))
         for dock in order:
-            together = [
+            tab_group = [
                 other
                 for other in order
                 if other is dock or (other in self.tabifiedDockWidgets(dock) and not other.isHidden())
             ]
-            if dock.isFloating() or len(together) < 2:
-                together = []
+            if dock.isFloating() or len(tab_group) < 2:
+                tab_group = []
                 dock.title.set_tabs(())
             else:
                 dock.title.set_tabs(
                     [
-                        (other.panel.title(), other.description.icon, other is dock, _make_raiser(other))
-                        for other in together
+                        (other.panel.title(), other.description.icon, other is dock, _create_raiser(other))
+                        for other in tab_group
                     ]
                 )
-            self._tab_groups[dock] = together
+            self._tab_groups[dock] = tab_group
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -377,24 +377,24 @@ class Workbench(QMainWindow):
         scale = self._theme.scaled(1)
         room = self.width() / scale, self.height() / scale
         folds = tuple(fold for fold in self._layout.folds if fold.applies(*room) and self._can_fold(fold))
-        if not self._arranged or folds == self._folded or self._fold_timer.isActive():
+        if not self._is_arranged or folds == self._active_folds or self._fold_timer.isActive():
             return
-        if set(self._folded) - set(folds):
+        if set(self._active_folds) - set(folds):
             self._fold_timer.start(0)  # Qt creates no tabs in the event loop turn in which it restores docks
             self._unfold()
             return
-        if not self._folded and folds:
+        if not self._active_folds and folds:
             self._unfolded_state = self.saveState(STATE_VERSION)
         for fold in folds:
-            if fold not in self._folded:
+            if fold not in self._active_folds:
                 self._fold(fold)
-        self._folded = folds
+        self._active_folds = folds
         self._size_timer.start(0)
         self._schedule_tabs()
 
     def _can_fold(self, fold: Fold) -> bool:
         # A fold that was active stays valid wherever its panels were moved.
-        if fold in self._folded:
+        if fold in self._active_folds:
             return True
         docks = [self.docks.get(name) for name in (fold.target, *fold.panels)]
         return all(dock is not None and not dock.isFloating() for dock in docks)
@@ -413,19 +413,19 @@ class Workbench(QMainWindow):
     def _folded_names(self) -> set[str]:
         return {
             name
-            for fold in self._folded
+            for fold in self._active_folds
             for name in fold.panels
             if self.docks[name] in self.tabifiedDockWidgets(self.docks[fold.target])
         }
 
     def _unfold(self) -> None:
         # Restores the state before folding, because splitting a dock off a tab would create a new tab.
-        self._folded = ()
-        opened = self.open_names()
+        self._active_folds = ()
+        open_keys = self.open_names()
         if not self.restoreState(self._unfolded_state, STATE_VERSION):
             self.reset_layout()
         for name, dock in list(self.docks.items()):
-            if name not in opened:
+            if name not in open_keys:
                 dock.close()
             elif dock.isHidden():
                 self.open(name)
@@ -433,16 +433,18 @@ class Workbench(QMainWindow):
         self._schedule_tabs()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
-        for dock in self._floating:
+        self._floating_docks = [
+            dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()
+        ]
+        for dock in self._floating_docks:
             dock.hide()
         super().hideEvent(event)
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        for dock in self._floating:
+        for dock in self._floating_docks:
             dock.show()
-        self._floating = []
+        self._floating_docks = []
 
     def update_suspension(self, now: float) -> None:
         """Suspend hidden panels and resume visible ones.
@@ -463,14 +465,14 @@ class Workbench(QMainWindow):
         """Return True if a panel with video is visible; such panels are refreshed at twice the rate."""
         return any(dock.panel.shows_video and dock.is_displayed() for dock in self.docks.values())
 
-    def refresh(self, *, pictures: bool = False) -> None:
+    def refresh(self, *, video_only: bool = False) -> None:
         """Refresh the visible panels.
 
         Args:
-            pictures: True to refresh only panels with video.
+            video_only: True to refresh only panels with video.
         """
         for name, dock in list(self.docks.items()):
-            if pictures and not dock.panel.shows_video:
+            if video_only and not dock.panel.shows_video:
                 continue
             self._report_failure(name, dock.refresh())
             if dock.is_displayed():
@@ -498,12 +500,14 @@ class Workbench(QMainWindow):
         """Return the arrangement as a JSON-serializable dict for `restore`."""
         return {
             "open": [
-                name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
+                name
+                for name, dock in self.docks.items()
+                if not dock.isHidden() or dock in self._floating_docks
             ],
             "docks": encode_state(self.saveState(STATE_VERSION)),
             "wide": encode_state(self._unfolded_state),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
-            "folds": [fold.panels[0] for fold in self._folded],
+            "folds": [fold.panels[0] for fold in self._active_folds],
             "moved": self._has_moved_separator,
         }
 
@@ -525,7 +529,7 @@ class Workbench(QMainWindow):
             return False
         self._size_timer.stop()  # keep the saved sizes instead of those of `_resize_docks`
         self._unfolded_state = decode_state(saved.get("wide"))
-        self._folded, self._has_moved_separator = self._folds_of(saved), saved.get("moved") is True
+        self._active_folds, self._has_moved_separator = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             panel_state = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(panel_state, Mapping):
@@ -547,7 +551,7 @@ class Workbench(QMainWindow):
             dock.dispose()
 
 
-def _make_raiser(dock: Dock) -> Callable[[], object]:
+def _create_raiser(dock: Dock) -> Callable[[], object]:
     def raise_dock() -> None:
         dock.raise_()
         dock.panel.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -575,7 +579,7 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
         bench.addDockWidget(BOTTOM_AREA, dock)
         return
     above = _panel_above(layout, name)
-    home = name if dock.number > 1 else layout.tab_targets.get(name, "")
+    tab_target = name if dock.number > 1 else layout.tab_targets.get(name, "")
     if (
         above in docks_by_key
         and not docks_by_key[above].isHidden()
@@ -584,7 +588,7 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
         bench.splitDockWidget(docks_by_key[above], dock, Qt.Orientation.Vertical)
     elif docks_by_key:
         bench.tabifyDockWidget(
-            docks_by_key[home] if home in docks_by_key else list(docks_by_key.values())[-1], dock
+            docks_by_key[tab_target] if tab_target in docks_by_key else list(docks_by_key.values())[-1], dock
         )
     else:
         bench.addDockWidget(MAIN_AREA, dock)
@@ -608,14 +612,14 @@ def insert_beside(
     orientations = (HORIZONTAL, VERTICAL) if other.width() >= other.height() else (VERTICAL, HORIZONTAL)
     # Qt adds a tab when a tabbed dock is split, so the place is reduced to one panel for a moment. In one
     # direction Qt may still see tabs; if in both, an additional tab is the result.
-    together = [tab_dock for tab_dock in bench.tabifiedDockWidgets(other) if isinstance(tab_dock, Dock)]
-    visible_docks = [tab_dock for tab_dock in together if not tab_dock.isHidden()]
+    tab_docks = [tab_dock for tab_dock in bench.tabifiedDockWidgets(other) if isinstance(tab_dock, Dock)]
+    visible_docks = [tab_dock for tab_dock in tab_docks if not tab_dock.isHidden()]
     for orientation in orientations:
-        for tab_dock in together:
+        for tab_dock in tab_docks:
             bench.removeDockWidget(tab_dock)
         bench.splitDockWidget(other, dock, orientation)
         is_tab = dock in bench.tabifiedDockWidgets(other)
-        for tab_dock in together:
+        for tab_dock in tab_docks:
             bench.tabifyDockWidget(other, tab_dock)
         for tab_dock in visible_docks:
             tab_dock.show()
@@ -627,7 +631,7 @@ def insert_beside(
 
 
 def _panel_above(layout: Layout, name: str) -> str:
-    # Panel in the row above that of a panel which opens later.
+    # Panel in the row above that of a deferred panel.
     if name in layout.deferred_panels:
         for column in layout.columns:
             for (names, _), (below, _) in zip(column.rows, column.rows[1:], strict=False):

@@ -18,7 +18,7 @@ ROOM_HEIGHT = 296  # height of the painted room; the card shows its upper part
 
 
 class Art(QWidget):
-    """Base class of illustrations at the top of a card, clipped to the card's round corners."""
+    """Base class of illustrations at the top of a card, clipped to the card's rounded corners."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ class Art(QWidget):
 
 
 def upper_corners(area: QRectF, radius: float) -> QPainterPath:
-    """Return the outline of a rectangle with round upper corners."""
+    """Return the outline of a rectangle with rounded upper corners."""
     path = QPainterPath()
     path.addRoundedRect(area.adjusted(0, 0, 0, 2 * radius), radius, radius)
     box = QPainterPath()
@@ -66,14 +66,16 @@ class RobotArt(Art):
     def _cached_pixmap(self, room: QRectF, area: QRectF) -> QPixmap:
         # Cached for each size and theme, in a pixmap because the drawing sets its own clip.
         ratio = self.devicePixelRatioF()
-        key = (area.width(), area.height(), ratio, self._theme.dark)
+        key = (area.width(), area.height(), ratio, self._theme.is_dark)
         if self._pixmap_cache is None or self._pixmap_cache[0] != key:
             pixmap = QPixmap((area.size() * ratio).toSize())
             pixmap.setDevicePixelRatio(ratio)
             pixmap.fill(Qt.GlobalColor.transparent)
             inner = QPainter(pixmap)
             inner.setRenderHint(QPainter.RenderHint.Antialiasing)
-            self._drawing.paint(inner, room.translated(-area.topLeft()), PREVIEW_STATE, dark=self._theme.dark)
+            self._drawing.paint(
+                inner, room.translated(-area.topLeft()), PREVIEW_STATE, is_dark=self._theme.is_dark
+            )
             inner.end()
             self._pixmap_cache = (key, pixmap)
         return self._pixmap_cache[1]

@@ -93,12 +93,12 @@ class ExampleCard(PaintedButton):
         self.setToolTip(plain.tip(text))  # a narrow card elides the text
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
-    def _fonts(self) -> tuple[float, float]:
+    def _line_heights(self) -> tuple[float, float]:
         title, text = self._theme.font("button"), self._theme.font("body")
         return paint.height_of(title), paint.height_of(text)
 
     def sizeHint(self) -> QSize:
-        title, text = self._fonts()
+        title, text = self._line_heights()
         return QSize(240, EXAMPLE_ART_HEIGHT + round(title + text) + 33)
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -112,7 +112,7 @@ class ExampleCard(PaintedButton):
         paint_rows(painter, art.adjusted(19, 16, -19, 0), theme, self._rows)
         painter.restore()
         paint.hairline(painter, art, Qt.Edge.BottomEdge, theme.colour("border"))
-        title, text = self._fonts()
+        title, text = self._line_heights()
         line = QRectF(17, art.bottom() + 14, rect.width() - 34, title)
         paint.text_line(painter, line, self.text(), theme.font("button"), theme.colour("text"))
         line = QRectF(17, line.bottom() + 2, line.width(), text)
@@ -143,8 +143,8 @@ class RecentRow(PaintedButton):
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
         small = theme.font("body")
-        when = paint.width_of(small, self._when) + 12
-        area = rect.adjusted(54, 0, -when - 8, 0)
+        when_width = paint.width_of(small, self._when) + 12
+        area = rect.adjusted(54, 0, -when_width - 8, 0)
         paint.text_line(painter, area, self.text(), theme.font("label"), theme.colour("text"))
         area = rect.adjusted(54, 0, -12, 0)
         paint.text_line(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)

@@ -17,7 +17,7 @@ from app.ui.widgets import label, paint
 from app.ui.widgets.buttons import PaintedButton
 from nep.i18n import _
 
-HEIGHT, TILE_SIZE, TEXT_LEFT = 56, 30, 54
+MIN_HEIGHT, TILE_SIZE, TEXT_LEFT = 56, 30, 54
 COLUMNS = 3
 DOT_SIZE = 7.0
 
@@ -72,7 +72,7 @@ class OpenRow(PaintedButton):
     def sizeHint(self) -> QSize:
         theme = self._theme
         text_height = paint.height_of(theme.font("label")) + paint.height_of(theme.font("body"))
-        return QSize(240, max(HEIGHT, round(text_height) + 18))
+        return QSize(240, max(MIN_HEIGHT, round(text_height) + 18))
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
         theme = self._theme
@@ -83,40 +83,40 @@ class OpenRow(PaintedButton):
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
-        link, text = theme.font("button"), _("Resume")
+        link_font, text = theme.font("button"), _("Resume")
         side = theme.scaled(14)
-        link_width = paint.width_of(link, text) + 6 + side
+        link_width = paint.width_of(link_font, text) + 6 + side
         room = QRectF(TEXT_LEFT, rect.top(), rect.width() - TEXT_LEFT - link_width - 26, rect.height())
         self._paint_text(painter, room)
         accent = theme.colour("accentText")
         area = QRectF(rect.right() - 14 - link_width, rect.top(), link_width - side - 6, rect.height())
-        paint.text_line(painter, area, text, link, accent)
+        paint.text_line(painter, area, text, link_font, accent)
         arrow = QRectF(rect.right() - 14 - side, rect.center().y() - side / 2, side, side)
         paint_icon(painter, arrow, "arrow-right", accent)
 
     def _paint_text(self, painter: QPainter, room: QRectF) -> None:
         theme, work = self._theme, self.work
-        name, state = theme.font("label"), theme.font("body")
-        name_height = paint.height_of(name)
-        top = room.center().y() - (name_height + paint.height_of(state)) / 2
+        name_font, state_font = theme.font("label"), theme.font("body")
+        name_height = paint.height_of(name_font)
+        top = room.center().y() - (name_height + paint.height_of(state_font)) / 2
         line = QRectF(room.left(), top, room.width() - (DOT_SIZE + 8 if work.is_unsaved else 0), name_height)
-        paint.text_line(painter, line, work.name, name, theme.colour("text"))
+        paint.text_line(painter, line, work.name, name_font, theme.colour("text"))
         if work.is_unsaved:
-            left = room.left() + min(paint.width_of(name, work.name), line.width()) + 8
+            left = room.left() + min(paint.width_of(name_font, work.name), line.width()) + 8
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.colour("textSecondary"))
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.drawEllipse(QRectF(left, line.center().y() - DOT_SIZE / 2, DOT_SIZE, DOT_SIZE))
-        line = QRectF(room.left(), top + name_height, room.width(), paint.height_of(state))
-        paint.text_line(painter, line, self._state, state, theme.colour("textTertiary"))
+        line = QRectF(room.left(), top + name_height, room.width(), paint.height_of(state_font))
+        paint.text_line(painter, line, self._state, state_font, theme.colour("textTertiary"))
 
 
 def state_text(work: OpenWork) -> str:
-    """Return the state of an open behaviour as text: running, not saved, saved or no changes."""
+    """Return the state of an open behaviour as text: running, unsaved changes, saved or no changes."""
     if work.is_running:
         return _("running")
     if work.is_unsaved:
-        return _("not saved yet")
+        return _("unsaved changes")
     return _("saved") if work.path else _("no changes yet")
 
 

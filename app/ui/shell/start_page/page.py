@@ -127,13 +127,13 @@ class StartPage(QWidget):
         self.setAccessibleName(_("Start"))
         self.open_work = OpenWorkList(theme)
         self.open_work.selected.connect(self.work_selected)
-        leave = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
-        leave.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        leave.activated.connect(self.exited)
+        exit_shortcut = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
+        exit_shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        exit_shortcut.activated.connect(self.exited)
         self._use_button = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
         self._use_button.clicked.connect(self.virtual_robot_pressed)
-        self._new = Button(theme, _("New behaviour"), size="large")
-        self._new.clicked.connect(self.new_behaviour_pressed)
+        self._new_button = Button(theme, _("New behaviour"), size="large")
+        self._new_button.clicked.connect(self.new_behaviour_pressed)
         self.robot_card = StartCard(
             theme,
             RobotArt(theme),
@@ -146,20 +146,22 @@ class StartPage(QWidget):
             EmptyPageArt(theme),
             _("Create a behaviour"),
             _("Start with an empty page and your robot's blocks."),
-            [self._new],
+            [self._new_button],
         )
-        self._learn = Button(theme, _("First steps"), size="large")
-        self._learn.clicked.connect(self.learn_pressed)
-        self._not_now = Button(theme, _("Cancel"), kind="ghost", size="large")
-        self._not_now.clicked.connect(self._decline)
-        self._not_now.hide()
+        self._learn_button = Button(theme, _("First steps"), size="large")
+        self._learn_button.clicked.connect(self.learn_pressed)
+        self._decline_button = Button(theme, _("Cancel"), kind="ghost", size="large")
+        self._decline_button.clicked.connect(self._decline)
+        self._decline_button.hide()
         title, text = LEARN_TEXTS
-        self.learn_card = StartCard(theme, StepsArt(theme), _(title), _(text), [self._learn, self._not_now])
+        self.learn_card = StartCard(
+            theme, StepsArt(theme), _(title), _(text), [self._learn_button, self._decline_button]
+        )
         self._is_offering_first_steps = False
         self._shows_all = False
         self._recent_box = QWidget()
-        self._open = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
-        self._open.clicked.connect(self.open_pressed)
+        self._open_button = Button(theme, _("Open a file"), "folder-open", kind="ghost", size="normal")
+        self._open_button.clicked.connect(self.open_pressed)
         self._build(examples)
         theme.changed.connect(self._restyle)
         theme.changed.connect(self._fit_room)
@@ -194,7 +196,7 @@ class StartPage(QWidget):
         column.addSpacing(26)
         self._all_button = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
         self._all_button.clicked.connect(lambda: self.show_all(not self._shows_all))
-        header = self._heading_row(label(_("Open an example"), "heading"), self._open)
+        header = self._heading_row(label(_("Open an example"), "heading"), self._open_button)
         header.addSpacing(8)
         header.addWidget(self._all_button)
         column.addLayout(header)
@@ -257,8 +259,8 @@ class StartPage(QWidget):
         # If there is little room, cards are stacked, then lose their images, so that the first button is
         # visible.
         cards = (self.robot_card, self.new_card, self.learn_card)
-        needed = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
-        fits_in_row = needed <= min(WIDTH, self.width() - 2 * MARGIN)
+        row_width = sum(card.minimumSizeHint().width() for card in cards) + CARD_GAP * (len(cards) - 1)
+        fits_in_row = row_width <= min(WIDTH, self.width() - 2 * MARGIN)
         direction = QBoxLayout.Direction.LeftToRight if fits_in_row else QBoxLayout.Direction.TopToBottom
         if self._cards.direction() != direction:
             self._cards.setDirection(direction)
@@ -276,18 +278,18 @@ class StartPage(QWidget):
         """True if the card with the first steps is the primary one."""
         return self._is_offering_first_steps
 
-    def offer_first_steps(self, offers: bool = True) -> None:
-        """Make the card with the first steps the primary one if `offers`, else one of three equal cards."""
-        if offers == self._is_offering_first_steps:
+    def offer_first_steps(self, is_offered: bool = True) -> None:
+        """Make the card with the first steps the primary one if `is_offered`, else one of three equals."""
+        if is_offered == self._is_offering_first_steps:
             return
-        self._is_offering_first_steps = offers
-        had_focus = self._not_now.hasFocus()
-        self._learn.set_kind("primary" if offers else "plain")
-        self._use_button.set_kind("plain" if offers else "primary")
-        title, text = OFFER_TEXTS if offers else LEARN_TEXTS
+        self._is_offering_first_steps = is_offered
+        had_focus = self._decline_button.hasFocus()
+        self._learn_button.set_kind("primary" if is_offered else "plain")
+        self._use_button.set_kind("plain" if is_offered else "primary")
+        title, text = OFFER_TEXTS if is_offered else LEARN_TEXTS
         self.learn_card.set_texts(_(title), _(text))
-        self.learn_card.border = "accent" if offers else "border"
-        paint.show_when(self._not_now, offers)
+        self.learn_card.border = "accent" if is_offered else "border"
+        paint.show_when(self._decline_button, is_offered)
         cards = self._ordered_cards()
         for index, card in enumerate(cards):
             self._cards.removeWidget(card)
@@ -363,7 +365,7 @@ class StartPage(QWidget):
                 old.deleteLater()
         self.recent_rows: list[RecentRow] = []
         paint.show_when(self._recent_box, bool(recent))
-        paint.show_when(self._open, not recent)
+        paint.show_when(self._open_button, not recent)
         if not recent:
             return
         other = Button(self._theme, _("Open a file"), "folder-open", kind="ghost")
@@ -401,5 +403,5 @@ class StartPage(QWidget):
         """Scroll to the top and focus the first open behaviour or, if there is none, the primary button."""
         self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
-        first = self._learn if self._is_offering_first_steps else self._use_button
+        first = self._learn_button if self._is_offering_first_steps else self._use_button
         (rows[0] if rows else first).setFocus(Qt.FocusReason.OtherFocusReason)

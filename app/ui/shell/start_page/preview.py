@@ -28,13 +28,13 @@ class Row:
         depth: Nesting depth.
         category: Block category, which determines the colour.
         text_length: Length of the text in characters.
-        values: Number of slots and fields, at most 3.
+        value_count: Number of slots and fields, at most 3.
     """
 
     depth: int
     category: str
     text_length: int
-    values: int
+    value_count: int
 
 
 def category_of(block_type: str) -> str:
@@ -48,10 +48,10 @@ def category_of(block_type: str) -> str:
 def rows(workspace: Mapping[str, object]) -> tuple[Row, ...]:
     """Return the first blocks of the largest script in a workspace; empty if there are no blocks."""
     blocks = workspace.get("blocks")
-    tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
-    if not isinstance(tops, list):
+    top_blocks = blocks.get("blocks") if isinstance(blocks, Mapping) else None
+    if not isinstance(top_blocks, list):
         return ()
-    scripts = [tuple(_chain(top, 0)) for top in tops if isinstance(top, Mapping)]
+    scripts = [tuple(_chain(top, 0)) for top in top_blocks if isinstance(top, Mapping)]
     return max(scripts, key=len, default=())[:MAX_ROWS]
 
 
@@ -65,8 +65,8 @@ def _chain(block: Mapping[str, object], depth: int) -> Iterator[Row]:
         children = [_child(value) for name, value in slots.items() if _is_statement(str(name))]
         fields = current.get("fields")
         values = len(slots) - len(children) + (len(fields) if isinstance(fields, Mapping) else 0)
-        kind = str(current.get("type", ""))
-        yield Row(depth, category_of(kind), len(kind.rsplit("_", 1)[-1]), min(values, 3))
+        block_type = str(current.get("type", ""))
+        yield Row(depth, category_of(block_type), len(block_type.rsplit("_", 1)[-1]), min(values, 3))
         if depth < MAX_DEPTH:
             for child in children:
                 if child is not None:
@@ -122,7 +122,7 @@ def paint_rows(painter: QPainter, area: QRectF, theme: Theme, preview_rows: tupl
         if top > area.bottom():
             break
         left = area.left() + row.depth * INDENT
-        width = 58.0 + 8.0 * row.text_length + 38.0 * row.values
+        width = 58.0 + 8.0 * row.text_length + 38.0 * row.value_count
         rect = QRectF(left, top, min(width, area.right() - left), ROW_HEIGHT)
         painter.setPen(QPen(theme.block_colour(row.category, "tertiary"), 0.75))
         painter.setBrush(theme.block_colour(row.category))
@@ -140,7 +140,7 @@ def _paint_content(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> N
     faint.setAlphaF(0.75)
     paint.box(painter, text_bar, 2.5, faint)
     left = text_bar.right() + 7
-    for _ in range(row.values):
+    for _ in range(row.value_count):
         if left + 26 > rect.right() - 4:
             break
         paint.box(painter, QRectF(left, middle - 5, 26, 10), 5, colour)

@@ -18,9 +18,9 @@ class CheckBox(PaintedButton):
 
     elides_text = True
 
-    def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
+    def __init__(self, theme: Theme, text: str, is_checked: bool = False) -> None:
         super().__init__(theme, text, checkable=True)
-        self.setChecked(on)
+        self.setChecked(is_checked)
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("body")
@@ -38,7 +38,7 @@ class CheckBox(PaintedButton):
             paint.box(painter, box_rect, theme.radius("key"), theme.colour("accent"))
             paint_icon(painter, box_rect.adjusted(2, 2, -2, -2), "check", theme.colour("onAccent"))
         else:
-            fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.dark else "panel")
+            fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.is_dark else "panel")
             paint.box(painter, box_rect, theme.radius("key"), fill, theme.colour("controlBorder"))
         colour = theme.colour("text" if self.isEnabled() else "textDisabled")
         paint.text_line(

@@ -68,7 +68,7 @@ class ComboBox(QComboBox):
         theme = self._theme
         painter = QPainter(self)
         rect = QRectF(self.rect())
-        fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.dark else "panel")
+        fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.is_dark else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("controlBorder"))
         colour = theme.colour("text" if self.isEnabled() else "textDisabled")
         paint.text_line(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), colour)

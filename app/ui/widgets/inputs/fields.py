@@ -17,7 +17,7 @@ from nep.i18n import number as number_text
 
 MAX_LINES = 5
 MIN_HEIGHT = 34
-SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for rounding
+STYLE_SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for rounding
 
 
 class SearchField(QLineEdit):
@@ -86,10 +86,10 @@ class NumberEdit(QLineEdit):
         maximum: Maximum, or None for no limit.
         unit: Unit, or "".
         decimals: Number of decimals.
-        empty: True if the field may be empty; `cleared` is then emitted when the text is deleted.
+        may_be_empty: True if the field may be empty; `cleared` is then emitted when the text is deleted.
     """
 
-    number = Signal(float)
+    number_entered = Signal(float)
     cleared = Signal()
     problem_changed = Signal(str)
 
@@ -101,10 +101,10 @@ class NumberEdit(QLineEdit):
         unit: str = "",
         decimals: int = 0,
         *,
-        empty: bool = False,
+        may_be_empty: bool = False,
     ) -> None:
         super().__init__()
-        self._may_be_empty = empty
+        self._may_be_empty = may_be_empty
         self._theme, self._unit, self._decimals = theme, unit, decimals
         self._minimum, self._maximum = minimum, maximum
         self.problem = ""
@@ -116,8 +116,8 @@ class NumberEdit(QLineEdit):
         self._arrange()
 
     def _arrange(self) -> None:
-        unit = paint.width_of(self._theme.font("body"), self._unit)
-        self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
+        unit_width = paint.width_of(self._theme.font("body"), self._unit)
+        self.setTextMargins(0, 0, round(unit_width) + (6 if self._unit else 0), 0)
 
     def show_number(self, value: float) -> None:
         """Show a number and clear the error state."""
@@ -144,7 +144,7 @@ class NumberEdit(QLineEdit):
             self._set_problem(_("The maximum is {value}.").format(value=self._limit_text(self._maximum)))
         else:
             self._set_problem("")
-            self.number.emit(value)
+            self.number_entered.emit(value)
 
     def _limit_text(self, value: float) -> str:
         return f"{number_text(value)} {self._unit}".rstrip()
@@ -267,11 +267,11 @@ class LongTextField(QWidget):
         return paint.height_of(self.edit.font())
 
     def _grow(self) -> None:
-        lines = self._line_count()
-        text = round(lines * self._line_height()) + SHEET_PADDING
-        height = max(round(self._theme.scaled(MIN_HEIGHT)), text + 8)
-        self.edit.setFixedHeight(text)
-        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MAX_LINES else None
+        line_count = self._line_count()
+        text_height = round(line_count * self._line_height()) + STYLE_SHEET_PADDING
+        height = max(round(self._theme.scaled(MIN_HEIGHT)), text_height + 8)
+        self.edit.setFixedHeight(text_height)
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if line_count == MAX_LINES else None
         self.edit.setVerticalScrollBarPolicy(policy or Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         if height != self.height():
             self.setFixedHeight(height)
@@ -286,7 +286,7 @@ class LongTextField(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         edge = "error" if self._is_invalid else "accent" if self.edit.hasFocus() else "controlBorder"
-        fill = theme.colour("sunken" if theme.dark else "panel")
+        fill = theme.colour("sunken" if theme.is_dark else "panel")
         width = 2.0 if self.edit.hasFocus() else 1.0
         paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
         painter.end()

@@ -36,7 +36,7 @@ _HIGHLIGHT_RULES: tuple[tuple[str, str], ...] = (
     ("warn", r"-?\b\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\b"),
 )
 _TOKEN_PATTERN = re.compile(
-    "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
+    "|".join(f"(?P<r{index}>{rule})" for index, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
 )
 
 
@@ -81,7 +81,7 @@ class JsonLinesEdit(QPlainTextEdit):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.wrong_line = 0
+        self.invalid_line = 0
         self.setProperty("bare", "true")
         self.setProperty("ownFocus", "true")
         self.setFrameShape(QFrame.Shape.NoFrame)
@@ -101,7 +101,7 @@ class JsonLinesEdit(QPlainTextEdit):
         self.setFont(font)
         self.highlighter.rehighlight()
         self._update_margins()
-        self.mark_line(self.wrong_line)
+        self.mark_line(self.invalid_line)
 
     def _margin_width(self) -> int:
         digits = max(2, len(str(self.blockCount())))
@@ -152,7 +152,7 @@ class JsonLinesEdit(QPlainTextEdit):
 
     def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""
-        self.wrong_line = line
+        self.invalid_line = line
         marks = []
         if line:
             mark = QTextEdit.ExtraSelection()
@@ -183,7 +183,7 @@ class JsonLinesEdit(QPlainTextEdit):
 
     def _paint_number(self, painter: QPainter, block: QTextBlock, area: QRectF, colour: QColor) -> None:
         theme, number = self._theme, block.blockNumber() + 1
-        if number == self.wrong_line:
+        if number == self.invalid_line:
             colour = theme.colour("error")
             row = QRectF(0, area.top(), self._numbers.width(), area.height())
             painter.fillRect(row, theme.colour("errorTint"))
@@ -201,11 +201,11 @@ class JsonEdit(QWidget):
     changed = Signal()
     submitted = Signal()
 
-    def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
-        # `name` is the accessible name; `least_lines` determines the minimum height.
+    def __init__(self, theme: Theme, name: str, *, min_lines: int = 6) -> None:
+        # `name` is the accessible name; `min_lines` determines the minimum height.
         super().__init__()
-        self._theme, self._min_lines = theme, least_lines
-        self._is_wrong = False
+        self._theme, self._min_lines = theme, min_lines
+        self._is_invalid = False
         self.edit = JsonLinesEdit(theme)
         self.edit.setAccessibleName(name)
         self.setFocusProxy(self.edit)
@@ -248,15 +248,15 @@ class JsonEdit(QWidget):
 
     def mark_line(self, line: int) -> None:
         """Mark a line, counted from 1, as invalid; 0 removes the marker."""
-        if line != self.edit.wrong_line or bool(line) != self._is_wrong:
-            self._is_wrong = bool(line)
+        if line != self.edit.invalid_line or bool(line) != self._is_invalid:
+            self._is_invalid = bool(line)
             self.edit.mark_line(line)
             self.update()
 
     @property
     def invalid_line(self) -> int:
         """Number of the line that is marked as invalid, or 0."""
-        return self.edit.wrong_line
+        return self.edit.invalid_line
 
     def _height_for(self, lines: int) -> int:
         return round(lines * paint.height_of(self.edit.font())) + 12
@@ -270,7 +270,7 @@ class JsonEdit(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         has_focus = self.edit.hasFocus()
-        edge = "error" if self._is_wrong else "accent" if has_focus else "controlBorder"
+        edge = "error" if self._is_invalid else "accent" if has_focus else "controlBorder"
         rect = QRectF(QPoint(0, 0), self.size())
         fill, width = theme.colour("panel"), 2.0 if has_focus else 1.0
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour(edge), width)

@@ -29,22 +29,22 @@ class _Segment(PaintedButton):
     elides_text = True
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
-        self._icon, self._check = icon, check
-        self._is_icon_only = self._dot = self.has_dot = False
+        self._icon, self._has_check_mark = icon, check
+        self._is_icon_only = self._is_dot_visible = self.reserves_dot = False
         self._height, self._padding, self._kind = _HEIGHTS[size]
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
 
-    def set_icon_only(self, icon_only: bool) -> None:
+    def set_icon_only(self, is_icon_only: bool) -> None:
         # The text becomes the tooltip.
-        self._is_icon_only = icon_only and self._icon is not None
+        self._is_icon_only = is_icon_only and self._icon is not None
         self.updateGeometry()
         self.update()
 
     def set_dot(self, visible: bool) -> None:
         """Show or hide the dot after the text, which marks an option that is in use."""
-        if visible != self._dot:
-            self._dot = visible
+        if visible != self._is_dot_visible:
+            self._is_dot_visible = visible
             template = _("{choice}, on") if visible else "{choice}"
             self.setAccessibleName(template.format(choice=self.text()))
             self.update()
@@ -67,7 +67,7 @@ class _Segment(PaintedButton):
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
-        icon_count = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
+        icon_count = int(self._icon is not None) + int(self._has_check_mark) + int(self.reserves_dot) / 2
         return round((self._icon_side() + GAP) * icon_count) - (GAP if self._is_icon_only else 0)
 
     def sizeHint(self) -> QSize:
@@ -81,17 +81,18 @@ class _Segment(PaintedButton):
         theme = self._theme
         is_checked = self.isChecked()
         if is_checked:
-            fill = theme.colour("pressed" if theme.dark else "panel")
+            fill = theme.colour("pressed" if theme.is_dark else "panel")
             paint.box(painter, rect, theme.radius("small"), fill, theme.colour("border"))
         elif self.is_hovered:
             paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
         colour = theme.colour(
             "text" if is_checked else "textSecondary" if self.isEnabled() else "textDisabled"
         )
-        icons = [name for name in ("check" if self._check and is_checked else None, self._icon) if name]
+        check_icon = "check" if self._has_check_mark and is_checked else None
+        icons = [name for name in (check_icon, self._icon) if name]
         text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._is_icon_only else 0)
         side = self._icon_side()
-        dot = (side + GAP) / 2 if self._dot else 0.0
+        dot = (side + GAP) / 2 if self._is_dot_visible else 0.0
         left = max(6.0, rect.center().x() - (text_width + len(icons) * (side + GAP) + dot) / 2)
         for name in icons:
             paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, colour)
@@ -99,7 +100,7 @@ class _Segment(PaintedButton):
         paint.text_line(
             painter, rect.adjusted(left, 0, 2 - dot, 0), self.displayed_text(), self._font(), colour
         )
-        if self._dot:
+        if self._is_dot_visible:
             dot_rect = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
             paint_icon(painter, dot_rect, "dot", theme.colour("ok"))
 
@@ -119,7 +120,7 @@ class Segments(QWidget):
         size: Literal["small", "normal", "form"] = "normal",
         name: str = "",
         wraps: bool = False,
-        dots: bool = False,
+        has_dots: bool = False,
     ) -> None:
         # `options` are (value, label, icon or None); `check` shows a check mark at the selected one; `wraps`
         # uses several rows if narrow.
@@ -138,16 +139,16 @@ class Segments(QWidget):
         self._segments: dict[str, _Segment] = {}
         for key, text, icon in options:
             segment = _Segment(theme, text, icon, size, check)
-            segment.has_dot = dots
+            segment.reserves_dot = has_dots
             row.addWidget(segment)
             self._segments[key] = segment
             segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
-    def set_icon_only(self, icon_only: bool) -> None:
-        """Show only icons if `icon_only`, else icons and texts. Options without an icon keep their text."""
+    def set_icon_only(self, is_icon_only: bool) -> None:
+        """Show only icons if `is_icon_only`, else icons and texts. Options without an icon keep the text."""
         for segment in self._segments.values():
-            segment.set_icon_only(icon_only)
+            segment.set_icon_only(is_icon_only)
 
     def set_dot(self, value: str, visible: bool) -> None:
         """Show or hide a dot after the text of an option, which marks the option as in use.
@@ -183,6 +184,6 @@ class Segments(QWidget):
         painter = QPainter(self)
         theme = self._theme
         rect = QRectF(self.rect())
-        edge = theme.colour("border") if theme.dark or theme.high_contrast else None
+        edge = theme.colour("border") if theme.is_dark or theme.is_high_contrast else None
         paint.box(painter, rect, theme.radius("panel"), theme.colour("sunken"), edge)
         painter.end()

@@ -45,15 +45,15 @@ class SliderTrack(QSlider):
 
     def handle_centre(self) -> QPointF:
         """Return the position of the handle's centre."""
-        half = self._theme.size("sliderHandle") / 2
+        handle_radius = self._theme.size("sliderHandle") / 2
         span = max(1, self.maximum() - self.minimum())
-        share = (self.sliderPosition() - self.minimum()) / span
-        return QPointF(half + share * (self.width() - 2 * half), self.height() / 2)
+        fraction = (self.sliderPosition() - self.minimum()) / span
+        return QPointF(handle_radius + fraction * (self.width() - 2 * handle_radius), self.height() / 2)
 
     def _step_at(self, x: float) -> int:
-        half = self._theme.size("sliderHandle") / 2
-        share = (x - half) / max(1.0, self.width() - 2 * half)
-        return round(self.minimum() + min(max(share, 0.0), 1.0) * (self.maximum() - self.minimum()))
+        handle_radius = self._theme.size("sliderHandle") / 2
+        fraction = (x - handle_radius) / max(1.0, self.width() - 2 * handle_radius)
+        return round(self.minimum() + min(max(fraction, 0.0), 1.0) * (self.maximum() - self.minimum()))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -84,16 +84,17 @@ class SliderTrack(QSlider):
         theme = self._theme
         painter = QPainter(self)
         middle = self.handle_centre()
-        thick, side = theme.size("sliderTrack"), theme.size("sliderHandle")
-        track = QRectF(side / 2 - 2, middle.y() - thick / 2, self.width() - side + 4, thick)
-        paint.box(painter, track, thick / 2, theme.colour("borderStrong"))
+        track_height, handle_size = theme.size("sliderTrack"), theme.size("sliderHandle")
+        track_left, track_width = handle_size / 2 - 2, self.width() - handle_size + 4
+        track = QRectF(track_left, middle.y() - track_height / 2, track_width, track_height)
+        paint.box(painter, track, track_height / 2, theme.colour("borderStrong"))
         track.setRight(middle.x())
-        enabled = self.isEnabled()
-        accent = theme.colour("accent" if enabled else "textDisabled")
-        paint.box(painter, track, thick / 2, accent)
+        is_enabled = self.isEnabled()
+        accent = theme.colour("accent" if is_enabled else "textDisabled")
+        paint.box(painter, track, track_height / 2, accent)
         painter.setPen(QPen(accent, 2))
         painter.setBrush(theme.colour("panel"))
-        painter.drawEllipse(middle, side / 2 - 1, side / 2 - 1)
+        painter.drawEllipse(middle, handle_size / 2 - 1, handle_size / 2 - 1)
         painter.end()
 
 
@@ -148,7 +149,7 @@ class SliderWithUnit(QWidget):
         self.set_value(value if value is not None else self._default)
         self.track.valueChanged.connect(self._on_track_changed)
         self.track.reset.connect(lambda: self._change_value(self._default))
-        self.field.number.connect(self._change_value)
+        self.field.number_entered.connect(self._change_value)
         self.field.problem_changed.connect(self._show_problem)
 
     def _set_name(self, name: str) -> None:

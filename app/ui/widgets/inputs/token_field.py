@@ -27,19 +27,19 @@ class Token(PaintedButton):
 
     Attributes:
         entry: Text of the entry.
-        is_left_out: True for an excluded entry, which is shown with "not".
+        is_excluded: True for an excluded entry, which is shown with "not".
     """
 
-    def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
+    def __init__(self, theme: Theme, entry: str, *, is_excluded: bool = False) -> None:
         super().__init__(theme)
-        self.entry, self.is_left_out = entry, is_left_out
-        template = _("Remove “not {pattern}”") if is_left_out else _("Remove “{pattern}”")
+        self.entry, self.is_excluded = entry, is_excluded
+        template = _("Remove “not {pattern}”") if is_excluded else _("Remove “{pattern}”")
         self.set_text(entry, template.format(pattern=entry))
 
     def sizeHint(self) -> QSize:
         theme = self._theme
         width = 2 * PADDING + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS_SIZE)
-        if self.is_left_out:
+        if self.is_excluded:
             width += paint.width_of(theme.font("small"), _(EXCLUDE_KEYWORD)) + GAP
         return QSize(round(width) + 1, round(theme.scaled(TOKEN_HEIGHT)))
 
@@ -55,20 +55,20 @@ class Token(PaintedButton):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         bounds = QRectF(self.rect())
-        fill = "hover" if self.is_highlighted else "sunken" if self.is_left_out else "accentTint"
+        fill = "hover" if self.is_highlighted else "sunken" if self.is_excluded else "accentTint"
         paint.box(painter, bounds, theme.radius("small"), theme.colour(fill))
-        role = "textDisabled" if not self.isEnabled() else "text" if self.is_left_out else "accentText"
+        role = "textDisabled" if not self.isEnabled() else "text" if self.is_excluded else "accentText"
         colour = theme.colour(role)
-        rest = bounds.adjusted(PADDING, 0, -PADDING, 0)
-        if self.is_left_out:
+        contents_rect = bounds.adjusted(PADDING, 0, -PADDING, 0)
+        if self.is_excluded:
             font = theme.font("small")
-            paint.text_line(painter, rest, _(EXCLUDE_KEYWORD), font, theme.colour("textSecondary"))
-            rest.setLeft(rest.left() + paint.width_of(font, _(EXCLUDE_KEYWORD)) + GAP)
+            paint.text_line(painter, contents_rect, _(EXCLUDE_KEYWORD), font, theme.colour("textSecondary"))
+            contents_rect.setLeft(contents_rect.left() + paint.width_of(font, _(EXCLUDE_KEYWORD)) + GAP)
         side = theme.scaled(CROSS_SIZE)
-        icon_rect = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
+        icon_rect = QRectF(contents_rect.right() - side, contents_rect.center().y() - side / 2, side, side)
         paint_icon(painter, icon_rect, "x", colour)
-        rest.setRight(icon_rect.left() - GAP + 1)
-        paint.text_line(painter, rest, self.entry, theme.font("code"), colour)
+        contents_rect.setRight(icon_rect.left() - GAP + 1)
+        paint.text_line(painter, contents_rect, self.entry, theme.font("code"), colour)
         painter.end()
 
 
@@ -79,7 +79,7 @@ class _TokenEdit(QLineEdit):
     """
 
     completed = Signal()
-    back = Signal()
+    backspace_pressed = Signal()
     focus_changed = Signal()
 
     def sizeHint(self) -> QSize:
@@ -95,7 +95,7 @@ class _TokenEdit(QLineEdit):
         if is_unmodified and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
             self.completed.emit()
         elif is_unmodified and event.key() == Qt.Key.Key_Backspace and not self.text():
-            self.back.emit()
+            self.backspace_pressed.emit()
         else:
             super().keyPressEvent(event)
 
@@ -120,16 +120,16 @@ class TokenField(QWidget):
         theme: Theme.
         name: Accessible name.
         example: Placeholder of the empty field.
-        add: Placeholder after the tokens.
+        add_placeholder: Placeholder after the tokens.
     """
 
     changed = Signal()
     editing_finished = Signal()
 
-    def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
+    def __init__(self, theme: Theme, name: str, example: str, add_placeholder: str = "") -> None:
         super().__init__()
-        self._add_placeholder = add
-        self._theme, self._example, self._is_wrong = theme, example, False
+        self._add_placeholder = add_placeholder
+        self._theme, self._example, self._is_invalid = theme, example, False
         self._tokens: list[Token] = []
         self.edit = _TokenEdit(self)
         self.edit.setAccessibleName(name)
@@ -141,21 +141,21 @@ class TokenField(QWidget):
         self.edit.textEdited.connect(self._on_edited)
         self.edit.textChanged.connect(self.edit.updateGeometry)
         self.edit.completed.connect(self._end_typing)
-        self.edit.back.connect(self._remove_last)
+        self.edit.backspace_pressed.connect(self._remove_last)
         self.edit.focus_changed.connect(self.update)
         self.setFocusProxy(self.edit)
         self._flow = Flow(self, gap=GAP, row_gap=4)
         self._flow.setContentsMargins(PADDING, 5, PADDING, 5)
-        self._flow.add_elastic(self.edit, greedy=True)
+        self._flow.add_elastic(self.edit, is_greedy=True)
 
     @property
     def tokens(self) -> Sequence[Token]:
         """Tokens in the order in which they are shown."""
         return tuple(self._tokens)
 
-    def set_invalid(self, is_wrong: bool) -> None:
-        """Show the field as invalid if ``is_wrong``, else as valid."""
-        self._is_wrong = is_wrong
+    def set_invalid(self, is_invalid: bool) -> None:
+        """Show the field as invalid if ``is_invalid``, else as valid."""
+        self._is_invalid = is_invalid
         self.update()
 
     # ---- input
@@ -176,7 +176,7 @@ class TokenField(QWidget):
         self.changed.emit()
         self.editing_finished.emit()
 
-    # ---- inside
+    # ---- tokens
 
     def _add_token(self, token: Token) -> None:
         token.clicked.connect(lambda _on=False: self._remove(token))
@@ -199,7 +199,7 @@ class TokenField(QWidget):
             if before is not None:
                 QWidget.setTabOrder(before, token)
             before = token
-        self._flow.add_elastic(self.edit, greedy=True)
+        self._flow.add_elastic(self.edit, is_greedy=True)
         if before is not None:
             QWidget.setTabOrder(before, self.edit)
         self.edit.setPlaceholderText(self._add_placeholder if self._tokens else self._example)
@@ -212,7 +212,7 @@ class TokenField(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)
         has_focus = self.edit.hasFocus()
-        edge = "error" if self._is_wrong else "accent" if has_focus else "controlBorder"
-        fill, width = theme.colour("sunken" if theme.dark else "panel"), 2.0 if has_focus else 1.0
+        edge = "error" if self._is_invalid else "accent" if has_focus else "controlBorder"
+        fill, width = theme.colour("sunken" if theme.is_dark else "panel"), 2.0 if has_focus else 1.0
         paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
         painter.end()

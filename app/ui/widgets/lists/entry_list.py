@@ -22,7 +22,7 @@ from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _
 
 ROW_HEIGHT, HEADING_HEIGHT, INSET = 40, 30, 8
-ICON_LEFT, TEXT_LEFT, RIGHT = 10, 38, 10
+ICON_LEFT, TEXT_LEFT, RIGHT_MARGIN = 10, 38, 10
 Index = QModelIndex | QPersistentModelIndex
 
 
@@ -97,12 +97,12 @@ class EntryDelegate(QStyledItemDelegate):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.waiting = ""  # id of the entry that waits for a new shortcut
+        self.waiting_entry_id = ""  # id of the entry that waits for a new shortcut
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
         model = index.model()
-        heading = isinstance(model, EntryModel) and isinstance(model.lines[index.row()], Heading)
-        return QSize(100, round(self._theme.scaled(HEADING_HEIGHT if heading else ROW_HEIGHT)))
+        is_heading = isinstance(model, EntryModel) and isinstance(model.lines[index.row()], Heading)
+        return QSize(100, round(self._theme.scaled(HEADING_HEIGHT if is_heading else ROW_HEIGHT)))
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         model = index.model()
@@ -124,35 +124,35 @@ class EntryDelegate(QStyledItemDelegate):
     def _paint_row(self, painter: QPainter, rect: QRectF, match: Match, *, is_selected: bool) -> None:
         theme, entry = self._theme, match.entry
         if is_selected:
-            edge = theme.colour("controlBorder") if theme.high_contrast else None
+            edge = theme.colour("controlBorder") if theme.is_high_contrast else None
             paint.box(painter, rect, theme.radius("panel"), theme.colour("selected"), edge)
         text_role = (
             "textDisabled" if entry.reason and not is_selected else "selectedText" if is_selected else "text"
         )
-        quiet = "selectedText" if is_selected else "textSecondary"
+        secondary_role = "selectedText" if is_selected else "textSecondary"
         side = theme.scaled(16)
         icon_rect = QRectF(rect.left() + ICON_LEFT, rect.center().y() - side / 2, side, side)
         if entry.icon:
-            dim = text_role if is_selected or entry.reason else "textSecondary"
-            paint_icon(painter, icon_rect, entry.icon, theme.colour(dim))
-        right = self._paint_right(painter, rect, entry, quiet, is_selected=is_selected)
+            icon_role = text_role if is_selected or entry.reason else "textSecondary"
+            paint_icon(painter, icon_rect, entry.icon, theme.colour(icon_role))
+        right = self._paint_right(painter, rect, entry, secondary_role, is_selected=is_selected)
         left = rect.left() + (TEXT_LEFT if entry.icon else ICON_LEFT) + (side - 16 if entry.icon else 0)
         area = QRectF(left, rect.top(), max(20.0, right - left - 12), rect.height())
-        marked = text_role if is_selected or entry.reason else "accentText"
-        self._paint_text(painter, area, match, text_role, marked)
+        match_role = text_role if is_selected or entry.reason else "accentText"
+        self._paint_text(painter, area, match, text_role, match_role)
 
     def _paint_right(
-        self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, is_selected: bool
+        self, painter: QPainter, rect: QRectF, entry: Entry, secondary_role: str, *, is_selected: bool
     ) -> float:
         # Paints note, shortcut and Enter sign; returns their left edge.
-        theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
-        if entry.id == self.waiting:
+        theme, right, middle = self._theme, rect.right() - RIGHT_MARGIN, rect.center().y()
+        if entry.id == self.waiting_entry_id:
             font = theme.font("body")
             font.setWeight(QFont.Weight.Medium)
             prompt = _("Press the new shortcut")
             width = paint.width_of(font, prompt)
             area = QRectF(right - width, rect.top(), width, rect.height())
-            paint.text_line(painter, area, prompt, font, theme.colour(quiet))
+            paint.text_line(painter, area, prompt, font, theme.colour(secondary_role))
             return right - width
         if is_selected and not entry.reason:
             side = theme.scaled(15)
@@ -167,10 +167,12 @@ class EntryDelegate(QStyledItemDelegate):
             room = min(paint.width_of(font, text), rect.width() * 0.55)
             right -= room + 4
             area = QRectF(right, rect.top(), room, rect.height())
-            paint.text_line(painter, area, text, font, theme.colour(quiet), paint.RIGHT)
+            paint.text_line(painter, area, text, font, theme.colour(secondary_role), paint.RIGHT)
         return right
 
-    def _paint_text(self, painter: QPainter, area: QRectF, match: Match, text_role: str, marked: str) -> None:
+    def _paint_text(
+        self, painter: QPainter, area: QRectF, match: Match, text_role: str, match_role: str
+    ) -> None:
         # Paints the text with matching letters in bold.
         theme = self._theme
         regular = theme.font("code" if match.entry.kind == "topic" else "bodyLarge")
@@ -188,7 +190,7 @@ class EntryDelegate(QStyledItemDelegate):
             font = bold if is_match else regular
             piece = elided[begin:stop]
             painter.setFont(font)
-            painter.setPen(theme.colour(marked if is_match else text_role))
+            painter.setPen(theme.colour(match_role if is_match else text_role))
             painter.drawText(area, int(paint.LEFT), piece)
             area.setLeft(area.left() + paint.width_of(font, piece))
 
@@ -206,9 +208,9 @@ class EntryList(QListView):
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__()
         self._theme = theme
-        self.lines = EntryModel()
+        self.line_model = EntryModel()
         self.delegate = EntryDelegate(theme)
-        self.setModel(self.lines)
+        self.setModel(self.line_model)
         self.setItemDelegate(self.delegate)
         self.setAccessibleName(name)
         self.setProperty("raised", "true")
@@ -225,7 +227,7 @@ class EntryList(QListView):
             lines: Headings and entries.
             selected_id: Id of the entry to select; "" or an unknown id selects the first entry.
         """
-        self.lines.show_lines(lines)
+        self.line_model.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         matching_rows = (row for row in rows if selected_id and _id(lines[row]) == selected_id)
         self._select_row(next(matching_rows, rows[0] if rows else -1))
@@ -240,23 +242,23 @@ class EntryList(QListView):
             note: Text on the right.
             reason: Reason why the entry is unavailable, or "".
         """
-        self.lines.update_entry(id, note, reason)
+        self.line_model.update_entry(id, note, reason)
 
     @property
     def entry(self) -> Entry | None:
         """Selected entry, or None."""
         row = self.currentIndex().row()
-        line = self.lines.lines[row] if 0 <= row < len(self.lines.lines) else None
+        line = self.line_model.lines[row] if 0 <= row < len(self.line_model.lines) else None
         return line.entry if isinstance(line, Match) else None
 
     def content_height(self) -> int:
         """Return the total height in px of all headings and entries."""
         heights = {Heading: self._theme.scaled(HEADING_HEIGHT), Match: self._theme.scaled(ROW_HEIGHT)}
-        return sum(round(heights[type(line)]) for line in self.lines.lines)
+        return sum(round(heights[type(line)]) for line in self.line_model.lines)
 
     def step(self, steps: int) -> None:
         """Move the selection by a number of entries, up to the first or last one."""
-        rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
+        rows = [row for row, line in enumerate(self.line_model.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
             index = rows.index(current) if current in rows else 0
@@ -265,7 +267,7 @@ class EntryList(QListView):
     def handle_key(self, key: int) -> bool:
         """Move the selection on Up, Down, Page Up, Page Down, Home and End; return False for other keys."""
         page = max(1, self.viewport().height() // round(self._theme.scaled(ROW_HEIGHT)) - 1)
-        row_count = len(self.lines.lines)
+        row_count = len(self.line_model.lines)
         steps = {
             Qt.Key.Key_Up: -1,
             Qt.Key.Key_Down: 1,
@@ -280,15 +282,15 @@ class EntryList(QListView):
         return True
 
     def _select_row(self, row: int) -> None:
-        index = self.lines.index(row) if row >= 0 else QModelIndex()
+        index = self.line_model.index(row) if row >= 0 else QModelIndex()
         self.setCurrentIndex(index)
-        if row >= 1 and isinstance(self.lines.lines[row - 1], Heading):
-            self.scrollTo(self.lines.index(row - 1))
+        if row >= 1 and isinstance(self.line_model.lines[row - 1], Heading):
+            self.scrollTo(self.line_model.index(row - 1))
         self.scrollTo(index)
         self.selection_moved.emit()
 
     def _on_clicked(self, index: QModelIndex) -> None:
-        if isinstance(self.lines.lines[index.row()], Match):
+        if isinstance(self.line_model.lines[index.row()], Match):
             self._select_row(index.row())
             self.row_activated.emit()
 

@@ -163,9 +163,9 @@ class Finder:
     def __init__(self, entries: Sequence[Entry]) -> None:
         # Entries with equal scores keep their order.
         self.entries = entries
-        self._kinds: dict[str, list[tuple[str, Entry]]] = {}
+        self._entries_by_kind: dict[str, list[tuple[str, Entry]]] = {}
         for entry in entries:
-            self._kinds.setdefault(entry.kind, []).append((entry.text.lower(), entry))
+            self._entries_by_kind.setdefault(entry.kind, []).append((entry.text.lower(), entry))
 
     def find(self, query: str, limit: int) -> tuple[list[Match], int]:
         """Search the entries.
@@ -180,22 +180,23 @@ class Finder:
         pieces = query.lower().split()
         best: list[list[Match]] = []
         count = 0
-        for pairs in self._kinds.values():
-            few = [entry for _lower, entry in pairs]
+        for pairs in self._entries_by_kind.values():
+            candidates = [entry for _lower, entry in pairs]
             if len(pairs) > MAX_FUZZY_ENTRIES:
                 exact_pairs = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
                 count += len(exact_pairs) - min(len(exact_pairs), MAX_FUZZY_ENTRIES)
-                few = [
+                candidates = [
                     entry
                     for _lower, entry in heapq.nsmallest(
                         MAX_FUZZY_ENTRIES, exact_pairs, key=_by_position(pieces)
                     )
                 ]
-            matches = [each for each in (_match_entry(query, entry) for entry in few) if each is not None]
+            results = (_match_entry(query, entry) for entry in candidates)
+            matches = [each for each in results if each is not None]
             count += len(matches)
             if matches:
                 best.append(heapq.nlargest(limit, matches, key=attrgetter("score")))
-        best.sort(key=lambda found: (not _matches_initials(query, found), -found[0].score))
+        best.sort(key=lambda matches: (not _matches_initials(query, matches), -matches[0].score))
         return [each for matches in best for each in matches], count
 
 
@@ -216,10 +217,10 @@ def _matches_initials(query: str, matches: Sequence[Match]) -> bool:
 def is_initials(query: str, text: str) -> bool:
     """Return True if a query consists of initials of a text's words, starting with the first word."""
     initials = query.lower().strip()
-    firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in text.lower()).split()]
-    if len(initials) < 2 or not firsts or initials[0] != firsts[0]:
+    first_letters = [word[0] for word in "".join(c if c.isalnum() else " " for c in text.lower()).split()]
+    if len(initials) < 2 or not first_letters or initials[0] != first_letters[0]:
         return False
-    remaining = iter(firsts)
+    remaining = iter(first_letters)
     return all(letter in remaining for letter in initials)
 
 

@@ -17,7 +17,7 @@ from app.ui.widgets.paint import box as paint_box
 from app.ui.widgets.table.model import Cell, Column, Order
 
 Index = QModelIndex | QPersistentModelIndex
-EDGE, PADDING, ICON = 12, 6, 14
+EDGE, PADDING, ICON_SIZE = 12, 6, 14
 # maximum number of cached cells: some screens, so that the cache does not grow by scrolling
 MAX_CACHED_CELLS = 4000
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
@@ -34,7 +34,7 @@ class TableAppearance(Protocol):
 
     row_height: int
     hovered_row: int
-    last_visible_column: int  # index of the last visible column
+    last_visible_column: int
 
     @property
     def all_columns(self) -> Sequence[Column[Any]]:
@@ -91,21 +91,22 @@ class CellDelegate(QStyledItemDelegate):
         super().__init__(parent)
         self._theme = theme
         self._view = view
-        self._painted: dict[tuple[int, int], Cell] = {}
+        self._painted_cells: dict[tuple[int, int], Cell] = {}
 
     def changed_columns(self, row: int, columns: Sequence[int]) -> list[int]:
         """Return the columns of a row whose contents differ from the last painted ones."""
-        if len(self._painted) > MAX_CACHED_CELLS:
-            self._painted.clear()
+        if len(self._painted_cells) > MAX_CACHED_CELLS:
+            self._painted_cells.clear()
         cell_at = self._view.cell_at
-        return [column for column in columns if self._painted.get((row, column)) != cell_at(row, column)]
+        painted_cells = self._painted_cells
+        return [column for column in columns if painted_cells.get((row, column)) != cell_at(row, column)]
 
     def sizeHint(self, _option: QStyleOptionViewItem, _index: Index) -> QSize:
         return QSize(40, self._view.row_height)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         row, column = index.row(), index.column()
-        cell = self._painted[row, column] = self._view.cell_at(row, column)
+        cell = self._painted_cells[row, column] = self._view.cell_at(row, column)
         theme, rect = self._theme, QRect(option.rect)
         is_selected = QStyle.StateFlag.State_Selected in option.state
         painter.save()
@@ -153,24 +154,24 @@ class CellDelegate(QStyledItemDelegate):
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)
-        reserved_width = (ICON + 5.0 if cell.icon else 0.0) + (
+        reserved_width = (ICON_SIZE + 5.0 if cell.icon else 0.0) + (
             self._chip_width(cell.chip) + 8 if cell.chip else 0.0
         )
         text, room = cell.text, max(0.0, box.width() - reserved_width)
         advance = metrics.horizontalAdvance(text)
         if advance > room:
-            shorten = Qt.TextElideMode.ElideMiddle if cell.elide_middle else Qt.TextElideMode.ElideRight
-            text = metrics.elidedText(text, shorten, room)
+            elide_mode = Qt.TextElideMode.ElideMiddle if cell.elide_middle else Qt.TextElideMode.ElideRight
+            text = metrics.elidedText(text, elide_mode, room)
             advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - reserved_width if is_numeric else box.left()
         if cell.icon:
-            top = box.center().y() - ICON / 2
-            paint_cached_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
-            x += ICON + 5.0
+            top = box.center().y() - ICON_SIZE / 2
+            paint_cached_icon(painter, QRectF(x, top, ICON_SIZE, ICON_SIZE), cell.icon, colour)
+            x += ICON_SIZE + 5.0
         if cell.tint and text:
             height = metrics.height() + 2
-            ground = QRectF(x - 4, box.center().y() - height / 2, advance + 8, height)
-            paint_box(painter, ground, theme.radius("key"), theme.colour(cell.tint))
+            tint_rect = QRectF(x - 4, box.center().y() - height / 2, advance + 8, height)
+            paint_box(painter, tint_rect, theme.radius("key"), theme.colour(cell.tint))
         painter.setFont(font)
         painter.setPen(colour)
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
@@ -220,18 +221,18 @@ class TableHeader(QHeaderView):
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         font = header_font(theme)
         box = padded_rect(rect, section, self._view.last_visible_column)
-        ordered = self._view.sort_order.column is column
+        is_sorted = self._view.sort_order.column is column
         metrics = QFontMetricsF(font)
-        arrow = 16.0 if ordered else 0.0
+        arrow_width = 16.0 if is_sorted else 0.0
         text = metrics.elidedText(
-            column.translated_title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow)
+            column.translated_title, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow_width)
         )
         advance = metrics.horizontalAdvance(text)
-        x = box.right() - advance - arrow if column.is_numeric else box.left()
+        x = box.right() - advance - arrow_width if column.is_numeric else box.left()
         painter.setFont(font)
-        painter.setPen(theme.colour("text" if ordered else "textTertiary"))
+        painter.setPen(theme.colour("text" if is_sorted else "textTertiary"))
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
-        if ordered:
+        if is_sorted:
             name = "chevron-up" if self._view.sort_order.is_descending else "chevron-down"
             icon_rect = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
             paint_icon(painter, icon_rect, name, theme.colour("textSecondary"))

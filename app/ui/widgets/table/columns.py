@@ -30,13 +30,13 @@ class ColumnChoice:
             or column is self._columns[0]
         )
 
-    def show(self, name: str, shown: bool) -> None:
-        """Show a column if `shown`, else hide it. Ignores the first column and unknown names."""
+    def show(self, name: str, is_visible: bool) -> None:
+        """Show a column if `is_visible`, else hide it. Ignores the first column and unknown names."""
         for column in self._columns[1:]:
             if column.name == name:
                 self._visibility_by_column.pop(name, None)
-                if shown is column.is_hidden_by_default:
-                    self._visibility_by_column[name] = shown
+                if is_visible is column.is_hidden_by_default:
+                    self._visibility_by_column[name] = is_visible
 
     def reset(self) -> None:
         """Restore the default visibility of all columns."""
@@ -58,23 +58,23 @@ class ColumnChoice:
             room: Available width in px.
         """
         visible_columns = {index for index, column in enumerate(self._columns) if self.should_show(column)}
-        yielding = sorted(
+        hideable = sorted(
             (self._columns[index].hide_order, index)
             for index in visible_columns
             if self._columns[index].hide_order
             and not self._visibility_by_column.get(self._columns[index].name)
         )
-        while yielding and sum(widths[index] for index in visible_columns) > room:
-            visible_columns.discard(yielding.pop()[1])
+        while hideable and sum(widths[index] for index in visible_columns) > room:
+            visible_columns.discard(hideable.pop()[1])
         return visible_columns
 
-    def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
+    def menu(self, theme: Theme, parent: QWidget, on_changed: Callable[[], object]) -> Menu:
         """Return a new menu to show and hide columns, see `fill`."""
         menu = Menu(theme, parent, _("Columns"))
-        self.fill(menu, changed)
+        self.fill(menu, on_changed)
         return menu
 
-    def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
+    def fill(self, menu: Menu, on_changed: Callable[[], object]) -> None:
         """Replace the entries of a menu by entries to show and hide columns.
 
         There is a checkable entry for each available column except the first, and an entry that
@@ -82,17 +82,17 @@ class ColumnChoice:
 
         Args:
             menu: Menu.
-            changed: Called after a column was shown or hidden.
+            on_changed: Called after a column was shown or hidden.
         """
         menu.clear()
 
-        def set_visible(name: str, visible: bool) -> None:
+        def set_column_visible(name: str, visible: bool) -> None:
             self.show(name, visible)
-            changed()
+            on_changed()
 
         def restore_defaults() -> None:
             self.reset()
-            changed()
+            on_changed()
 
         for column in self._columns[1:]:
             if column.is_available is not None and not column.is_available():
@@ -100,7 +100,7 @@ class ColumnChoice:
             action = menu.addAction(column.display_name)
             action.setCheckable(True)
             action.setChecked(self.should_show(column))
-            action.toggled.connect(lambda on, name=column.name: set_visible(name, on))
+            action.toggled.connect(lambda on, name=column.name: set_column_visible(name, on))
         menu.addSeparator()
         reset_action = menu.addAction(_("Default columns"))
         reset_action.setEnabled(self.changed)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
 CELL_ROLE = int(Qt.ItemDataRole.UserRole)
-MAX_REMOVED_RANGES = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
+MAX_REMOVED_RANGES = 40  # with more ranges of removed rows, a reset is cheaper than a signal for each
 _ROOT = QModelIndex()
 
 
@@ -224,21 +224,22 @@ class TableModel(QAbstractTableModel, Generic[Row]):
     def set_rows(self, rows: Sequence[Row]) -> None:
         """Replace the rows; the selection is kept if the selected row still exists.
 
-        If more than `MAX_RUNS` separate ranges of rows disappear, the model is reset and the selection
-        is lost.
+        If more than `MAX_REMOVED_RANGES` separate ranges of rows disappear, the model is reset and the
+        selection is lost.
         """
         keys = [self._key(row) for row in rows]
         if keys == self._rows.keys:
             self._rows.rows = list(rows)
             return
         new_keys = set(keys)
-        runs = _consecutive_runs([index for index, key in enumerate(self._rows.keys) if key not in new_keys])
-        if len(runs) > MAX_REMOVED_RANGES:
+        removed_rows = [index for index, key in enumerate(self._rows.keys) if key not in new_keys]
+        ranges = _consecutive_ranges(removed_rows)
+        if len(ranges) > MAX_REMOVED_RANGES:
             self.beginResetModel()
             self._rows = _Rows(list(rows), keys)
             self.endResetModel()
             return
-        for first, last in reversed(runs):
+        for first, last in reversed(ranges):
             self.beginRemoveRows(_ROOT, first, last)
             del self._rows.rows[first : last + 1], self._rows.keys[first : last + 1]
             self.endRemoveRows()
@@ -279,12 +280,12 @@ def _alignment(is_numeric: bool) -> int:
     return int(side | Qt.AlignmentFlag.AlignVCenter)
 
 
-def _consecutive_runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
+def _consecutive_ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
     # Groups consecutive numbers to (first, last).
-    runs: list[tuple[int, int]] = []
+    ranges: list[tuple[int, int]] = []
     for number in numbers:
-        if runs and runs[-1][1] == number - 1:
-            runs[-1] = (runs[-1][0], number)
+        if ranges and ranges[-1][1] == number - 1:
+            ranges[-1] = (ranges[-1][0], number)
         else:
-            runs.append((number, number))
-    return runs
+            ranges.append((number, number))
+    return ranges

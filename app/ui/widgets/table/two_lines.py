@@ -29,16 +29,16 @@ class TwoLines:
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
         """Paint both lines into the rectangle ``box``."""
-        name, below = (
+        name_font, second_font = (
             theme.font("code" if self.mono else "body"),
             theme.font("small" if self.mono else "mono"),
         )
         if not self.mono:
-            name.setWeight(QFont.Weight.DemiBold)
-        below.setPixelSize(theme.font("small").pixelSize())
-        first, second = paint.height_of(name), paint.height_of(below)
-        top = box.center().y() - (first + second + 2) / 2
-        row = QRectF(box.left(), top, box.width(), first)
-        paint.text_line(painter, row, self.name, name, theme.colour("text"))
-        row = QRectF(box.left(), top + first + 2, box.width(), second)
-        paint.text_line(painter, row, self.second_line, below, theme.colour("textSecondary"))
+            name_font.setWeight(QFont.Weight.DemiBold)
+        second_font.setPixelSize(theme.font("small").pixelSize())
+        first_height, second_height = paint.height_of(name_font), paint.height_of(second_font)
+        top = box.center().y() - (first_height + second_height + 2) / 2
+        row = QRectF(box.left(), top, box.width(), first_height)
+        paint.text_line(painter, row, self.name, name_font, theme.colour("text"))
+        row = QRectF(box.left(), top + first_height + 2, box.width(), second_height)
+        paint.text_line(painter, row, self.second_line, second_font, theme.colour("textSecondary"))

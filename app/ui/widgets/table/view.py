@@ -76,9 +76,9 @@ class TableView(QTableView, Generic[Row]):
         self.last_visible_column = len(self.columns) - 1
         self.row_height = 26
         self.hovered_row = -1
-        self.keyboard = False
+        self.is_keyboard_navigation = False
         self._fonts: dict[tuple[bool, bool, bool], QFont] = {}
-        self._large = False
+        self._is_large = False
         self.setModel(model)
         self._model = model
         self._cells = CellDelegate(theme, self, self)
@@ -119,7 +119,7 @@ class TableView(QTableView, Generic[Row]):
             height: Height in px.
             large: True for the text size of the comfortable density.
         """
-        self.row_height, self._large = height, large
+        self.row_height, self._is_large = height, large
         self._fonts.clear()
         rows = self.verticalHeader()
         rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
@@ -133,7 +133,7 @@ class TableView(QTableView, Generic[Row]):
         """Return the font for a cell."""
         key = (cell.mono, cell.bold, cell.is_struck_out)
         if key not in self._fonts:
-            font = self.theme.font("bodyLarge" if self._large else "body")
+            font = self.theme.font("bodyLarge" if self._is_large else "body")
             if cell.mono:
                 mono = self.theme.font("mono")
                 mono.setPixelSize(font.pixelSize())
@@ -200,7 +200,7 @@ class TableView(QTableView, Generic[Row]):
             self.selectRow(index.row())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        self.keyboard = True
+        self.is_keyboard_navigation = True
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._open(self.currentIndex())
         elif event.text() == "/":
@@ -209,20 +209,20 @@ class TableView(QTableView, Generic[Row]):
             super().keyPressEvent(event)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        by_keys = event.reason() == QContextMenuEvent.Reason.Keyboard
-        index = self.currentIndex() if by_keys else self.indexAt(event.pos())
+        is_by_keyboard = event.reason() == QContextMenuEvent.Reason.Keyboard
+        index = self.currentIndex() if is_by_keyboard else self.indexAt(event.pos())
         row = self._model.row_at(index)
         if row is None:
             return
         key = self._model.key_of(row)
         self.select_key(key)
-        position = self.visualRect(index).bottomLeft() if by_keys else event.pos()
+        position = self.visualRect(index).bottomLeft() if is_by_keyboard else event.pos()
         self.menu_requested.emit(key, self.viewport().mapToGlobal(position))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        self.keyboard = event.reason() in KEYBOARD_REASONS
+        self.is_keyboard_navigation = event.reason() in KEYBOARD_REASONS
         super().focusInEvent(event)
-        if self.keyboard and not self.currentIndex().isValid() and self._model.rowCount():
+        if self.is_keyboard_navigation and not self.currentIndex().isValid() and self._model.rowCount():
             self.setCurrentIndex(self._model.index(0, 0))
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -233,7 +233,7 @@ class TableView(QTableView, Generic[Row]):
         if event.type() in {QEvent.Type.MouseMove, QEvent.Type.HoverMove}:
             self._hover(self.rowAt(round(event.position().y())))  # type: ignore[attr-defined]
         elif event.type() in {QEvent.Type.MouseButtonPress, QEvent.Type.Leave, QEvent.Type.HoverLeave}:
-            self.keyboard = False
+            self.is_keyboard_navigation = False
         return super().viewportEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -250,14 +250,16 @@ class TableView(QTableView, Generic[Row]):
         visible_columns = self.choice.fitting_columns(scaled, room)
         spare = room - sum(scaled[index] for index in visible_columns)
         for index in sorted(visible_columns):  # translations may be longer; they get the remaining space
-            more = header_width(self.theme, self.columns[index]) - scaled[index]
-            if not self.columns[index].stretch and more > 0 and spare > 0:
-                scaled[index] += min(more, spare)
-                spare -= min(more, spare)
-        rest = room - sum(scaled[index] for index in visible_columns if not self.columns[index].stretch)
+            missing_width = header_width(self.theme, self.columns[index]) - scaled[index]
+            if not self.columns[index].stretch and missing_width > 0 and spare > 0:
+                scaled[index] += min(missing_width, spare)
+                spare -= min(missing_width, spare)
+        stretch_width = room - sum(
+            scaled[index] for index in visible_columns if not self.columns[index].stretch
+        )
         for index, column in enumerate(self.columns):
             self.setColumnHidden(index, index not in visible_columns)
-            self.setColumnWidth(index, max(scaled[index], rest) if column.stretch else scaled[index])
+            self.setColumnWidth(index, max(scaled[index], stretch_width) if column.stretch else scaled[index])
         self.last_visible_column = max(visible_columns)
         overflows = sum(scaled[index] for index in visible_columns) > room
         policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if overflows else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
@@ -297,7 +299,7 @@ class TableView(QTableView, Generic[Row]):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         index = self.currentIndex()
-        if self.keyboard and self.hasFocus() and index.isValid():
+        if self.is_keyboard_navigation and self.hasFocus() and index.isValid():
             painter = QPainter(self.viewport())
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(self.theme.colour("focus"), 2))
@@ -321,7 +323,7 @@ class TableView(QTableView, Generic[Row]):
         column = self.columns[section]
         if column.key is None:
             return
-        same = self.order.column is column
-        self.order = Order(column, not self.order.is_descending if same else column.is_numeric)
+        is_same_column = self.order.column is column
+        self.order = Order(column, not self.order.is_descending if is_same_column else column.is_numeric)
         self.horizontalHeader().viewport().update()
         self.order_changed.emit()

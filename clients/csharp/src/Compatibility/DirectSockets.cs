@@ -6,7 +6,7 @@ using Nep.Zmtp;
 
 namespace Nep
 {
-    /// <summary>Publisher of the original wire, bound at one port: frames of the form <c>TOPIC TEXT</c>. Thread-safe.</summary>
+    /// <summary>Publisher of the original wire, bound to one port; sends frames of the form <c>TOPIC TEXT</c>. Thread-safe.</summary>
     internal sealed class DirectPublisher : IXPubOwner
     {
         private readonly XPubSocket _socket;
@@ -81,7 +81,7 @@ namespace Nep
         {
             if (parts.Length != 1 || !ByteOrder.StartsWith(parts[0], _prefix))
             {
-                return; // ZeroMQ compares prefixes: "cam" also gets "camera ..."
+                return; // ZeroMQ compares prefixes: "cam" also matches "camera ..."
             }
             int size = parts[0].Length - _prefix.Length;
             Inbox.Put(new Message(new WireMessage

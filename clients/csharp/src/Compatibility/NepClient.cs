@@ -7,7 +7,7 @@ using Nep.Zmtp;
 
 namespace Nep
 {
-    /// <summary>Client of a server of the original library: one request, one answer. New programs use <see cref="Client"/>.</summary>
+    /// <summary>Client of a server of the original library, with one request at a time. New programs use <see cref="Client"/>.</summary>
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepClient : IDealerOwner, IDisposable
     {
@@ -19,29 +19,29 @@ namespace Nep
         private bool _isClosed;
 
         /// <summary>Connect to a server.</summary>
-        /// <param name="ip">Its address.</param>
-        /// <param name="port">Its port.</param>
-        /// <exception cref="ArgumentException">They are no address and port.</exception>
+        /// <param name="ip">Address of the server.</param>
+        /// <param name="port">Port of the server.</param>
+        /// <exception cref="ArgumentException">The address or port is invalid.</exception>
         public NepClient(string ip, int port)
         {
             ZmtpEndpoint endpoint;
             if (!ZmtpEndpoint.TryParse(ZmtpEndpoint.Format(ip, port), out endpoint))
             {
-                throw new ArgumentException("'" + ip + ":" + port + "' is no address and port.", "ip");
+                throw new ArgumentException("Invalid address or port '" + ip + ":" + port + "'.", "ip");
             }
             _socket = new DealerSocket(endpoint, this, new ZmtpLimits { MaxMessageBytes = 64L << 20 }, NullMechanism.Create);
             _socket.Start();
         }
 
         /// <summary>Connect to a server.</summary>
-        /// <param name="ip">Its address.</param>
-        /// <param name="port">Its port as text.</param>
+        /// <param name="ip">Address of the server.</param>
+        /// <param name="port">Port of the server as text.</param>
         public NepClient(string ip, string port) : this(ip, int.Parse(port, CultureInfo.InvariantCulture))
         {
         }
 
-        /// <summary>Send a request as JSON; it is sent when the server can be reached.</summary>
-        /// <exception cref="InvalidOperationException">The answer to the last request was not read.</exception>
+        /// <summary>Send a request as JSON, as soon as the server is connected.</summary>
+        /// <exception cref="InvalidOperationException">The reply to the previous request was not read.</exception>
         public void SendInfo(object message)
         {
             byte[] request = Encoding.UTF8.GetBytes(Json.Serializer.Serialize(message));
@@ -53,7 +53,7 @@ namespace Nep
                 }
                 if (_isWaiting)
                 {
-                    throw new InvalidOperationException("Read the answer with ListenInfo() before the next request.");
+                    throw new InvalidOperationException("Read the reply with ListenInfo() before the next request.");
                 }
                 _isWaiting = true;
                 _request = request;
@@ -61,7 +61,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Wait for the answer and return its JSON; empty when the client was closed.</summary>
+        /// <summary>Wait for the reply and return its JSON; empty if the client was closed.</summary>
         /// <exception cref="InvalidOperationException">No request was sent.</exception>
         public string ListenInfo()
         {
@@ -82,7 +82,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Close; a waiting <see cref="ListenInfo"/> returns an empty text.</summary>
+        /// <summary>Close the client; a waiting <see cref="ListenInfo"/> returns an empty string.</summary>
         public void Close()
         {
             lock (_lock)
@@ -111,7 +111,7 @@ namespace Nep
         {
             lock (_lock)
             {
-                // An empty part, then the body: the envelope of REQ and REP.
+                // Envelope of REQ and REP: an empty part, then the body.
                 if (parts.Length == 2 && parts[0].Length == 0 && _isWaiting && _request == null && _answer == null)
                 {
                     _answer = Encoding.UTF8.GetString(parts[1]);

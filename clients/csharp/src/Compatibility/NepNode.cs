@@ -24,14 +24,14 @@ namespace Nep
         }
 
         /// <summary>Configuration for a master on another computer.</summary>
-        /// <param name="masterIp">Its address, <c>HOST</c> or <c>HOST:PORT</c>.</param>
+        /// <param name="masterIp">Address of the master, <c>HOST</c> or <c>HOST:PORT</c>.</param>
         public NepConfiguration Hybrid(string masterIp = null)
         {
             return new NepConfiguration(masterIp);
         }
 
         /// <summary>Same as <see cref="Hybrid"/>.</summary>
-        /// <param name="masterIp">Its address, <c>HOST</c> or <c>HOST:PORT</c>.</param>
+        /// <param name="masterIp">Address of the master, <c>HOST</c> or <c>HOST:PORT</c>.</param>
         public NepConfiguration Master(string masterIp = null)
         {
             return new NepConfiguration(masterIp);
@@ -39,14 +39,14 @@ namespace Nep
 
         /// <summary>Configuration for a connection without a master: the publisher binds, subscribers connect.</summary>
         /// <param name="ip">Address of the publisher.</param>
-        /// <param name="port">Its port.</param>
-        /// <param name="mode"><c>one2many</c>.</param>
-        /// <exception cref="NotSupportedException">The mode is another one.</exception>
+        /// <param name="port">Port of the publisher.</param>
+        /// <param name="mode"><c>one2many</c>, the only supported mode.</param>
+        /// <exception cref="NotSupportedException">The mode is not supported.</exception>
         public NepConfiguration Direct(string ip = "127.0.0.1", string port = "9000", string mode = "one2many")
         {
             if (mode != "one2many")
             {
-                throw new NotSupportedException("Direct connections of the C# client have the mode 'one2many', not '" + mode + "'.");
+                throw new NotSupportedException("The C# client supports direct connections only in the mode 'one2many', not '" + mode + "'.");
             }
             return new NepConfiguration(ip, int.Parse(port, CultureInfo.InvariantCulture));
         }
@@ -93,7 +93,7 @@ namespace Nep
             return new NepSubscriber(subscriber.Socket.Inbox, subscriber.Close);
         }
 
-        /// <summary>Call a function with the text of each message, in <see cref="Update"/>.</summary>
+        /// <summary>Subscribe; <see cref="Update"/> calls the function with the text of each message.</summary>
         public NepCallback NewCallback(string topic, Action<string> callback, string masterIp = null)
         {
             var made = new NepCallback(_node, topic, callback, masterIp);
@@ -105,7 +105,7 @@ namespace Nep
             return made;
         }
 
-        /// <summary>Run the callbacks of all messages that wait. Call it once a frame.</summary>
+        /// <summary>Run the callbacks of all queued messages. Call it once per frame.</summary>
         public void Update()
         {
             List<NepCallback> all;
@@ -116,7 +116,7 @@ namespace Nep
             all.ForEach(each => each.UpdateMessage());
         }
 
-        /// <summary>Close with all publishers, subscribers and callbacks.</summary>
+        /// <summary>Close the node with all its publishers, subscribers and callbacks.</summary>
         public void Close()
         {
             List<IDisposable> direct;
@@ -145,7 +145,7 @@ namespace Nep
         }
     }
 
-    /// <summary>Which master a publisher or subscriber registers with, or its port without a master.</summary>
+    /// <summary>Master of a publisher or subscriber, or the endpoint of a direct connection.</summary>
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepConfiguration
     {
@@ -164,7 +164,7 @@ namespace Nep
 
         internal string Host { get; private set; }
 
-        /// <summary>Port of a direct connection; 0 with a master.</summary>
+        /// <summary>Port of a direct connection; 0 for a connection through a master.</summary>
         internal int Port { get; private set; }
 
         internal static string MasterOf(NepConfiguration configuration)
@@ -275,7 +275,7 @@ namespace Nep
             _close = close;
         }
 
-        /// <summary>Return whether a message is there, and its JSON or text (empty when there is none).</summary>
+        /// <summary>Take the next message without waiting; false if there is none, with an empty string.</summary>
         public bool Listen(out string message)
         {
             Message received = _inbox.Take(0);
@@ -290,14 +290,14 @@ namespace Nep
             return received == null ? "" : received.Text;
         }
 
-        /// <summary>Close; a waiting <see cref="BlockingListen"/> returns an empty text.</summary>
+        /// <summary>Close the subscriber; a waiting <see cref="BlockingListen"/> returns an empty string.</summary>
         public void Dispose()
         {
             _close();
         }
     }
 
-    /// <summary>Callback of a <see cref="NepNode"/>; every message is delivered, in the thread that calls <see cref="UpdateMessage"/>.</summary>
+    /// <summary>Callback of a <see cref="NepNode"/>, called with every message in the thread that calls <see cref="UpdateMessage"/>.</summary>
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepCallback : IDisposable
     {
@@ -315,7 +315,7 @@ namespace Nep
             _options = new SubscriberOptions { Callbacks = CallbackMode.Update, Master = master };
         }
 
-        /// <summary>Subscribe, unless it has already.</summary>
+        /// <summary>Subscribe, unless already subscribed.</summary>
         public void Start()
         {
             if (_subscription == null)
@@ -334,7 +334,7 @@ namespace Nep
             }
         }
 
-        /// <summary>Call the function for all messages that wait.</summary>
+        /// <summary>Call the function for all queued messages.</summary>
         public void UpdateMessage()
         {
             Subscription subscription = _subscription;

@@ -2,7 +2,7 @@ using System.ComponentModel;
 
 namespace Nep
 {
-    // Names of the paper's listings 9 and 10 and of the samples of that time.
+    // Names in listings 9 and 10 of the paper and in the samples of that time.
     public sealed partial class Node
     {
         /// <summary>Name of the original library for <see cref="CreatePublisher"/>.</summary>
@@ -46,7 +46,7 @@ namespace Nep
 
     public sealed partial class Subscriber
     {
-        /// <summary>Wait for the next message and return its JSON or text; empty when the subscriber was closed.</summary>
+        /// <summary>Wait for the next message and return its JSON or text; empty if the subscriber was closed.</summary>
         [EditorBrowsable(EditorBrowsableState.Never)]
         public string listen()
         {
@@ -54,7 +54,7 @@ namespace Nep
             return message == null ? "" : message.Text;
         }
 
-        /// <summary>Return whether a message is there, and its JSON or text; <paramref name="msg"/> stays as it is when there is none.</summary>
+        /// <summary>Take the JSON or text of the next message without waiting; false if there is none, with <paramref name="msg"/> unchanged.</summary>
         [EditorBrowsable(EditorBrowsableState.Never)]
         public bool listenNB(ref string msg)
         {

@@ -5,7 +5,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>Addresses at which a socket is bound, each with a port of its own. It lives under its owner's lock.</summary>
+    /// <summary>Addresses at which a socket is bound, each with its own port. Not thread-safe; guarded by the owner's lock.</summary>
     internal sealed class Bindings
     {
         private readonly Dictionary<string, string> _bound = new Dictionary<string, string>();
@@ -16,7 +16,7 @@ namespace Nep.Session
             _acceptor = acceptor;
         }
 
-        /// <summary>Bind at these hosts and no others; true when the endpoints in <paramref name="record"/> changed.</summary>
+        /// <summary>Bind at exactly these hosts; return true if the endpoints in <paramref name="record"/> have changed.</summary>
         public bool Move(IList<string> hosts, PublisherRecord record)
         {
             foreach (string host in new List<string>(_bound.Keys))
@@ -38,7 +38,7 @@ namespace Nep.Session
                     }
                     catch (SocketException)
                     {
-                        continue; // the address has gone; tried again within a second
+                        continue; // the address no longer exists; retried within a second
                     }
                 }
                 endpoints.Add(_bound[host]);
@@ -51,7 +51,7 @@ namespace Nep.Session
             return true;
         }
 
-        /// <summary>Ports that programs of the original NEP expect to find something else on are left alone.</summary>
+        /// <summary>Return true if publishers may use a port, which is not one of the original NEP's.</summary>
         private static bool IsFreeForUs(int port)
         {
             return port != 7000 && port != 7777 && port != 7780 && port != 12345 && port != 50000 && (port < 9000 || port > 9999);

@@ -6,7 +6,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A call that a client waits for.</summary>
+    /// <summary>Pending call of a client.</summary>
     internal sealed class OutgoingCall
     {
         public ulong Number;
@@ -16,7 +16,7 @@ namespace Nep.Session
         public byte[] Payload;
     }
 
-    /// <summary>A client's connection to one server.</summary>
+    /// <summary>Connection of a client to one server.</summary>
     internal sealed class ServerLink : IDealerOwner
     {
         private readonly ClientSocket _client;
@@ -37,7 +37,7 @@ namespace Nep.Session
 
         public bool IsConnected { get; set; }
 
-        /// <summary>It is not listed any more: gets no further calls.</summary>
+        /// <summary>True if the server is no longer listed and receives no further calls.</summary>
         public bool IsGone { get; set; }
 
         void IDealerOwner.Connected()
@@ -56,7 +56,7 @@ namespace Nep.Session
         }
     }
 
-    /// <summary>A client's connections to the servers of a service, in the order in which they registered. Thread-safe.</summary>
+    /// <summary>Connections of a client to the servers of a service, in the order of their registration. Thread-safe.</summary>
     internal sealed class ClientSocket : ISessionSubscriber
     {
         private readonly object _lock = new object();
@@ -76,7 +76,7 @@ namespace Nep.Session
 
         public SubscriberRecord Record { get; private set; }
 
-        /// <summary>Answers that came after their call had ended, or are none.</summary>
+        /// <summary>Number of late and malformed replies.</summary>
         public long Late { get; private set; }
 
         public Dictionary<object, object> Statistics()
@@ -92,7 +92,7 @@ namespace Nep.Session
             return topic == Record.Topic;
         }
 
-        /// <summary>Send a call and wait for its answer.</summary>
+        /// <summary>Send a call and wait for its reply.</summary>
         public OutgoingCall Call(byte codec, byte[] payload, int timeoutMs, CancellationToken cancellation)
         {
             var deadline = new Deadline(timeoutMs);
@@ -165,7 +165,7 @@ namespace Nep.Session
                 ServerLink link = _links.Find(each => each.Id == publisher);
                 if (link != null && isClosed)
                 {
-                    link.IsGone = true; // answers may still come; its connection ends by itself
+                    link.IsGone = true; // replies may still arrive; the server closes the connection
                     LeaveIfIdle(link);
                 }
             }
@@ -200,7 +200,7 @@ namespace Nep.Session
 
         public void Correct(Dictionary<string, ClockDifference> clocks)
         {
-            // answers have no times
+            // replies have no time stamps
         }
 
         public void Close()
@@ -215,7 +215,7 @@ namespace Nep.Session
             links.ForEach(each => each.Socket.Close(0));
         }
 
-        /// <summary>Let those who wait look again.</summary>
+        /// <summary>Wake waiting threads so that they check for cancellation.</summary>
         public void Wake()
         {
             lock (_lock)
@@ -287,7 +287,7 @@ namespace Nep.Session
         private void Leave(ServerLink link)
         {
             _links.Remove(link);
-            ThreadPool.QueueUserWorkItem(state => link.Socket.Close(0)); // which waits for the thread that may have called
+            ThreadPool.QueueUserWorkItem(state => link.Socket.Close(0)); // Close waits for the socket's thread, which may be the caller
         }
 
         private void Wait(Deadline deadline, CancellationToken cancellation, Func<NepException> error)

@@ -3,7 +3,7 @@ using System.Diagnostics;
 
 namespace Nep.Session
 {
-    /// <summary>This computer's time in nanoseconds since 1970, and seconds that only go forward.</summary>
+    /// <summary>Clocks of this computer: time in nanoseconds since 1970, and monotonic time.</summary>
     internal static class Clock
     {
         private static readonly long EpochTicks = new DateTime(1970, 1, 1, 0, 0, 0, DateTimeKind.Utc).Ticks;
@@ -14,13 +14,13 @@ namespace Nep.Session
             get { return Steady.Elapsed.TotalSeconds; }
         }
 
-        /// <summary>Nanoseconds that only go forward.</summary>
+        /// <summary>Monotonic time in nanoseconds.</summary>
         public static long SteadyNs
         {
             get { return (long)(Stopwatch.GetTimestamp() * (1e9 / Stopwatch.Frequency)); }
         }
 
-        /// <summary>Step in which <see cref="NowNs"/> goes on: 16 ms with .NET Framework, else microseconds.</summary>
+        /// <summary>Measure the resolution of <see cref="NowNs"/>: 16 ms with .NET Framework, otherwise microseconds.</summary>
         public static long MeasureResolutionNs()
         {
             ulong first = NextNs();

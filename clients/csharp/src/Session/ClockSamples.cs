@@ -3,22 +3,22 @@ using System.Collections.Generic;
 
 namespace Nep.Session
 {
-    /// <summary>One moment by this computer's clock and by one that nobody sets.</summary>
+    /// <summary>A moment by this computer's clock and by a monotonic clock.</summary>
     internal struct Moment
     {
         public long WallNs;
         public long SteadyNs;
 
-        /// <summary>How far the two readings may be apart.</summary>
+        /// <summary>Maximum difference between the two readings.</summary>
         public long SlackNs;
     }
 
-    /// <summary>Compares this computer's clock with the master's by the times of renewals: docs/wire.md, "Clocks". Not thread-safe.</summary>
+    /// <summary>Comparison of this computer's clock with the master's, from the times in renewals: docs/wire.md, "Clocks". Not thread-safe.</summary>
     internal sealed class ClockSamples
     {
         private const int MaxSamples = 8;
         private const long StepNs = 50000;
-        private const long SlewParts = 2000; // a clock that is adjusted slowly; what goes faster was set
+        private const long SlewParts = 2000; // a clock adjusted by slewing deviates by at most 1/2000
 
         private readonly Func<long> _wall;
         private readonly Func<long> _steady;
@@ -27,8 +27,8 @@ namespace Nep.Session
         private Moment? _seen;
 
         /// <param name="wall">Clock of message stamps, in nanoseconds since 1970.</param>
-        /// <param name="steady">Clock that nobody sets, in nanoseconds.</param>
-        /// <param name="resolutionNs">Step of <paramref name="wall"/>.</param>
+        /// <param name="steady">Monotonic clock, in nanoseconds.</param>
+        /// <param name="resolutionNs">Resolution of <paramref name="wall"/>.</param>
         public ClockSamples(Func<long> wall, Func<long> steady, long resolutionNs)
         {
             _wall = wall;
@@ -36,7 +36,7 @@ namespace Nep.Session
             _resolutionNs = resolutionNs;
         }
 
-        /// <summary>This moment. Forgets all samples when this computer's clock was set since the last one.</summary>
+        /// <summary>Return the current moment. Discards all samples if this computer's clock was set since the last call.</summary>
         public Moment Now()
         {
             long before = _steady();
@@ -51,7 +51,11 @@ namespace Nep.Session
             return moment;
         }
 
-        /// <summary>A renewal was sent, received and answered by the master at its times, and its answer came; whether that is of use.</summary>
+        /// <summary>Add a sample from the times of a renewal; return false if it is invalid.</summary>
+        /// <param name="sent">When the renewal was sent.</param>
+        /// <param name="receivedNs">When the master received it, by the master's clock.</param>
+        /// <param name="answeredNs">When the master replied, by the master's clock.</param>
+        /// <param name="now">When the reply was received.</param>
         public bool Add(Moment sent, long receivedNs, long answeredNs, Moment now)
         {
             long awayNs = now.SteadyNs - sent.SteadyNs - (answeredNs - receivedNs);
@@ -69,7 +73,7 @@ namespace Nep.Session
             Sample best = Best(now.SteadyNs);
             if (best != null && Math.Abs((decimal)offsetNs - best.OffsetNs) > uncertaintyNs + best.UncertaintyAt(now.SteadyNs))
             {
-                _samples.Clear(); // both can't be true: the master's clock was set
+                _samples.Clear(); // contradiction: the master's clock was set
             }
             if (_samples.Count == MaxSamples)
             {
@@ -79,7 +83,7 @@ namespace Nep.Session
             return true;
         }
 
-        /// <summary>What to add to this computer's time to get the master's, and its uncertainty; false when that is unknown.</summary>
+        /// <summary>Get the offset from this computer's clock to the master's, and its uncertainty; return false if unknown.</summary>
         public bool TryGetOffset(out long offsetNs, out long uncertaintyNs)
         {
             Moment now = Now();
@@ -89,13 +93,13 @@ namespace Nep.Session
             return best != null && uncertaintyNs <= ClockDifference.MaxUncertaintyNs;
         }
 
-        /// <summary>Another master may have another clock.</summary>
+        /// <summary>Discard all samples: another master may have another clock.</summary>
         public void Forget()
         {
             _samples.Clear();
         }
 
-        /// <summary>Mean of two numbers, rounded down, without overflow.</summary>
+        /// <summary>Return the mean of two numbers, rounded down, without overflow.</summary>
         private static long Middle(long one, long two)
         {
             return (one & two) + ((one ^ two) >> 1);
@@ -111,7 +115,7 @@ namespace Nep.Session
             return best;
         }
 
-        /// <summary>Whether both clocks went on by as much since then.</summary>
+        /// <summary>Return true if both clocks advanced by the same time between two moments.</summary>
         private bool Fits(Moment then, Moment now)
         {
             long bySteady = now.SteadyNs - then.SteadyNs;

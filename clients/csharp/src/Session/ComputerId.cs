@@ -7,7 +7,7 @@ using Nep.Wire;
 
 namespace Nep.Session
 {
-    /// <summary>Which computer this is: programs with the same id read the same clock.</summary>
+    /// <summary>Id of the running system: programs with the same id use the same clock.</summary>
     internal static class ComputerId
     {
         private const string BootIdFile = "/proc/sys/kernel/random/boot_id";
@@ -15,7 +15,7 @@ namespace Nep.Session
         private static readonly IntPtr LocalMachine = new IntPtr(unchecked((int)0x80000002));
         private static string _id;
 
-        /// <summary>16 hexadecimal digits as those of nep for Python, or an empty string where the system does not say.</summary>
+        /// <summary>Return 16 hexadecimal digits, the same as in nep for Python; empty if unknown.</summary>
         public static string Get()
         {
             if (_id == null)
@@ -25,7 +25,7 @@ namespace Nep.Session
                 {
                     name = NameOfClock();
                 }
-                catch (Exception) // a platform without the call, or without permission
+                catch (Exception) // not available on this platform, or permission denied
                 {
                     name = "";
                 }

@@ -5,19 +5,19 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>One publisher as a subscriber hears it.</summary>
+    /// <summary>State of one publisher of a subscriber.</summary>
     internal sealed class HeardPublisher
     {
         public RemotePublisher Remote;
         public SubConnection Connection;
 
-        /// <summary>Clock of its computer; its messages ask for it.</summary>
+        /// <summary>Clock of the publisher's computer, shared by its messages.</summary>
         public readonly PublisherClock Clock = new PublisherClock();
 
-        /// <summary>Newest message that was received or counted as lost; null while unknown, 0 if all are still to come.</summary>
+        /// <summary>Seq of the newest message, received or lost; null while unknown, 0 if no message has been sent yet.</summary>
         public ulong? Last;
 
-        /// <summary>Whether a message, an echo or a bye was received.</summary>
+        /// <summary>True if a message, an echo or a bye was received.</summary>
         public bool IsHeard;
 
         public bool HasEchoed;
@@ -30,7 +30,7 @@ namespace Nep.Session
         public ulong LeaptTo;
     }
 
-    /// <summary>The publishers that a subscriber hears, and how many messages were lost. It lives under its subscriber's lock.</summary>
+    /// <summary>Publishers of a subscriber and the number of their lost messages. Not thread-safe; guarded by the subscriber's lock.</summary>
     internal sealed class HeardPublishers
     {
         private const double FarewellS = 3.0;
@@ -83,14 +83,14 @@ namespace Nep.Session
             return source;
         }
 
-        /// <summary>Count losses from the first message of a new publisher. Has no effect once it was heard.</summary>
+        /// <summary>Count losses from the first message of a new publisher. No effect after its first message.</summary>
         public void ExpectAllOf(ulong publisher)
         {
             HeardPublisher source = Get(publisher);
             source.Last = source.Last ?? 0;
         }
 
-        /// <summary>Take over how the clocks of other computers' nodes differ; no others are known.</summary>
+        /// <summary>Set the clock differences to other nodes, replacing all previous ones.</summary>
         public void Correct(Dictionary<string, ClockDifference> clocks)
         {
             _clocks = clocks;
@@ -117,8 +117,8 @@ namespace Nep.Session
             return found;
         }
 
-        /// <summary>A message arrived; false when it was heard already.</summary>
-        /// <exception cref="WireException">More messages than anybody can miss would be missing before it.</exception>
+        /// <summary>Count a message; return false if it is a duplicate.</summary>
+        /// <exception cref="WireException">The gap before the message is too large.</exception>
         public bool Arrived(ulong publisher, ulong seq, bool isAlone)
         {
             HeardPublisher source = Get(publisher);
@@ -147,7 +147,7 @@ namespace Nep.Session
             }
             else if (source.LateTo == last && source.LateFrom <= seq && source.LateTo != 0)
             {
-                source.LateFrom = seq + 1; // it was only late
+                source.LateFrom = seq + 1; // it was late, not lost
                 Lost--;
             }
             else if (isAlone)
@@ -158,7 +158,7 @@ namespace Nep.Session
             return true;
         }
 
-        /// <summary>Whether a message comes again with the history that follows: see docs/wire.md, "Notices".</summary>
+        /// <summary>Return true if a message received before the echo will be repeated with the history: docs/wire.md, "Notices".</summary>
         public bool IsEarly(ulong publisher)
         {
             HeardPublisher source = Find(publisher);
@@ -170,7 +170,7 @@ namespace Nep.Session
             return Session.Clock.SteadyS < source.EarlyUntilS;
         }
 
-        /// <summary>Messages up to <paramref name="seq"/> were sent before this; false when that cannot be.</summary>
+        /// <summary>Handle an echo or a bye, sent after the messages up to <paramref name="seq"/>; return false if it is implausible.</summary>
         public bool Reached(ulong publisher, ulong seq)
         {
             HeardPublisher source = Get(publisher);
@@ -190,7 +190,7 @@ namespace Nep.Session
             return true;
         }
 
-        /// <summary>The master says that <paramref name="seq"/> was sent; what was promised one renewal ago and has not come is lost.</summary>
+        /// <summary>Handle the seq reported by the master; messages reported one renewal ago and not received are lost.</summary>
         public void PromisedBy(ulong publisher, ulong seq)
         {
             HeardPublisher source = Find(publisher);
@@ -210,14 +210,14 @@ namespace Nep.Session
             source.Promised = seq;
         }
 
-        /// <summary>Messages that had been received were dropped for lack of room.</summary>
+        /// <summary>Count received messages that were dropped for lack of room as lost.</summary>
         public void Dropped(int count)
         {
             Received -= count;
             Lost += count;
         }
 
-        /// <summary>A publisher has unregistered or was replaced; its last messages may still come.</summary>
+        /// <summary>Handle that a publisher has unregistered or was replaced; its last messages may still arrive.</summary>
         public void Closing(ulong publisher, ulong final)
         {
             HeardPublisher source = Find(publisher);
@@ -238,7 +238,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>It is about to be left: what has not come of what was promised is lost.</summary>
+        /// <summary>Count the reported messages that were not received as lost, before disconnecting from a publisher.</summary>
         public void Settle(ulong publisher)
         {
             HeardPublisher source = Find(publisher);
@@ -248,7 +248,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Publishers to leave: they closed long ago without a bye, or are the oldest of too many silent ones.</summary>
+        /// <summary>Return publishers to disconnect from: their bye did not arrive, or there are too many silent ones.</summary>
         public List<ulong> Ended()
         {
             var silent = new List<ulong>();
@@ -268,7 +268,7 @@ namespace Nep.Session
             return ended;
         }
 
-        /// <summary>Silent publishers whose program was started again.</summary>
+        /// <summary>Return silent publishers whose program was restarted as <paramref name="remote"/>.</summary>
         public List<ulong> ReplacedBy(RemotePublisher remote)
         {
             var replaced = new List<ulong>();

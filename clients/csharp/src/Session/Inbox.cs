@@ -4,7 +4,7 @@ using System.Threading.Tasks;
 
 namespace Nep.Session
 {
-    /// <summary>Messages that wait to be read. Drops the oldest when it is full. Thread-safe.</summary>
+    /// <summary>Queue of unread messages, which drops the oldest when it is full. Thread-safe.</summary>
     internal sealed class Inbox
     {
         private readonly object _lock = new object();
@@ -19,7 +19,7 @@ namespace Nep.Session
             _options = options;
         }
 
-        /// <summary>Add a message and return how many others were dropped for it. Replacing the latest is no drop.</summary>
+        /// <summary>Add a message; return the number of messages dropped for it, without those replaced by <c>KeepLatest</c>.</summary>
         public int Put(Message message)
         {
             lock (_lock)
@@ -40,7 +40,7 @@ namespace Nep.Session
                 _messages.Enqueue(message);
                 _bytes += message.Size;
                 int dropped = 0;
-                // The newest stays even when it alone is larger than the bound.
+                // The newest message is kept even if it exceeds the limit.
                 while (_messages.Count > 1 && (_messages.Count > _options.MaxMessages || _bytes > _options.MaxBytes))
                 {
                     _bytes -= _messages.Dequeue().Size;
@@ -51,7 +51,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
+        /// <summary>Wait for the next message; null after the timeout (-1 for none), or if the inbox is closed.</summary>
         public Message Take(int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
@@ -69,8 +69,8 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Next message, without a thread that waits; null when it was closed.</summary>
-        /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
+        /// <summary>Wait for the next message without blocking a thread; null if the inbox is closed.</summary>
+        /// <exception cref="OperationCanceledException">The wait was canceled.</exception>
         public async Task<Message> TakeAsync(CancellationToken cancellation)
         {
             cancellation.ThrowIfCancellationRequested();
@@ -83,7 +83,7 @@ namespace Nep.Session
                 }
                 while (_awaiting.Count > 0 && _awaiting.Peek().Task.IsCompleted)
                 {
-                    _awaiting.Dequeue(); // cancelled
+                    _awaiting.Dequeue(); // canceled
                 }
                 _awaiting.Enqueue(awaiting);
             }
@@ -100,7 +100,7 @@ namespace Nep.Session
             return message;
         }
 
-        /// <summary>Give a message to the first task that waits; false when none does.</summary>
+        /// <summary>Pass a message to the first waiting task; return false if there is none.</summary>
         private bool HandOver(Message message)
         {
             while (_awaiting.Count > 0)
@@ -110,10 +110,10 @@ namespace Nep.Session
                     return true;
                 }
             }
-            return false; // all that waited were cancelled
+            return false; // all waits were canceled
         }
 
-        /// <summary>Forget what was not read.</summary>
+        /// <summary>Close the inbox and discard unread messages.</summary>
         public void Close()
         {
             lock (_lock)

@@ -5,7 +5,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>Where a master is: <c>HOST</c> or <c>HOST:PORT</c>.</summary>
+    /// <summary>Address of a master: <c>HOST</c> or <c>HOST:PORT</c>.</summary>
     internal sealed class MasterAddress
     {
         public const string Loopback = "127.0.0.1";
@@ -23,7 +23,7 @@ namespace Nep.Session
             get { return Endpoint.Host; }
         }
 
-        /// <summary>Whether the master is on this computer and reached by its loopback address.</summary>
+        /// <summary>True if the address is a loopback address.</summary>
         public bool IsNear
         {
             get { return Endpoint.IsLoopback; }
@@ -34,8 +34,8 @@ namespace Nep.Session
             return ZmtpEndpoint.Format(Endpoint.Host, Endpoint.Port).Substring("tcp://".Length);
         }
 
-        /// <summary>Parse an address; null or empty stands for <c>NEP_MASTER</c>, else this computer.</summary>
-        /// <exception cref="ArgumentException">It is none.</exception>
+        /// <summary>Parse an address; null or empty selects <c>NEP_MASTER</c>, or this computer if it isn't set.</summary>
+        /// <exception cref="ArgumentException">The address is invalid.</exception>
         public static MasterAddress Parse(string text)
         {
             if (string.IsNullOrEmpty(text))
@@ -52,12 +52,12 @@ namespace Nep.Session
             string whole = isIPv6 ? ZmtpEndpoint.Format(text, DefaultPort) : hasPort ? "tcp://" + text : "tcp://" + text + ":" + DefaultPort;
             if (!ZmtpEndpoint.TryParse(whole, out endpoint))
             {
-                throw new ArgumentException("'" + text + "' is no address of a master; write HOST or HOST:PORT");
+                throw new ArgumentException("Invalid master address '" + text + "'. Use HOST or HOST:PORT.");
             }
             return new MasterAddress(endpoint);
         }
 
-        /// <summary>Address of this computer from which the way to the master begins, or null without a network.</summary>
+        /// <summary>Return the address of this computer on the route to the master, or null without a network.</summary>
         public string OwnHost()
         {
             try

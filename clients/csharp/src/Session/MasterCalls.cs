@@ -47,7 +47,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Send a request if there is a connection; <paramref name="then"/> gets its reply, in the socket's thread.</summary>
+        /// <summary>Send a request if connected; <paramref name="then"/> is called with its reply, in the socket's thread.</summary>
         public void Tell(string name, Dictionary<object, object> what, Action<Fields> then)
         {
             Call call = Begin(name, what, then, false);
@@ -60,9 +60,9 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Send a request, repeat it while no reply comes, and wait; <paramref name="then"/> runs before this returns.</summary>
-        /// <exception cref="MasterUnreachableException">No reply came in time (-1: wait for ever).</exception>
-        /// <exception cref="RequestRefusedException">The master refused it.</exception>
+        /// <summary>Send a request, repeat it until there is a reply, and wait; <paramref name="then"/> is called before this returns.</summary>
+        /// <exception cref="MasterUnreachableException">No reply arrived before the timeout (-1 for none).</exception>
+        /// <exception cref="RequestRefusedException">The master rejected the request.</exception>
         public void Ask(string name, Dictionary<object, object> what, int timeoutMs, Action<Fields> then)
         {
             Call call = Begin(name, what, then, true);
@@ -79,7 +79,7 @@ namespace Nep.Session
                     }
                     if (_isConnected && sendAgain.IsOver)
                     {
-                        // It may have gone to a master that ended just then.
+                        // A request may be lost if its master exits.
                         sendAgain = new Deadline(_socket.Send(call.Body) ? AskAgainMs : SendAgainMs);
                     }
                     Monitor.Wait(_lock, SendAgainMs);
@@ -91,7 +91,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>A reply came.</summary>
+        /// <summary>Handle a reply.</summary>
         public void Complete(long number, string name, Fields what)
         {
             Call call;
@@ -99,7 +99,7 @@ namespace Nep.Session
             {
                 if (!_calls.TryGetValue(number, out call))
                 {
-                    return; // a repeated request is answered twice
+                    return; // second reply to a repeated request
                 }
                 _calls.Remove(number);
             }
@@ -124,7 +124,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Let those who wait give up.</summary>
+        /// <summary>Close; waiting calls throw <see cref="MasterUnreachableException"/>.</summary>
         public void Close()
         {
             lock (_lock)
@@ -139,13 +139,13 @@ namespace Nep.Session
             string seconds = (Math.Max(0, timeoutMs) / 1000.0).ToString("0.#", CultureInfo.InvariantCulture);
             if (_isConnected)
             {
-                return "The program at " + _address + " did not answer within " + seconds + " s. It is no master, or a master that hangs. "
+                return "The program at " + _address + " did not answer within " + seconds + " s. It isn't a master, or it hangs. "
                     + "Restart it, or set NEP_MASTER to the address of a master.";
             }
-            string missed = "No master answered at " + _address + " within " + seconds + " s";
+            string missed = "No master replied at " + _address + " within " + seconds + " s";
             return _socket.Problem == null
                 ? missed + ". Start one with 'nep master', or set NEP_MASTER to its address."
-                : missed + ": the program at this address is no master (" + _socket.Problem + "). Stop it, or set NEP_MASTER to the address of a master.";
+                : missed + ": the program at this address isn't a master (" + _socket.Problem + "). Stop it, or set NEP_MASTER to the address of a master.";
         }
 
         private Call Begin(string name, Dictionary<object, object> what, Action<Fields> then, bool isWaited)
@@ -157,7 +157,7 @@ namespace Nep.Session
                 Call old;
                 if (_calls.TryGetValue(call.Number - MaxCalls, out old) && !old.IsWaited)
                 {
-                    _calls.Remove(old.Number); // its master has ended
+                    _calls.Remove(old.Number); // its master has exited
                 }
                 _calls[call.Number] = call;
             }

@@ -3,13 +3,13 @@ using Nep.Wire;
 
 namespace Nep.Session
 {
-    /// <summary>The clock of a master as renewals tell of it: docs/wire.md, "Clocks". Thread-safe.</summary>
+    /// <summary>Clock of a master, measured with renewals: docs/wire.md, "Clocks". Thread-safe.</summary>
     internal sealed class MasterClock
     {
         private static readonly long ResolutionNs = Clock.MeasureResolutionNs();
         private readonly ClockSamples _samples = new ClockSamples(() => (long)Clock.NowNs, () => Clock.SteadyNs, ResolutionNs);
 
-        /// <summary>This moment, for <see cref="Compare"/>.</summary>
+        /// <summary>Return the current moment, for <see cref="Compare"/>.</summary>
         public Moment Now()
         {
             lock (_samples)
@@ -18,7 +18,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Field <c>clock</c> of a renewal: offset and uncertainty, or empty when they are unknown.</summary>
+        /// <summary>Return the field <c>clock</c> of a renewal: offset and uncertainty, or empty if unknown.</summary>
         public List<object> Field()
         {
             lock (_samples)
@@ -28,14 +28,14 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Take the times of a renewal that was sent and answered at these moments; true when the offset was unknown before.</summary>
-        /// <exception cref="WireException">The field <c>times</c> is no list of integers.</exception>
+        /// <summary>Add a sample from a renewal and its reply; return true if the offset was unknown before.</summary>
+        /// <exception cref="WireException">The field <c>times</c> is not a list of integers.</exception>
         public bool Compare(Fields answer, Moment sent, Moment received)
         {
             List<long> times = answer.Integers("times");
             if (times.Count != 2)
             {
-                return false; // the master has the same clock, or compares none
+                return false; // the master has the same clock, or doesn't compare clocks
             }
             lock (_samples)
             {
@@ -45,7 +45,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Another master may have another clock.</summary>
+        /// <summary>Discard all samples: another master may have another clock.</summary>
         public void Forget()
         {
             lock (_samples)
@@ -54,14 +54,14 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>How clocks differ from this computer's, by node, as a renewal's answer tells; impossible differences are left out.</summary>
-        /// <exception cref="WireException">The field <c>clocks</c> is none.</exception>
+        /// <summary>Return the clock differences to other nodes in the reply to a renewal; implausible ones are omitted.</summary>
+        /// <exception cref="WireException">The field <c>clocks</c> is malformed.</exception>
         public static Dictionary<string, ClockDifference> DifferencesIn(Fields answer)
         {
             var differences = new Dictionary<string, ClockDifference>();
             foreach (KeyValuePair<string, List<long>> each in answer.IntegersByText("clocks"))
             {
-                List<long> told = each.Value; // the sums of two clocks
+                List<long> told = each.Value; // sums of the values of two clocks
                 if (told.Count == 2 && ClockDifference.IsPossible(told[0] / 2, told[1] / 2))
                 {
                     differences[each.Key] = new ClockDifference(told[0], told[1], Clock.SteadyNs);

@@ -7,57 +7,57 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A publisher, or a server, as its session and its node need it. All methods are thread-safe.</summary>
+    /// <summary>Interface of publishers and servers used by the session and the node. All methods are thread-safe.</summary>
     internal interface ISessionPublisher
     {
         PublisherRecord Record { get; }
 
-        /// <summary>Number of the newest message, or of answered calls.</summary>
+        /// <summary>Seq of the newest message, or number of answered calls.</summary>
         ulong LastSeq { get; }
 
         Dictionary<object, object> Statistics();
 
-        /// <summary>Be reached at these addresses; true when the endpoints of the record changed.</summary>
+        /// <summary>Bind at exactly these addresses; return true if the endpoints of the record have changed.</summary>
         bool Move(IList<string> hosts);
 
-        /// <summary>Send nothing new: say bye to subscribers, refuse the calls of clients.</summary>
+        /// <summary>Start to close: send byes to subscribers, or reject calls.</summary>
         void BeginClose();
 
-        /// <summary>Wait until peers have everything, for a limited time, and close the socket.</summary>
+        /// <summary>Wait until peers have received everything or the timeout expires, and close the socket.</summary>
         void Finish(int timeoutMs);
     }
 
-    /// <summary>A subscriber, or a client, as its session and its node need it. All methods are thread-safe.</summary>
+    /// <summary>Interface of subscribers and clients used by the session and the node. All methods are thread-safe.</summary>
     internal interface ISessionSubscriber
     {
         SubscriberRecord Record { get; }
 
         Dictionary<object, object> Statistics();
 
-        /// <summary>Connect to a publisher; twice is once.</summary>
-        /// <param name="remote">Publisher that the master lists.</param>
-        /// <param name="isNew">Whether it was created after this subscriber was registered: losses count from its first message.</param>
+        /// <summary>Connect to a publisher, unless connected already.</summary>
+        /// <param name="remote">Publisher listed by the master.</param>
+        /// <param name="isNew">True if it was created after this subscriber was registered: losses count from its first message.</param>
         void Connect(RemotePublisher remote, bool isNew);
 
-        /// <summary>Whether it subscribes to a topic.</summary>
+        /// <summary>Return true if it subscribes to a topic.</summary>
         bool Hears(string topic);
 
-        /// <summary>A publisher is not listed any more.</summary>
+        /// <summary>Handle that a publisher is no longer listed.</summary>
         void Gone(string topic, ulong publisher, ulong lastSeq, bool isClosed);
 
-        /// <summary>These are all publishers of a topic that are listed; of all its topics when it is null.</summary>
+        /// <summary>Handle the complete list of the publishers of a topic; null for all topics of the subscriber.</summary>
         void Reconcile(string topic, IList<RemotePublisher> remotes);
 
-        /// <summary>A renewal was answered: the newest messages of publishers that the master knows.</summary>
+        /// <summary>Called after each renewal with the seqs of the publishers' newest messages, as known to the master.</summary>
         void Tick(Dictionary<ulong, ulong> lastSeqs);
 
-        /// <summary>How clocks differ from this computer's, by node; no others are known.</summary>
+        /// <summary>Set the clock differences to other computers, by node, replacing all previous ones.</summary>
         void Correct(Dictionary<string, ClockDifference> clocks);
 
         void Close();
     }
 
-    /// <summary>A node's link to one master: registers, renews, hears of publishers, joins a master that was started again.</summary>
+    /// <summary>Registration of a node with one master: renews the lease, rejoins, and handles pushed changes.</summary>
     internal sealed class MasterSession : IDealerOwner
     {
         private const int JoinAgainMs = 500;
@@ -98,7 +98,7 @@ namespace Nep.Session
             BackgroundThread.Start("node", Run, BackgroundThread.SmallStackBytes);
         }
 
-        /// <summary>Addresses of this computer at which publishers are to be reached.</summary>
+        /// <summary>Return the addresses of this computer at which publishers must be reachable.</summary>
         public IList<string> Hosts()
         {
             var hosts = new List<string>();
@@ -120,8 +120,8 @@ namespace Nep.Session
             return hosts;
         }
 
-        /// <summary>Register a publisher and return the subscribers to wait for.</summary>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <summary>Register a publisher and return the expected subscribers.</summary>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
         public List<ExpectedSubscriber> AddPublisher(ISessionPublisher publisher, int timeoutMs)
         {
             ulong id = publisher.Record.Id;
@@ -144,7 +144,7 @@ namespace Nep.Session
                         }
                     });
                 }
-                while (publisher.Move(Hosts())); // a node's first publisher learns whom the master serves
+                while (publisher.Move(Hosts())); // the reply may contain new addresses that the master serves
             }
             catch
             {
@@ -155,7 +155,7 @@ namespace Nep.Session
         }
 
         /// <summary>Register a subscriber; it is connected to the publishers there are before this returns.</summary>
-        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="MasterUnreachableException">No master replied before the timeout.</exception>
         public void AddSubscriber(ISessionSubscriber subscriber, int timeoutMs)
         {
             ulong id = subscriber.Record.Id;
@@ -215,7 +215,7 @@ namespace Nep.Session
             _calls.Tell("missing", new Dictionary<object, object> { { "node_id", _node.Id }, { "publisher_id", publisher }, { "subscriber_ids", subscribers } }, null);
         }
 
-        /// <summary>Renew once more and unregister the node with all that it has; waits for the answer in <see cref="Close"/>.</summary>
+        /// <summary>Renew once more before the node is unregistered by <see cref="Close"/>.</summary>
         public void BeginLeave()
         {
             lock (_lock)
@@ -226,7 +226,7 @@ namespace Nep.Session
                 }
                 _isLeaving = true;
             }
-            Renew(); // subscribers that do not hear the bye learn what was sent last
+            Renew(); // reports the last seqs to subscribers that don't receive the bye
         }
 
         public void Close(int timeoutMs)
@@ -246,7 +246,7 @@ namespace Nep.Session
                 }
                 catch (NepException)
                 {
-                    // The master will notice that the connection has ended.
+                    // The master will detect that the connection has ended.
                 }
             }
             lock (_lock)
@@ -361,7 +361,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Whether the master has answered the registration of a publisher or subscriber.</summary>
+        /// <summary>Return true if the master has confirmed the registration of a publisher or subscriber.</summary>
         private bool IsConfirmed(ulong id)
         {
             lock (_lock)
@@ -423,16 +423,16 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Log once that another program is at the master's address, and again only after a master has answered.</summary>
+        /// <summary>Log once that another program uses the master's address, and again only after a master has replied.</summary>
         private void ReportProblem()
         {
             string problem = _socket.Problem;
-            bool isSteady = problem != null && problem == _lastProblem; // a master that ends closes connections, too
+            bool isSteady = problem != null && problem == _lastProblem; // an exiting master closes connections, too
             _lastProblem = problem;
             if (isSteady && !_isProblemReported)
             {
                 _isProblemReported = true;
-                Log.Warning("The program at the master's address " + _address + " is no master (" + problem + "). Still trying to reach a master there.");
+                Log.Warning("The program at the master's address " + _address + " isn't a master (" + problem + "). Retrying until a master is there.");
             }
         }
 
@@ -473,7 +473,7 @@ namespace Nep.Session
             Moment sent = _masterClock.Now();
             if (clock.Count == 0)
             {
-                Correct(new Dictionary<string, ClockDifference>()); // also when this computer's clock was set just now
+                Correct(new Dictionary<string, ClockDifference>()); // also after this computer's clock was set
             }
             var what = new Dictionary<object, object>
             {
@@ -515,7 +515,7 @@ namespace Nep.Session
             {
                 lock (_lock)
                 {
-                    _dueAtS = 0.0; // other nodes wait for it
+                    _dueAtS = 0.0; // other nodes need the offset
                     Monitor.PulseAll(_lock);
                 }
             }

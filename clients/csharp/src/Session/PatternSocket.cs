@@ -4,7 +4,7 @@ using System.Threading;
 
 namespace Nep.Session
 {
-    /// <summary>What the public subscriber needs of a socket.</summary>
+    /// <summary>Interface of sockets used by the public subscriber.</summary>
     internal interface ISubscriberSocket : ISessionSubscriber
     {
         Inbox Inbox { get; }
@@ -15,11 +15,11 @@ namespace Nep.Session
 
         long Rejected { get; }
 
-        /// <summary>Wait until all listed publishers have echoed.</summary>
+        /// <summary>Wait until the echoes of all listed publishers were received.</summary>
         void WaitForEchoes(int timeoutMs);
     }
 
-    /// <summary>A subscriber of all topics that match a pattern: one member for each topic, one inbox. Thread-safe.</summary>
+    /// <summary>Subscriber of all topics that match a pattern: one member per topic, one inbox. Thread-safe.</summary>
     internal sealed class PatternSocket : ISubscriberSocket
     {
         private const int MaxMembers = 2000;
@@ -89,7 +89,7 @@ namespace Nep.Session
 
         public void Gone(string topic, ulong publisher, ulong lastSeq, bool isClosed)
         {
-            SubscriberSocket member = MemberOf(topic, isClosed); // which then knows what the reply may still name
+            SubscriberSocket member = MemberOf(topic, isClosed); // remembers the closed publisher, which a later reply may still list
             if (member != null)
             {
                 member.Gone(topic, publisher, lastSeq, isClosed);
@@ -158,7 +158,7 @@ namespace Nep.Session
             Inbox.Close();
         }
 
-        /// <summary>A topic that nobody publishes any more is left; its counters stay.</summary>
+        /// <summary>Remove the member of a topic without publishers; its counters are retained.</summary>
         private void Leave(SubscriberSocket member)
         {
             lock (_lock)

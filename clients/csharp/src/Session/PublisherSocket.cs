@@ -6,7 +6,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A publisher's XPUB socket and those who read there. Thread-safe.</summary>
+    /// <summary>XPUB socket of a publisher with its subscribers. Thread-safe.</summary>
     internal sealed class PublisherSocket : IXPubOwner, ISessionPublisher
     {
         private const int OnePartBelowBytes = 16384;
@@ -50,7 +50,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Messages that were not sent to a subscriber because too much was under way to it.</summary>
+        /// <summary>Number of messages not sent to a subscriber because too many bytes were in flight.</summary>
         public long Dropped { get; private set; }
 
         public int SubscriberCount
@@ -64,7 +64,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Why the last payload could not be encoded, for the next renewal; cleared by the next message.</summary>
+        /// <summary>Encoding error of the last payload, reported in the next renewal; cleared by the next message.</summary>
         public string Problem
         {
             set { _problem = value; }
@@ -95,8 +95,8 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Send a message to everybody who reads. <paramref name="payload"/> must not be changed any more.</summary>
-        /// <exception cref="ObjectDisposedException">It is closed.</exception>
+        /// <summary>Send a message to all subscribers. The caller must not modify <paramref name="payload"/> afterwards.</summary>
+        /// <exception cref="ObjectDisposedException">The publisher is closed.</exception>
         public void Send(byte[] payload, byte[] extension)
         {
             lock (_lock)
@@ -129,7 +129,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Wait until these have said hello; returns those that have not in time.</summary>
+        /// <summary>Wait for the hellos of the expected subscribers; return those that are missing after the timeout.</summary>
         public List<ExpectedSubscriber> WaitFor(List<ExpectedSubscriber> expected, int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
@@ -165,7 +165,7 @@ namespace Nep.Session
                 {
                     if (!Monitor.Wait(_lock, Math.Min(deadline.LeftMs, ByeAgainMs)))
                     {
-                        Bye(); // a full queue drops it like anything else
+                        Bye(); // repeated, because a full queue drops it
                     }
                 }
             }
@@ -360,7 +360,7 @@ namespace Nep.Session
             return parts;
         }
 
-        /// <summary>What one connection has subscribed to.</summary>
+        /// <summary>State of one subscriber's connection.</summary>
         private sealed class Reader
         {
             public readonly HashSet<byte[]> TopicFilters = new HashSet<byte[]>(ByteOrder.Instance);

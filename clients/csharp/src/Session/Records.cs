@@ -5,7 +5,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A node as it presents itself to a master.</summary>
+    /// <summary>Record of a node, sent to the master.</summary>
     internal sealed class NodeRecord
     {
         public string Id;
@@ -25,7 +25,7 @@ namespace Nep.Session
         }
     }
 
-    /// <summary>A publisher as its node presents it.</summary>
+    /// <summary>Record of a publisher.</summary>
     internal sealed class PublisherRecord
     {
         public ulong Id;
@@ -68,7 +68,7 @@ namespace Nep.Session
         }
     }
 
-    /// <summary>A subscriber as its node presents it.</summary>
+    /// <summary>Record of a subscriber.</summary>
     internal sealed class SubscriberRecord
     {
         public ulong Id;
@@ -88,17 +88,17 @@ namespace Nep.Session
         }
     }
 
-    /// <summary>A publisher with the node that it belongs to and the endpoint at which this node reaches it.</summary>
+    /// <summary>Publisher with its node and the endpoint at which this node reaches it.</summary>
     internal sealed class RemotePublisher
     {
         public PublisherRecord Publisher;
         public string NodeId;
         public string NodeName;
 
-        /// <summary>Whether it is on this very computer, with the same clock.</summary>
+        /// <summary>True if the publisher is on this computer, with the same clock.</summary>
         public bool IsHere;
 
-        /// <summary>Endpoint to connect to, or null when there is none for this node.</summary>
+        /// <summary>Endpoint to connect to, or null if this node can't reach any.</summary>
         public string Endpoint;
 
         public static RemotePublisher Read(Fields fields, MasterAddress master)
@@ -129,7 +129,7 @@ namespace Nep.Session
                 ZmtpEndpoint endpoint;
                 if (!ZmtpEndpoint.TryParse(each, out endpoint))
                 {
-                    continue; // nanomsg, or nonsense
+                    continue; // another transport, or invalid
                 }
                 if (master.IsNear ? endpoint.Host == MasterAddress.Loopback : !endpoint.IsLoopback)
                 {
@@ -141,7 +141,7 @@ namespace Nep.Session
         }
     }
 
-    /// <summary>A subscriber that a new publisher waits for.</summary>
+    /// <summary>Subscriber for whose connection a new publisher waits.</summary>
     internal sealed class ExpectedSubscriber
     {
         public ulong Id;

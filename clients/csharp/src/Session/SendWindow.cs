@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Nep.Session
 {
-    /// <summary>Bytes that were sent to one subscriber and are not known to be read. It lives under its publisher's lock.</summary>
+    /// <summary>Bytes sent to one subscriber and not yet acknowledged. Not thread-safe; guarded by the publisher's lock.</summary>
     internal sealed class SendWindow
     {
         public const long MaxBytes = 192L << 20;
@@ -19,7 +19,7 @@ namespace Nep.Session
 
         public long UnderWay { get; private set; }
 
-        /// <summary>Whether a message of this size may follow; one larger than the window waits for a step.</summary>
+        /// <summary>Return true if a message of this size may be sent; one larger than the window waits until a step is free.</summary>
         public bool HasRoom(long size)
         {
             return UnderWay <= StepBytes || UnderWay + size <= _bound;
@@ -45,7 +45,7 @@ namespace Nep.Session
             _hasMissed = true;
         }
 
-        /// <summary>Whether it has room again and does not know yet what it missed; true counts as telling.</summary>
+        /// <summary>Return true once when there is room again after a drop; the caller then notifies the subscriber.</summary>
         public bool IsToTell()
         {
             if (!_hasMissed || UnderWay > StepBytes)
@@ -56,7 +56,7 @@ namespace Nep.Session
             return true;
         }
 
-        /// <summary>The subscriber has read everything up to a message and wants so much under way at most.</summary>
+        /// <summary>Handle an acknowledgement of all messages up to a seq, with the window that the subscriber requests.</summary>
         public void Read(ulong seq, ulong boundBytes)
         {
             _bound = boundBytes > (ulong)MaxBytes ? MaxBytes : boundBytes < (ulong)MinBytes ? MinBytes : (long)boundBytes;
@@ -67,7 +67,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Whether to ask it now what it has read; true counts as asking.</summary>
+        /// <summary>Return true if an acknowledgement should be requested now; the request is then counted as sent.</summary>
         public bool IsToAsk(double nowS, bool hasRoom)
         {
             if (_unasked < StepBytes && (hasRoom || nowS < _askedAtS + AskAgainS))

@@ -6,7 +6,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A call that waits for a server's callback.</summary>
+    /// <summary>Call that waits for the server's callback.</summary>
     internal sealed class IncomingCall
     {
         public Connection From;
@@ -15,7 +15,7 @@ namespace Nep.Session
         public double? UntilS;
     }
 
-    /// <summary>A server's ROUTER socket with the calls that wait. Thread-safe.</summary>
+    /// <summary>ROUTER socket of a server with its queue of calls. Thread-safe.</summary>
     internal sealed class ServerSocket : IRouterOwner, ISessionPublisher
     {
         private const int MaxWaiting = 1000;
@@ -71,7 +71,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Next call that somebody still waits for; null when the server closes.</summary>
+        /// <summary>Wait for the next call that has not timed out; null if the server is closing.</summary>
         public IncomingCall Take()
         {
             lock (_lock)
@@ -97,7 +97,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Answer a call that <see cref="Take"/> gave.</summary>
+        /// <summary>Reply to a call returned by <see cref="Take"/>.</summary>
         public void Answer(IncomingCall call, byte kind, byte[] payload)
         {
             lock (_lock)
@@ -128,7 +128,7 @@ namespace Nep.Session
                 _waiting.Clear();
                 Monitor.PulseAll(_lock);
             }
-            refused.ForEach(each => Refuse(each, "the server closes"));
+            refused.ForEach(each => Refuse(each, "the server is closing"));
         }
 
         public void Finish(int timeoutMs)
@@ -153,12 +153,12 @@ namespace Nep.Session
             }
             catch (WireException exception)
             {
-                _socket.Acceptor.Refused.Add(exception.Code); // counted and not answered; the connection stays
+                _socket.Acceptor.Refused.Add(exception.Code); // counted without a reply; the connection stays open
                 return;
             }
             if (call.Payload.Length > ServiceHeader.MaxPayloadBytes)
             {
-                throw new ZmtpException("message-too-large", "a call has more than 64 MB");
+                throw new ZmtpException("message-too-large", "it sent a call of more than 64 MB");
             }
             if (call.Header.TimeoutMs > 0)
             {
@@ -169,11 +169,11 @@ namespace Nep.Session
             {
                 if (_isClosing)
                 {
-                    reason = "the server closes";
+                    reason = "the server is closing";
                 }
                 else if (_waiting.Count >= MaxWaiting || _waitingBytes + call.Payload.Length > MaxWaitingBytes)
                 {
-                    reason = "too many calls wait for the server";
+                    reason = "the server has too many pending calls";
                 }
                 else
                 {

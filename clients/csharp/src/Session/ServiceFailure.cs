@@ -4,7 +4,7 @@ using Nep.Wire;
 
 namespace Nep.Session
 {
-    /// <summary>Payload of an error or refusal.</summary>
+    /// <summary>Payload of an error or rejection.</summary>
     internal static class ServiceFailure
     {
         public static byte[] Encode(string kind, string reason)
@@ -21,10 +21,10 @@ namespace Nep.Session
                 string text = Names.StrictUtf8.GetString(payload);
                 failure = (Dictionary<string, string>)Json.Serializer.Deserialize(text, typeof(Dictionary<string, string>));
             }
-            catch (Exception) // whatever the other side sent
+            catch (Exception) // malformed payload
             {
             }
-            string name = "", reason = "the server told no reason";
+            string name = "", reason = "the server gave no reason";
             if (failure != null)
             {
                 failure.TryGetValue("nep_error", out name);

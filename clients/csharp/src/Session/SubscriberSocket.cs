@@ -6,7 +6,7 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A subscriber's SUB socket, which fills an inbox. Thread-safe.</summary>
+    /// <summary>SUB socket of a subscriber, which fills an inbox. Thread-safe.</summary>
     internal sealed class SubscriberSocket : ISubOwner, ISubscriberSocket
     {
         private const int MaxClosedEarly = 1000;
@@ -64,7 +64,7 @@ namespace Nep.Session
             return topic == Record.Topic;
         }
 
-        /// <summary>Wait until all listed publishers have echoed.</summary>
+        /// <summary>Wait until the echoes of all listed publishers were received.</summary>
         public void WaitForEchoes(int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
@@ -144,7 +144,7 @@ namespace Nep.Session
                     {
                         _closedEarly.Clear();
                     }
-                    _closedEarly.Add(publisher); // the reply that still names it may come later
+                    _closedEarly.Add(publisher); // a later reply may still list it
                 }
             }
         }
@@ -267,7 +267,7 @@ namespace Nep.Session
             if ((message.Header.Flags & Header.Shared) != 0)
             {
                 _sources.Dropped(1);
-                throw new WireException("shared-memory"); // nobody was told that it would be read
+                throw new WireException("shared-memory"); // this library accepts no offers
             }
             HeardPublisher source = _sources.Get(publisher);
             string type = source.Remote == null ? Record.MsgType : source.Remote.Publisher.MsgType;
@@ -305,7 +305,7 @@ namespace Nep.Session
                 string problem = connection == null ? null : connection.Problem;
                 if (problem != null)
                 {
-                    return "the program at " + connection.Endpoint + " is no publisher (" + problem + ")";
+                    return "the program at " + connection.Endpoint + " isn't a publisher (" + problem + ")";
                 }
             }
             return null;

@@ -3,7 +3,7 @@ using System.Collections.Generic;
 
 namespace Nep.Wire
 {
-    /// <summary>Typed access to a map of a reply or push. Unknown fields are ignored, missing ones have their default.</summary>
+    /// <summary>Typed access to a map of a reply or push. Unknown fields are ignored; missing ones have a default.</summary>
     internal sealed class Fields
     {
         private static readonly List<object> NoList = new List<object>();
@@ -162,7 +162,7 @@ namespace Nep.Wire
             return ToIntegers(List(name));
         }
 
-        /// <summary>The map with text keys and lists of integers that <c>clocks</c> is.</summary>
+        /// <summary>Return a map with text keys and lists of integers, such as <c>clocks</c>.</summary>
         public Dictionary<string, List<long>> IntegersByText(string name)
         {
             var lists = new Dictionary<string, List<long>>();
@@ -191,7 +191,7 @@ namespace Nep.Wire
             return list.ConvertAll(each => (long)each);
         }
 
-        /// <summary>The map with integer keys that <c>last_seqs</c> is.</summary>
+        /// <summary>Return a map with integer keys, such as <c>last_seqs</c>.</summary>
         public Dictionary<ulong, ulong> Numbers(string name)
         {
             var numbers = new Dictionary<ulong, ulong>();

@@ -3,7 +3,7 @@ using System.Text;
 
 namespace Nep.Wire
 {
-    /// <summary>What a hello filter says.</summary>
+    /// <summary>Content of a hello filter.</summary>
     internal struct Hello
     {
         public ulong Subscriber;
@@ -11,7 +11,7 @@ namespace Nep.Wire
         public int Level;
     }
 
-    /// <summary>What an answer to an echo says.</summary>
+    /// <summary>Content of an acknowledgement.</summary>
     internal struct ReadAnswer
     {
         public ulong Subscriber;
@@ -76,7 +76,7 @@ namespace Nep.Wire
                 && TryHex(filter, 57, out answer.BoundBytes);
         }
 
-        /// <summary>Whether it answers an offer of shared memory, which this library never makes.</summary>
+        /// <summary>Return true if a filter accepts an offer of shared memory, which this library never sends.</summary>
         public static bool IsShares(byte[] filter)
         {
             ulong number;

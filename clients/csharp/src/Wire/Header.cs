@@ -2,7 +2,7 @@ using System;
 
 namespace Nep.Wire
 {
-    /// <summary>The 32 bytes before a payload.</summary>
+    /// <summary>Header of a message: 32 bytes before the payload.</summary>
     internal struct Header
     {
         public const int Size = 32;
@@ -41,7 +41,7 @@ namespace Nep.Wire
             LittleEndian.Write(into, at + 24, Publisher, 8);
         }
 
-        /// <exception cref="WireException">It has another size or version.</exception>
+        /// <exception cref="WireException">The header has another size or version.</exception>
         public static Header Read(byte[] from, int at, int count)
         {
             if (count != Size)
@@ -63,7 +63,7 @@ namespace Nep.Wire
         }
     }
 
-    /// <summary>Little-endian numbers in byte arrays, on any processor.</summary>
+    /// <summary>Access to little-endian numbers in byte arrays, on any processor.</summary>
     internal static class LittleEndian
     {
         public static ulong Read(byte[] from, int at, int bytes)

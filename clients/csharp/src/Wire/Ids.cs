@@ -5,12 +5,12 @@ using System.Text;
 
 namespace Nep.Wire
 {
-    /// <summary>Ids that a key proves: see docs/wire.md, "Who speaks for a node".</summary>
+    /// <summary>Ids derived from a node's key: see docs/wire.md, "Node identity".</summary>
     internal static class Ids
     {
         public static string NewKey()
         {
-            return Guid.NewGuid().ToString("N"); // made by the system's cryptographic generator
+            return Guid.NewGuid().ToString("N"); // from the system's cryptographic generator
         }
 
         public static string NodeId(string key)
@@ -33,7 +33,7 @@ namespace Nep.Wire
 
         private static byte[] Digest(string text)
         {
-            // By name: SHA256.Create finds its class by reflection, and IL2CPP's linker may have removed it.
+            // SHA256.Create finds its class by reflection, and IL2CPP's linker may have removed it.
             using (var hash = new SHA256Managed())
             {
                 return hash.ComputeHash(Encoding.UTF8.GetBytes(text));

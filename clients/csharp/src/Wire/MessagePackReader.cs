@@ -4,7 +4,7 @@ using System.Text;
 
 namespace Nep.Wire
 {
-    /// <summary>msgpack to plain values. Numbers are long, or ulong above its range; 64 levels at most.</summary>
+    /// <summary>Decoder of msgpack to plain values. Integers are long, or ulong beyond its range; at most 64 levels.</summary>
     internal sealed class MessagePackReader
     {
         public const int MaxLevels = 64;
@@ -21,15 +21,15 @@ namespace Nep.Wire
             _end = data.Offset + data.Count;
         }
 
-        /// <summary>The one value in <paramref name="data"/>.</summary>
-        /// <exception cref="FormatException">It is no msgpack, or not exactly one value.</exception>
+        /// <summary>Decode the single value in <paramref name="data"/>.</summary>
+        /// <exception cref="FormatException">The data is malformed or has trailing bytes.</exception>
         public static object ReadOnly(ArraySegment<byte> data)
         {
             var reader = new MessagePackReader(data);
             object value = reader.ReadValue(0);
             if (reader._at != reader._end)
             {
-                throw new FormatException("bytes follow the msgpack value");
+                throw new FormatException("the msgpack value is followed by other bytes");
             }
             return value;
         }
@@ -97,7 +97,7 @@ namespace Nep.Wire
                 case 0xDD: return List(Count(Number(4)), level);
                 case 0xDE: return Map((int)Number(2), level);
                 case 0xDF: return Map(Count(Number(4)), level);
-                default: throw new FormatException("an unknown msgpack type");
+                default: throw new FormatException("unknown msgpack type");
             }
         }
 
@@ -133,7 +133,7 @@ namespace Nep.Wire
         {
             if (told > (ulong)(_end - _at))
             {
-                throw new FormatException("the msgpack ends too early");
+                throw new FormatException("the msgpack is truncated");
             }
             return (int)told;
         }
@@ -142,7 +142,7 @@ namespace Nep.Wire
         {
             if (count > _end - _at)
             {
-                throw new FormatException("the msgpack ends too early");
+                throw new FormatException("the msgpack is truncated");
             }
         }
 
@@ -166,7 +166,7 @@ namespace Nep.Wire
             }
             catch (DecoderFallbackException)
             {
-                throw new FormatException("a msgpack text is no UTF-8");
+                throw new FormatException("a msgpack string is not valid UTF-8");
             }
         }
 
@@ -203,7 +203,7 @@ namespace Nep.Wire
         {
             if (level >= MaxLevels)
             {
-                throw new FormatException("more than 64 levels of lists and maps");
+                throw new FormatException("lists and maps are nested more than 64 levels deep");
             }
         }
 
@@ -239,13 +239,13 @@ namespace Nep.Wire
             }
             if (nanoseconds > 999999999 || seconds < -62135596800 || seconds > 253402300799)
             {
-                throw new FormatException("a msgpack timestamp is no time");
+                throw new FormatException("a msgpack timestamp is out of range");
             }
             return new DateTime(EpochTicks + seconds * TimeSpan.TicksPerSecond + (long)(nanoseconds / 100), DateTimeKind.Utc);
         }
     }
 
-    /// <summary>Stands for nil where it is a key.</summary>
+    /// <summary>Key that represents nil in dictionaries.</summary>
     internal static class MessagePackNil
     {
         public static readonly object Key = new object();

@@ -5,14 +5,14 @@ using System.Globalization;
 
 namespace Nep.Wire
 {
-    /// <summary>Plain values to msgpack: null, bool, integers, floats, string, byte[], DateTime, dictionaries and lists.</summary>
+    /// <summary>Encoder of plain values to msgpack: null, bool, integers, floats, string, byte[], DateTime, dictionaries and lists.</summary>
     internal sealed class MessagePackWriter
     {
         private static readonly long EpochTicks = new DateTime(1970, 1, 1, 0, 0, 0, DateTimeKind.Utc).Ticks;
         private byte[] _buffer = new byte[256];
         private int _size;
 
-        /// <exception cref="NotSupportedException">A value has no form in msgpack or is nested too deeply.</exception>
+        /// <exception cref="NotSupportedException">A value can't be encoded or is nested too deep.</exception>
         public static byte[] Write(object value)
         {
             var writer = new MessagePackWriter();
@@ -26,7 +26,7 @@ namespace Nep.Wire
         {
             if (level >= MessagePackReader.MaxLevels && (value is IDictionary || value is ICollection && !(value is byte[])))
             {
-                throw new NotSupportedException("more than 64 levels of lists and maps");
+                throw new NotSupportedException("lists and maps are nested more than 64 levels deep");
             }
             if (value == null || value == MessagePackNil.Key)
             {
@@ -99,7 +99,7 @@ namespace Nep.Wire
             }
             else
             {
-                throw new NotSupportedException("a value of type " + value.GetType().Name + " has no form in msgpack");
+                throw new NotSupportedException("a value of type " + value.GetType().Name + " can't be encoded as msgpack");
             }
         }
 
@@ -130,7 +130,7 @@ namespace Nep.Wire
             _size += bytes.Length;
         }
 
-        /// <summary>Size of a map or list (15 in the first byte), or of bytes (never in it).</summary>
+        /// <summary>Write the type and size of a map or list (up to 15 in the first byte) or of bytes.</summary>
         private void Head(int count, int small, int medium, int large)
         {
             if (medium == 15)
@@ -152,7 +152,7 @@ namespace Nep.Wire
 
         private void Text(string text)
         {
-            byte[] bytes = System.Text.Encoding.UTF8.GetBytes(text); // halves of letters become U+FFFD
+            byte[] bytes = System.Text.Encoding.UTF8.GetBytes(text); // lone surrogates become U+FFFD
             if (bytes.Length <= 31)
             {
                 Byte(0xA0 | bytes.Length);

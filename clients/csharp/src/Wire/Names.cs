@@ -3,7 +3,7 @@ using System.Text;
 
 namespace Nep.Wire
 {
-    /// <summary>The grammar of topics and node names.</summary>
+    /// <summary>Grammar of topics and node names.</summary>
     internal static class Names
     {
         public const int MaxBytes = 200;
@@ -62,7 +62,7 @@ namespace Nep.Wire
                 || each >= '\uFFF9' && each <= '\uFFFB';
         }
 
-        /// <summary>The topic part: the name and a zero byte.</summary>
+        /// <summary>Return the topic part: the name and a zero byte.</summary>
         public static byte[] TopicPart(string topic)
         {
             var part = new byte[StrictUtf8.GetByteCount(topic) + 1];
@@ -70,7 +70,7 @@ namespace Nep.Wire
             return part;
         }
 
-        /// <exception cref="WireException">It is none.</exception>
+        /// <exception cref="WireException">The topic part is malformed.</exception>
         public static string ReadTopicPart(byte[] part, int count)
         {
             if (count == 0 || part[count - 1] != 0)

@@ -2,7 +2,7 @@ using System;
 
 namespace Nep.Wire
 {
-    /// <summary>First part of a call or answer of a service: see docs/services.md, "Calls and answers".</summary>
+    /// <summary>First part of a call or reply of a service: see docs/services.md, "Calls and answers".</summary>
     internal struct ServiceHeader
     {
         public const int Size = 16;
@@ -28,8 +28,8 @@ namespace Nep.Wire
             return bytes;
         }
 
-        /// <summary>Read the first of two parts; <paramref name="isCall"/> says which kinds are wanted.</summary>
-        /// <exception cref="WireException">It is none.</exception>
+        /// <summary>Read the header of a call (<paramref name="isCall"/> true) or a reply, which has two parts.</summary>
+        /// <exception cref="WireException">The parts are malformed.</exception>
         public static ServiceHeader Read(byte[][] parts, bool isCall)
         {
             if (parts.Length != 2 || parts[0].Length != Size)

@@ -2,7 +2,7 @@ using System;
 
 namespace Nep.Wire
 {
-    /// <summary>Bytes that the native wire does not allow. <see cref="Code"/> is the same in every language: see docs/wire.md.</summary>
+    /// <summary>Malformed data of the native wire. <see cref="Code"/> is the same in every language: see docs/wire.md.</summary>
     internal sealed class WireException : Exception
     {
         public WireException(string code) : base("the message is malformed: " + code)

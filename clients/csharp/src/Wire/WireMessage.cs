@@ -3,7 +3,7 @@ using System.Collections.Generic;
 
 namespace Nep.Wire
 {
-    /// <summary>One message, or a notice if it has only a header.</summary>
+    /// <summary>Decoded message.</summary>
     internal struct WireMessage
     {
         public string Topic;
@@ -12,14 +12,14 @@ namespace Nep.Wire
         public Dictionary<string, object> Extension;
     }
 
-    /// <summary>Messages from the parts of the wire. Pure functions; the checks and their order are those of docs/wire.md.</summary>
+    /// <summary>Decoder of messages, with the checks of docs/wire.md in their order.</summary>
     internal static class WireReader
     {
         public const int MaxBatch = 256;
         private const int MaxCodec = 5;
 
-        /// <summary>The messages in these parts, one unless it is a batch.</summary>
-        /// <exception cref="WireException">Anything is not as the specification says.</exception>
+        /// <summary>Decode the messages in these parts: one, or those of a batch.</summary>
+        /// <exception cref="WireException">The message violates the specification.</exception>
         public static List<WireMessage> Read(byte[][] parts)
         {
             int cut = CheckFirst(parts);
@@ -27,7 +27,7 @@ namespace Nep.Wire
             return ReadRest(topic, parts, cut);
         }
 
-        /// <summary>Bytes of the topic part, in its own part or at the beginning of the only one.</summary>
+        /// <summary>Return the size of the topic part, which may be the beginning of a single part.</summary>
         public static int CheckFirst(byte[][] parts)
         {
             if (parts.Length == 0)
@@ -46,7 +46,7 @@ namespace Nep.Wire
             return cut;
         }
 
-        /// <summary>The messages behind a first part that was checked; <paramref name="cut"/> is its size.</summary>
+        /// <summary>Decode the messages after the topic part, which the caller has checked; <paramref name="cut"/> is its size.</summary>
         public static List<WireMessage> ReadRest(string topic, byte[][] parts, int cut)
         {
             bool isOnePart = parts.Length == 1;

@@ -6,19 +6,19 @@ using System.Threading;
 
 namespace Nep.Zmtp
 {
-    /// <summary>What an <see cref="Acceptor"/> tells its owner, in the thread of the connection.</summary>
+    /// <summary>Events of an <see cref="Acceptor"/>, raised in the thread of the connection.</summary>
     internal interface IAcceptorOwner
     {
-        /// <summary>The handshake of a connection is over.</summary>
+        /// <summary>Called after the handshake of a connection.</summary>
         void Opened(Connection connection);
 
-        /// <exception cref="ZmtpException">The connection is to be closed for this reason.</exception>
+        /// <exception cref="ZmtpException">The connection must be closed; the exception contains the reason.</exception>
         void Received(Connection connection, byte[][] parts);
 
         void Closed(Connection connection);
     }
 
-    /// <summary>Bound addresses and the connections that come in there, each with a thread that reads. Thread-safe.</summary>
+    /// <summary>Bound addresses and their incoming connections, each with a reading thread. Thread-safe.</summary>
     internal sealed class Acceptor
     {
         private readonly object _lock = new object();
@@ -41,19 +41,19 @@ namespace Nep.Zmtp
             Refused = new CloseCounter();
         }
 
-        /// <summary>Connections that were closed because of what the peer sent, or for lack of room.</summary>
+        /// <summary>Counter of connections closed because of protocol errors or limits.</summary>
         public CloseCounter Refused { get; private set; }
 
-        /// <summary>Connections after their handshake.</summary>
+        /// <summary>Established connections.</summary>
         public Connection[] Connections
         {
             get { return _snapshot; }
         }
 
-        /// <summary>Bind at a free port of an address and return it.</summary>
+        /// <summary>Bind to a free port of an address and return the port.</summary>
         /// <param name="host">An IPv4 or IPv6 address, or a name of this computer.</param>
-        /// <param name="isAllowed">Ports that may be taken; others are given back.</param>
-        /// <exception cref="SocketException">The address cannot be bound.</exception>
+        /// <param name="isAllowed">Returns true for ports that may be used.</param>
+        /// <exception cref="SocketException">The address can't be bound.</exception>
         public int Bind(string host, Predicate<int> isAllowed)
         {
             IPAddress address = AddressOf(host);
@@ -88,8 +88,8 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Bind at a port of an address.</summary>
-        /// <exception cref="SocketException">It cannot be bound.</exception>
+        /// <summary>Bind to a port of an address.</summary>
+        /// <exception cref="SocketException">The port can't be bound.</exception>
         public void Bind(string host, int port)
         {
             IPAddress address = AddressOf(host);
@@ -107,7 +107,7 @@ namespace Nep.Zmtp
             Listen(host, socket);
         }
 
-        /// <summary>Accept no further connections at an address. Present ones stay.</summary>
+        /// <summary>Stop accepting connections at an address; existing ones stay open.</summary>
         public void Unbind(string host)
         {
             Listener listener;
@@ -122,7 +122,7 @@ namespace Nep.Zmtp
             listener.Close();
         }
 
-        /// <summary>Deliver what is queued, for <paramref name="lingerMs"/> at most, and close.</summary>
+        /// <summary>Send queued messages for at most <paramref name="lingerMs"/>, and close.</summary>
         public void Close(int lingerMs)
         {
             var deadline = new Deadline(lingerMs);
@@ -184,7 +184,7 @@ namespace Nep.Zmtp
             }
             catch (SocketException)
             {
-                socket.Close(); // it is gone already
+                socket.Close(); // already disconnected
                 return;
             }
             lock (_lock)
@@ -262,7 +262,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>A listening socket with the thread that accepts.</summary>
+        /// <summary>Listening socket with its accepting thread.</summary>
         private sealed class Listener
         {
             private readonly Socket _socket;

@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Nep.Zmtp
 {
-    /// <summary>Compares byte arrays by their unsigned bytes, a prefix before what it begins.</summary>
+    /// <summary>Comparer of byte arrays by their unsigned bytes; a prefix sorts before longer arrays.</summary>
     internal sealed class ByteOrder : IComparer<byte[]>, IEqualityComparer<byte[]>
     {
         public static readonly ByteOrder Instance = new ByteOrder();

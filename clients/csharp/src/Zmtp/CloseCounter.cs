@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Nep.Zmtp
 {
-    /// <summary>Connections that were closed because of what the peer sent, by reason. Thread-safe.</summary>
+    /// <summary>Counter of connections closed because of protocol errors or limits, by reason. Thread-safe.</summary>
     internal sealed class CloseCounter
     {
         private readonly Dictionary<string, long> _byReason = new Dictionary<string, long>();

@@ -4,7 +4,7 @@ using System.Text;
 
 namespace Nep.Zmtp
 {
-    /// <summary>Bodies of commands: a name with its length before it, then data.</summary>
+    /// <summary>Bodies of commands: the length of the name, the name, and data.</summary>
     internal static class Commands
     {
         private const int MaxProperties = 32;
@@ -44,7 +44,7 @@ namespace Nep.Zmtp
             return body;
         }
 
-        /// <summary>The answer to a PING, with its context.</summary>
+        /// <summary>Return the PONG for a PING, with its context.</summary>
         public static byte[] Pong(byte[] ping)
         {
             byte[] name = Name("PONG");
@@ -58,7 +58,7 @@ namespace Nep.Zmtp
             return body;
         }
 
-        /// <summary>The peer's text, without characters that control a terminal.</summary>
+        /// <summary>Return the text of an ERROR, with control characters replaced.</summary>
         public static string ErrorReason(byte[] body)
         {
             if (body.Length < 7)

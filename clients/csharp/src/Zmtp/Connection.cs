@@ -7,7 +7,7 @@ using System.Threading;
 
 namespace Nep.Zmtp
 {
-    /// <summary>One TCP connection that speaks ZMTP 3.0. One thread reads; any thread sends.</summary>
+    /// <summary>TCP connection with ZMTP 3.0. One thread reads; any thread may send.</summary>
     internal sealed class Connection
     {
         private const int IdlePollMs = 1000;
@@ -29,7 +29,7 @@ namespace Nep.Zmtp
         private bool _hasReceived;
         private int _isClosed;
 
-        /// <summary>Take a connected socket over. Call <see cref="Handshake"/> before anything else.</summary>
+        /// <summary>Create a connection from a connected socket, which it owns. Call <see cref="Handshake"/> first.</summary>
         public Connection(Socket socket, string socketType, bool isServer, ZmtpLimits limits, MechanismFactory mechanism)
         {
             _socket = socket;
@@ -48,10 +48,10 @@ namespace Nep.Zmtp
             _isFar = limits.IsHeartbeatLocal || RemoteAddress != null && !IPAddress.IsLoopback(RemoteAddress);
         }
 
-        /// <summary>Peer's address.</summary>
+        /// <summary>Address of the peer.</summary>
         public IPAddress RemoteAddress { get; private set; }
 
-        /// <summary>Address of this computer that the connection uses.</summary>
+        /// <summary>Local address of the connection.</summary>
         public IPAddress LocalAddress { get; private set; }
 
         /// <summary>Data of the owner.</summary>
@@ -72,9 +72,9 @@ namespace Nep.Zmtp
             get { return _isClosed != 0; }
         }
 
-        /// <summary>Exchange greeting and security handshake; blocks for <see cref="ZmtpLimits.HandshakeTimeoutMs"/> at most.</summary>
-        /// <exception cref="ZmtpException">The peer is not one to talk to.</exception>
-        /// <exception cref="ConnectionClosedException">It hung up.</exception>
+        /// <summary>Perform greeting and security handshake; blocks for at most <see cref="ZmtpLimits.HandshakeTimeoutMs"/>.</summary>
+        /// <exception cref="ZmtpException">The peer is incompatible or violates the protocol.</exception>
+        /// <exception cref="ConnectionClosedException">The peer closed the connection.</exception>
         public void Handshake()
         {
             var watch = Stopwatch.StartNew();
@@ -89,7 +89,7 @@ namespace Nep.Zmtp
                 }
                 catch (ConnectionClosedException) when (count >= Greeting.SignatureSize)
                 {
-                    // libzmq closes before it sends its mechanism when that is another one.
+                    // libzmq with another mechanism closes the connection without sending its own.
                     throw new ZmtpException("refused-by-peer", "it closed the connection during the handshake; it may require encryption or a password");
                 }
                 count += _decoder.Peek(greeting, count, greeting.Length - count);
@@ -111,8 +111,8 @@ namespace Nep.Zmtp
             CheckSocketType();
         }
 
-        /// <summary>Wait for the next message and return its parts. Commands are answered on the way.</summary>
-        /// <exception cref="ZmtpException">The peer broke the protocol or a limit.</exception>
+        /// <summary>Wait for the next message and return its parts. Commands are handled meanwhile.</summary>
+        /// <exception cref="ZmtpException">The peer violates the protocol or a limit.</exception>
         /// <exception cref="ConnectionClosedException">The connection ended.</exception>
         public byte[][] ReadMessage()
         {
@@ -142,19 +142,19 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Queue a message; false when it was dropped.</summary>
+        /// <summary>Queue a message; return false if it was dropped.</summary>
         public bool Send(EncodedMessage message)
         {
             return _queue.Send(message);
         }
 
-        /// <summary>Wait until the kernel has taken everything.</summary>
+        /// <summary>Wait until the kernel has accepted all messages; return false after the timeout.</summary>
         public bool Flush(int timeoutMs)
         {
             return _queue.Flush(timeoutMs);
         }
 
-        /// <summary>Close; the reader ends with <see cref="ConnectionClosedException"/>. From any thread, any number of times.</summary>
+        /// <summary>Close; the reader throws <see cref="ConnectionClosedException"/>. Thread-safe and idempotent.</summary>
         public void Close()
         {
             if (Interlocked.Exchange(ref _isClosed, 1) != 0)
@@ -164,7 +164,7 @@ namespace Nep.Zmtp
             _queue.Close();
             try
             {
-                _socket.Shutdown(SocketShutdown.Both); // wakes a reader that polls
+                _socket.Shutdown(SocketShutdown.Both); // wakes a polling reader
             }
             catch (SocketException)
             {
@@ -194,7 +194,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Answer a command. A SUBSCRIBE or CANCEL of ZMTP 3.1 becomes the message that 3.0 has for it.</summary>
+        /// <summary>Handle a command. SUBSCRIBE and CANCEL of ZMTP 3.1 are converted to the messages of 3.0.</summary>
         private byte[] OnCommand(byte[] body)
         {
             if (Commands.Is(body, "PING"))
@@ -213,7 +213,7 @@ namespace Nep.Zmtp
                 Buffer.BlockCopy(body, at, message, 1, body.Length - at);
                 return message;
             }
-            return null; // unknown commands are ignored, as the specification asks
+            return null; // unknown commands are ignored, as specified
         }
 
         private Frame ReadFrame(Stopwatch handshake)
@@ -226,7 +226,7 @@ namespace Nep.Zmtp
             return frame;
         }
 
-        /// <summary>Receive what is there; waits for it, within the handshake's time limit if there is one.</summary>
+        /// <summary>Wait for input, within the time limit of a handshake, and receive it.</summary>
         private void Fill(Stopwatch handshake)
         {
             ArraySegment<byte> buffer = _decoder.Buffer;
@@ -285,7 +285,7 @@ namespace Nep.Zmtp
 
         private ZmtpException HandshakeTimeout()
         {
-            return new ZmtpException("handshake-timeout", _hasReceived ? "it sent half a handshake" : "it sent nothing");
+            return new ZmtpException("handshake-timeout", _hasReceived ? "it sent an incomplete handshake" : "it sent nothing");
         }
 
         private void Heartbeat()

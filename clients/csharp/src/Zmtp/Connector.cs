@@ -6,19 +6,19 @@ using System.Threading;
 
 namespace Nep.Zmtp
 {
-    /// <summary>What a <see cref="Connector"/> tells its owner, in the connector's thread.</summary>
+    /// <summary>Events of a <see cref="Connector"/>, raised in its thread.</summary>
     internal interface IConnectorOwner
     {
-        /// <summary>The handshake is over. Nothing was sent yet but what the owner sends now.</summary>
+        /// <summary>Called after the handshake, before any other message is sent.</summary>
         void Connected(Connector connector, Connection connection);
 
         void Received(Connector connector, byte[][] parts);
 
-        /// <summary>The connection ended; another attempt follows unless the connector was closed.</summary>
+        /// <summary>Called when the connection has ended; the connector reconnects unless it was closed.</summary>
         void Disconnected(Connector connector, string reason);
     }
 
-    /// <summary>Keeps one outgoing connection: dials, reads, and dials again with growing waits, in a background thread.</summary>
+    /// <summary>Outgoing connection that is re-established with exponential back-off, in a background thread.</summary>
     internal sealed class Connector
     {
         private const string ClosedHere = "this side closed the connection";
@@ -51,13 +51,13 @@ namespace Nep.Zmtp
         /// <summary>Data of the owner.</summary>
         public object Tag { get; set; }
 
-        /// <summary>The connection after its handshake, or null.</summary>
+        /// <summary>Established connection, or null.</summary>
         public Connection Connection
         {
             get { return _connection; }
         }
 
-        /// <summary>What is wrong with the program at the address, such as "it is a PULL socket"; null while it is a peer, or nobody is there.</summary>
+        /// <summary>Why the program at the address isn't a compatible peer, such as "it is a PULL socket"; null if it is, or if there is none.</summary>
         public string Problem
         {
             get { return _problem; }
@@ -68,14 +68,14 @@ namespace Nep.Zmtp
             _thread = BackgroundThread.Start(_socketType.ToLowerInvariant(), Run, BackgroundThread.SmallStackBytes);
         }
 
-        /// <summary>Queue a message; false when there is no connection or its queue is full.</summary>
+        /// <summary>Queue a message; return false if there is no connection or its queue is full.</summary>
         public bool Send(EncodedMessage message)
         {
             Connection connection = _connection;
             return connection != null && connection.Send(message);
         }
 
-        /// <summary>End it. Does not wait; nothing is told to the owner from another connection after this.</summary>
+        /// <summary>Close the connection without waiting; no further connection is established.</summary>
         public void Close()
         {
             _stop.Set();
@@ -86,7 +86,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Wait for the thread, unless it is the caller's.</summary>
+        /// <summary>Wait for the thread to end, unless called from it.</summary>
         public void Join(int timeoutMs)
         {
             if (_thread != null && Thread.CurrentThread != _thread)
@@ -117,7 +117,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Dial, and read until the connection ends; returns why it ended.</summary>
+        /// <summary>Connect and read until the connection ends; return the reason of its end.</summary>
         private string ServeOne()
         {
             Connection connection = null;
@@ -139,7 +139,7 @@ namespace Nep.Zmtp
                     _owner.Received(this, connection.ReadMessage());
                 }
             }
-            catch (Exception exception) // whatever a peer sends, the thread goes on
+            catch (Exception exception) // nothing that a peer sends may end the thread
             {
                 return Ended(exception, sinceConnected != null);
             }
@@ -151,12 +151,12 @@ namespace Nep.Zmtp
                 }
                 if (sinceConnected != null && sinceConnected.ElapsedMilliseconds >= _limits.MaxReconnectMs)
                 {
-                    _waitMs = _limits.MinReconnectMs; // a peer that ends each connection at once is dialled less and less often
+                    _waitMs = _limits.MinReconnectMs; // keeps the back-off for a peer that closes each connection at once
                 }
             }
         }
 
-        /// <summary>Note why an attempt ended, and return it.</summary>
+        /// <summary>Record why a connection ended, and return the reason.</summary>
         private string Ended(Exception exception, bool wasConnected)
         {
             var broken = exception as ZmtpException;
@@ -171,7 +171,7 @@ namespace Nep.Zmtp
             }
             else if (exception is SocketException)
             {
-                _problem = null; // nobody is there
+                _problem = null; // no program uses the address
             }
             else if (exception is ObjectDisposedException)
             {
@@ -184,7 +184,7 @@ namespace Nep.Zmtp
             return exception.Message;
         }
 
-        /// <summary>Grows to the limit; a quarter of it is random, so that clients do not dial in step.</summary>
+        /// <summary>Return the next delay, which doubles up to the limit, with jitter of a quarter.</summary>
         private int NextWaitMs()
         {
             int wait = _waitMs;

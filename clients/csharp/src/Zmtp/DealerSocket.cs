@@ -2,7 +2,7 @@ using System;
 
 namespace Nep.Zmtp
 {
-    /// <summary>What a <see cref="DealerSocket"/> tells its owner, in a thread of the socket.</summary>
+    /// <summary>Events of a <see cref="DealerSocket"/>, raised in its thread.</summary>
     internal interface IDealerOwner
     {
         void Connected();
@@ -12,7 +12,7 @@ namespace Nep.Zmtp
         void Disconnected(string reason);
     }
 
-    /// <summary>DEALER that is connected to one ROUTER. Sends nothing while there is no connection. Thread-safe.</summary>
+    /// <summary>DEALER socket connected to one ROUTER. Queues nothing while disconnected. Thread-safe.</summary>
     internal sealed class DealerSocket : IConnectorOwner, IDisposable
     {
         private readonly IDealerOwner _owner;
@@ -25,16 +25,16 @@ namespace Nep.Zmtp
             _connector = new Connector(endpoint, "DEALER", limits, mechanism, this, Refused);
         }
 
-        /// <summary>Connections that were closed because of what the peer sent.</summary>
+        /// <summary>Counter of connections closed because of protocol errors.</summary>
         public CloseCounter Refused { get; private set; }
 
-        /// <summary>The present connection, or null.</summary>
+        /// <summary>Established connection, or null.</summary>
         public Connection Connection
         {
             get { return _connector.Connection; }
         }
 
-        /// <summary>What is wrong with the program at the address; see <see cref="Connector.Problem"/>.</summary>
+        /// <summary>See <see cref="Connector.Problem"/>.</summary>
         public string Problem
         {
             get { return _connector.Problem; }
@@ -45,13 +45,13 @@ namespace Nep.Zmtp
             _connector.Start();
         }
 
-        /// <summary>Queue a message; false when there is no connection or its queue is full.</summary>
+        /// <summary>Queue a message; return false if there is no connection or its queue is full.</summary>
         public bool Send(params byte[][] parts)
         {
             return _connector.Send(EncodedMessage.Message(parts));
         }
 
-        /// <summary>Deliver what is queued, for <paramref name="lingerMs"/> at most, and close.</summary>
+        /// <summary>Send queued messages for at most <paramref name="lingerMs"/>, and close.</summary>
         public void Close(int lingerMs)
         {
             Connection connection = _connector.Connection;

@@ -3,7 +3,7 @@ using System.Collections.Generic;
 
 namespace Nep.Zmtp
 {
-    /// <summary>A message as frames, encoded once and queued for any number of connections. Immutable.</summary>
+    /// <summary>Message encoded as frames, which may be queued for several connections. Immutable.</summary>
     internal sealed class EncodedMessage
     {
         private const int CopyBelowBytes = 16384;

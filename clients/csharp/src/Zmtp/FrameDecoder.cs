@@ -2,7 +2,7 @@ using System;
 
 namespace Nep.Zmtp
 {
-    /// <summary>One frame of a connection.</summary>
+    /// <summary>Frame of a connection.</summary>
     internal struct Frame
     {
         public byte[] Body;
@@ -10,8 +10,8 @@ namespace Nep.Zmtp
         public bool IsCommand;
     }
 
-    /// <summary>Frames from the bytes of a connection. Sizes are checked before memory is taken. Not thread-safe.</summary>
-    /// <remarks>Receive into <see cref="Buffer"/>, call <see cref="Advance"/>, then <see cref="TryRead"/> until it is false.</remarks>
+    /// <summary>Decoder of frames from the bytes of a connection. Checks sizes before it allocates memory. Not thread-safe.</summary>
+    /// <remarks>Receive into <see cref="Buffer"/>, call <see cref="Advance"/>, then <see cref="TryRead"/> until it returns false.</remarks>
     internal sealed class FrameDecoder
     {
         private const int ChunkBytes = 65536;
@@ -33,7 +33,7 @@ namespace Nep.Zmtp
             _limits = limits;
         }
 
-        /// <summary>Where the next bytes are to be received.</summary>
+        /// <summary>Buffer for the next received bytes.</summary>
         public ArraySegment<byte> Buffer
         {
             get
@@ -56,7 +56,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>So many bytes were received into <see cref="Buffer"/>.</summary>
+        /// <summary>Report the number of bytes received into <see cref="Buffer"/>.</summary>
         public void Advance(int count)
         {
             if (_body != null && _begin == _end)
@@ -69,7 +69,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Take raw bytes, before any frame: the greeting.</summary>
+        /// <summary>Read raw bytes before the first frame: the greeting.</summary>
         public int Peek(byte[] into, int at, int most)
         {
             int count = Math.Min(most, _end - _begin);
@@ -78,8 +78,8 @@ namespace Nep.Zmtp
             return count;
         }
 
-        /// <summary>Get the next whole frame.</summary>
-        /// <exception cref="ZmtpException">It is malformed or beyond a limit.</exception>
+        /// <summary>Read the next complete frame.</summary>
+        /// <exception cref="ZmtpException">The frame is malformed or exceeds a limit.</exception>
         public bool TryRead(out Frame frame)
         {
             frame = default(Frame);

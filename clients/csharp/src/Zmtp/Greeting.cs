@@ -3,7 +3,7 @@ using System.Text;
 
 namespace Nep.Zmtp
 {
-    /// <summary>The 64 bytes that open a connection (ZMTP 3.0, section "Greeting").</summary>
+    /// <summary>Greeting: the first 64 bytes of a connection (ZMTP 3.0, section "Greeting").</summary>
     internal static class Greeting
     {
         public const int Size = 64;
@@ -17,14 +17,14 @@ namespace Nep.Zmtp
             var greeting = new byte[Size];
             greeting[0] = 0xFF;
             greeting[9] = 0x7F;
-            greeting[10] = 3; // 3.0: a libzmq peer then sends subscriptions as messages
+            greeting[10] = 3; // 3.0, so that libzmq sends subscriptions as messages
             Encoding.ASCII.GetBytes(mechanism, 0, mechanism.Length, greeting, MechanismAt);
             greeting[AsServerAt] = isServer ? (byte)1 : (byte)0;
             return greeting;
         }
 
-        /// <summary>Check what is there of a peer's greeting.</summary>
-        /// <exception cref="ZmtpException">It is no ZMTP 3 greeting or names another mechanism.</exception>
+        /// <summary>Check the first <paramref name="count"/> bytes of a peer's greeting.</summary>
+        /// <exception cref="ZmtpException">It isn't a greeting of ZMTP 3, or has another mechanism.</exception>
         public static void Check(byte[] greeting, int count, string mechanism)
         {
             if (count >= 1 && greeting[0] != 0xFF || count >= 10 && (greeting[9] & 1) != 1)

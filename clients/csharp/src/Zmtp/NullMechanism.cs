@@ -4,7 +4,7 @@ using System.Text;
 
 namespace Nep.Zmtp
 {
-    /// <summary>The mechanism NULL: one READY command in each direction.</summary>
+    /// <summary>Mechanism NULL: one READY command in each direction.</summary>
     internal sealed class NullMechanism : IMechanism
     {
         private readonly string _socketType;

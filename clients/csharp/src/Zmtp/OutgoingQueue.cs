@@ -7,20 +7,20 @@ using System.Threading;
 
 namespace Nep.Zmtp
 {
-    /// <summary>Messages on their way out of one connection. Bounded; drops the newest. Thread-safe.</summary>
+    /// <summary>Send queue of one connection. Bounded; drops the newest messages. Thread-safe.</summary>
     /// <remarks>
-    /// The caller's thread writes as much as the socket takes at once; what is left is written by a thread that is
-    /// started when it is first needed. That thread also writes bursts, many messages in one call of the system.
+    /// The caller's thread writes as much as the socket accepts; the rest is written by a background thread, which is started on
+    /// first use. It also writes bursts, with several messages per system call.
     /// </remarks>
     internal sealed class OutgoingQueue
     {
         private const int JoinBytes = 65536;
         private const int SendBufferBytes = 262144;
 
-        /// <summary>After so many messages that follow each other within <see cref="BurstTicks"/> the thread takes over.</summary>
+        /// <summary>Number of consecutive messages within <see cref="BurstTicks"/> of each other after which the thread takes over.</summary>
         private const int MinBurst = 8;
 
-        /// <summary>A caller gives the thread a millisecond when so many messages wait although the socket takes them.</summary>
+        /// <summary>Number of queued messages beyond which a caller waits a millisecond for the thread, unless the socket is full.</summary>
         private const int MaxAhead = 10000;
 
         private static readonly long BurstTicks = Stopwatch.Frequency * 20 / 1000000;
@@ -51,17 +51,17 @@ namespace Nep.Zmtp
             _onFailure = onFailure;
             if (IsMono)
             {
-                // Mono (6.8, also Unity's) spins in Send on a non-blocking socket until all is sent. A writable socket has a third of
-                // its buffer free, so what is an eighth of it never meets a full one: docs/adr/0033-sending-under-mono.md.
+                // Send of Mono (6.8, also Unity's) busy-waits on a non-blocking socket until everything is sent. A writable socket has
+                // a third of its buffer free, so chunks of an eighth always fit: docs/adr/0033-sending-under-mono.md.
                 socket.SendBufferSize = SendBufferBytes;
                 _maxChunk = Math.Max(2048, socket.SendBufferSize / 8);
             }
         }
 
-        /// <summary>Messages that were dropped because the queue was full.</summary>
+        /// <summary>Number of messages dropped because the queue was full.</summary>
         public long Dropped { get; private set; }
 
-        /// <summary>Bytes that the socket has not taken yet.</summary>
+        /// <summary>Number of bytes not yet accepted by the socket.</summary>
         public long Bytes
         {
             get
@@ -73,7 +73,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Queue a message; false when it was dropped.</summary>
+        /// <summary>Queue a message; return false if it was dropped.</summary>
         public bool Send(EncodedMessage message)
         {
             lock (_lock)
@@ -117,7 +117,7 @@ namespace Nep.Zmtp
             return true;
         }
 
-        /// <summary>Wait until the socket has taken everything; false when it has not in time.</summary>
+        /// <summary>Wait until the socket has accepted all messages; return false after the timeout.</summary>
         public bool Flush(int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
@@ -131,7 +131,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Drop what waits and end the thread.</summary>
+        /// <summary>Discard queued messages and end the thread.</summary>
         public void Close()
         {
             lock (_lock)
@@ -150,7 +150,7 @@ namespace Nep.Zmtp
             return _burst == MinBurst;
         }
 
-        /// <summary>Write until there is nothing more (true) or the socket is full (false). The caller owns the writing.</summary>
+        /// <summary>Write until the queue is empty (true) or the socket is full (false). Only one thread may write at a time.</summary>
         private bool Write()
         {
             try
@@ -213,7 +213,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>The next message, or several small ones in one buffer; false ends the writing.</summary>
+        /// <summary>Dequeue the next message, or several small ones into one buffer; return false if the queue is empty.</summary>
         private bool TakeNext()
         {
             lock (_lock)

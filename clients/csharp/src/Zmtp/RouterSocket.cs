@@ -1,6 +1,6 @@
 namespace Nep.Zmtp
 {
-    /// <summary>What a <see cref="RouterSocket"/> tells its owner, in the thread of the connection.</summary>
+    /// <summary>Events of a <see cref="RouterSocket"/>, raised in the thread of the connection.</summary>
     internal interface IRouterOwner
     {
         void Received(Connection from, byte[][] parts);
@@ -8,7 +8,7 @@ namespace Nep.Zmtp
         void Left(Connection connection);
     }
 
-    /// <summary>ROUTER that is bound at one or more addresses; answers go to a connection instead of a routing id. Thread-safe.</summary>
+    /// <summary>ROUTER socket bound to one or more addresses; replies are sent to a connection, not to a routing id. Thread-safe.</summary>
     internal sealed class RouterSocket : IAcceptorOwner
     {
         private readonly IRouterOwner _owner;
@@ -19,7 +19,7 @@ namespace Nep.Zmtp
             Acceptor = new Acceptor("ROUTER", this, limits, mechanism);
         }
 
-        /// <summary>Addresses and connections.</summary>
+        /// <summary>Bound addresses and connections.</summary>
         public Acceptor Acceptor { get; private set; }
 
         void IAcceptorOwner.Opened(Connection connection)

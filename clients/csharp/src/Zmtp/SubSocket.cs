@@ -3,7 +3,7 @@ using System.Collections.Generic;
 
 namespace Nep.Zmtp
 {
-    /// <summary>What a <see cref="SubSocket"/> tells its owner, in the thread of the connection.</summary>
+    /// <summary>Events of a <see cref="SubSocket"/>, raised in the thread of the connection.</summary>
     internal interface ISubOwner
     {
         void Received(SubConnection from, byte[][] parts);
@@ -11,7 +11,7 @@ namespace Nep.Zmtp
         void Disconnected(SubConnection from, string reason);
     }
 
-    /// <summary>One publisher that a <see cref="SubSocket"/> is connected to, over any number of reconnections.</summary>
+    /// <summary>Connection of a <see cref="SubSocket"/> to one publisher, including reconnections.</summary>
     internal sealed class SubConnection
     {
         internal SubConnection(string endpoint)
@@ -24,7 +24,7 @@ namespace Nep.Zmtp
         /// <summary>Data of the owner.</summary>
         public object Tag { get; set; }
 
-        /// <summary>What is wrong with the program at the address; see <see cref="Zmtp.Connector.Problem"/>.</summary>
+        /// <summary>See <see cref="Zmtp.Connector.Problem"/>.</summary>
         public string Problem
         {
             get { return Connector.Problem; }
@@ -33,10 +33,10 @@ namespace Nep.Zmtp
         internal Connector Connector { get; set; }
     }
 
-    /// <summary>SUB that connects to any number of publishers. Thread-safe.</summary>
+    /// <summary>SUB socket connected to any number of publishers. Thread-safe.</summary>
     /// <remarks>
-    /// A new connection gets all filters in byte order right after READY, before anything else: a publisher that sees
-    /// the last one knows that the others are installed.
+    /// All filters are sent in byte order right after READY, before anything else: a publisher that receives the last one knows
+    /// that the others are installed.
     /// </remarks>
     internal sealed class SubSocket : IConnectorOwner, IDisposable
     {
@@ -56,10 +56,10 @@ namespace Nep.Zmtp
             Refused = new CloseCounter();
         }
 
-        /// <summary>Connections that were closed because of what the peer sent.</summary>
+        /// <summary>Counter of connections closed because of protocol errors.</summary>
         public CloseCounter Refused { get; private set; }
 
-        /// <summary>Receive what begins with <paramref name="filter"/>, from present and future connections.</summary>
+        /// <summary>Subscribe to messages that begin with <paramref name="filter"/>, on existing and future connections.</summary>
         public void Subscribe(byte[] filter)
         {
             lock (_lock)
@@ -72,7 +72,7 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Take a filter back.</summary>
+        /// <summary>Remove a filter.</summary>
         public void Unsubscribe(byte[] filter)
         {
             lock (_lock)
@@ -94,14 +94,14 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Connect and stay connected.</summary>
-        /// <exception cref="ArgumentException">It is no <c>tcp://HOST:PORT</c>.</exception>
+        /// <summary>Connect to an endpoint; reconnects automatically.</summary>
+        /// <exception cref="ArgumentException">The endpoint is not of the form <c>tcp://HOST:PORT</c>.</exception>
         public SubConnection Connect(string endpoint, object tag)
         {
             ZmtpEndpoint parsed;
             if (!ZmtpEndpoint.TryParse(endpoint, out parsed))
             {
-                throw new ArgumentException("'" + endpoint + "' is no endpoint of the form tcp://HOST:PORT", "endpoint");
+                throw new ArgumentException("Invalid endpoint '" + endpoint + "'. Use tcp://HOST:PORT.", "endpoint");
             }
             var made = new SubConnection(endpoint) { Tag = tag };
             made.Connector = new Connector(parsed, "SUB", _limits, _mechanism, this, Refused) { Tag = made };
@@ -117,7 +117,7 @@ namespace Nep.Zmtp
             return made;
         }
 
-        /// <summary>Close one connection; what it has not delivered yet is not delivered any more.</summary>
+        /// <summary>Close one connection and discard its undelivered messages.</summary>
         public void Disconnect(SubConnection connection)
         {
             lock (_lock)
@@ -169,7 +169,7 @@ namespace Nep.Zmtp
             foreach (SubConnection each in _connections)
             {
                 Connection connection = each.Connector.Connection;
-                if (connection != null && connection.Tag == this) // others get all filters when they are connected
+                if (connection != null && connection.Tag == this) // others receive all filters after their handshake
                 {
                     connection.Send(message);
                 }

@@ -3,20 +3,20 @@ using System.Collections.Generic;
 
 namespace Nep.Zmtp
 {
-    /// <summary>What an <see cref="XPubSocket"/> tells its owner, in the thread of the connection.</summary>
+    /// <summary>Events of an <see cref="XPubSocket"/>, raised in the thread of the connection.</summary>
     internal interface IXPubOwner
     {
-        /// <summary>A filter came (also one that the peer has already) or was taken back.</summary>
+        /// <summary>Called when a filter was added, including duplicates, or removed.</summary>
         void FilterChanged(XPubPeer peer, byte[] filter, bool isSubscribed);
 
-        /// <summary>A peer is gone, with all of its filters.</summary>
+        /// <summary>Called when a peer has disconnected, with all its filters.</summary>
         void Left(XPubPeer peer);
 
-        /// <summary>A peer sent something that is no subscription.</summary>
+        /// <summary>Called when a peer has sent a malformed subscription.</summary>
         void Rejected(string reason);
     }
 
-    /// <summary>One subscriber's connection.</summary>
+    /// <summary>Connection of one subscriber.</summary>
     internal sealed class XPubPeer
     {
         private readonly HashSet<byte[]> _filters = new HashSet<byte[]>(ByteOrder.Instance);
@@ -36,7 +36,7 @@ namespace Nep.Zmtp
             get { return _filters.Count; }
         }
 
-        /// <summary>Queue a message whether or not a filter asks for it; false when it was dropped.</summary>
+        /// <summary>Queue a message regardless of the filters; return false if it was dropped.</summary>
         public bool Send(EncodedMessage message)
         {
             return Connection.Send(message);
@@ -74,10 +74,10 @@ namespace Nep.Zmtp
         }
     }
 
-    /// <summary>XPUB that is bound at one or more addresses. Thread-safe.</summary>
+    /// <summary>XPUB socket bound to one or more addresses. Thread-safe.</summary>
     internal sealed class XPubSocket : IAcceptorOwner, IDisposable
     {
-        /// <summary>Longest subscription in bytes; who sends more is disconnected.</summary>
+        /// <summary>Maximum size of a subscription in bytes; peers that send more are disconnected.</summary>
         public const int MaxFilterBytes = 4096;
 
         private readonly IXPubOwner _owner;
@@ -93,13 +93,13 @@ namespace Nep.Zmtp
             _acceptor = new Acceptor("XPUB", this, limits, mechanism);
         }
 
-        /// <summary>Connections that were closed because of what the peer sent, or for lack of room.</summary>
+        /// <summary>Counter of connections closed because of protocol errors or limits.</summary>
         public CloseCounter Refused
         {
             get { return _acceptor.Refused; }
         }
 
-        /// <summary>Subscribers after their handshake.</summary>
+        /// <summary>Connected subscribers.</summary>
         public IEnumerable<XPubPeer> Peers
         {
             get
@@ -115,13 +115,13 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Addresses and connections.</summary>
+        /// <summary>Bound addresses and connections.</summary>
         public Acceptor Acceptor
         {
             get { return _acceptor; }
         }
 
-        /// <summary>Send to every peer with a filter that <paramref name="first"/> begins with; returns how many took it.</summary>
+        /// <summary>Send a message to every peer with a filter that is a prefix of <paramref name="first"/>; return the number of peers.</summary>
         public int Send(byte[] first, EncodedMessage message)
         {
             int count = 0;
@@ -135,7 +135,7 @@ namespace Nep.Zmtp
             return count;
         }
 
-        /// <summary>Deliver what is queued, for <paramref name="lingerMs"/> at most, and close.</summary>
+        /// <summary>Send queued messages for at most <paramref name="lingerMs"/>, and close.</summary>
         public void Close(int lingerMs)
         {
             _acceptor.Close(lingerMs);
@@ -166,7 +166,7 @@ namespace Nep.Zmtp
             byte[] body = parts[0];
             if (parts.Length != 1 || body.Length < 1 || body[0] > 1)
             {
-                _owner.Rejected("it is no subscription");
+                _owner.Rejected("malformed subscription");
                 return;
             }
             var filter = new byte[body.Length - 1];
@@ -175,7 +175,7 @@ namespace Nep.Zmtp
             {
                 if (peer.FilterCount >= _limits.MaxSubscriptions)
                 {
-                    throw new ZmtpException("too-many-subscriptions", "a connection has more than " + _limits.MaxSubscriptions + " subscriptions");
+                    throw new ZmtpException("too-many-subscriptions", "it sent more than " + _limits.MaxSubscriptions + " subscriptions");
                 }
                 peer.Add(filter);
                 _owner.FilterChanged(peer, filter, true);

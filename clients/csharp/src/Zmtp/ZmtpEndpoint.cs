@@ -5,7 +5,7 @@ using System.Net.Sockets;
 
 namespace Nep.Zmtp
 {
-    /// <summary>An address <c>tcp://HOST:PORT</c>; HOST is a name, an IPv4 address or an IPv6 address in brackets.</summary>
+    /// <summary>Endpoint <c>tcp://HOST:PORT</c>; HOST is a name, an IPv4 address or an IPv6 address in brackets.</summary>
     internal sealed class ZmtpEndpoint
     {
         private const string Scheme = "tcp://";
@@ -69,7 +69,7 @@ namespace Nep.Zmtp
             return true;
         }
 
-        /// <summary>Addresses behind the host, in the system's order.</summary>
+        /// <summary>Return the addresses of the host, IPv4 first.</summary>
         public IPAddress[] Resolve()
         {
             IPAddress address;
@@ -78,7 +78,7 @@ namespace Nep.Zmtp
                 return new[] { address };
             }
             IPAddress[] all = Dns.GetHostAddresses(Host);
-            // Peers bind IPv4 addresses unless told otherwise, so those are tried first.
+            // Peers bind IPv4 addresses by default.
             Array.Sort(all, CompareFamilies);
             return all;
         }

@@ -18,7 +18,7 @@ namespace Nep.Unity
         [Tooltip("Address of the master, HOST or HOST:PORT. Empty: this computer.")]
         [SerializeField] private string master = "";
 
-        [Tooltip("Most time per frame that callbacks may take, in milliseconds.")]
+        [Tooltip("Maximum time for callbacks per frame, in milliseconds.")]
         [SerializeField] private float budgetMilliseconds = 4.0f;
 
         private Node _node;

@@ -38,12 +38,12 @@ const json: Codec = {
     try {
       encoded = encodeJson(payload);
     } catch (error) {
-      throw new EncodeError(`The payload has no form in JSON: ${(error as Error).message}`);
+      throw new EncodeError(`The payload can't be encoded as JSON: ${(error as Error).message}`);
     }
-    if (!encoded) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
+    if (!encoded) throw new EncodeError(`A value of type "${typeof payload}" can't be encoded as JSON.`);
     const { data } = encoded;
     if (data.length > 2 * MAX_LEVELS && isTooDeep(payload))
-      throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
+      throw new EncodeError(`The payload can't be encoded: ${TOO_DEEP}.`);
     const nonFinite = data.includes(NULL) ? countNonFinite(payload) : 0;
     return { ...encoded, nonFinite };
   },
@@ -52,9 +52,9 @@ const json: Codec = {
     try {
       value = JSON.parse(data.toString("utf8"));
     } catch (error) {
-      throw new DecodeError(`${data.length} bytes are no JSON: ${(error as Error).message}`);
+      throw new DecodeError(`The payload of ${data.length} bytes is not valid JSON: ${(error as Error).message}`);
     }
-    if (data.length > 2 * MAX_LEVELS && isTooDeep(value)) throw new DecodeError(`The JSON is refused: ${TOO_DEEP}.`);
+    if (data.length > 2 * MAX_LEVELS && isTooDeep(value)) throw new DecodeError(`The JSON is rejected: ${TOO_DEEP}.`);
     return value;
   },
 };
@@ -71,7 +71,7 @@ const string: Codec = {
     try {
       return decodeUtf8(data);
     } catch {
-      throw new DecodeError(`${data.length} bytes are no UTF-8.`);
+      throw new DecodeError(`The payload of ${data.length} bytes is not valid UTF-8.`);
     }
   },
 };
@@ -91,18 +91,18 @@ const msgpack: Codec = {
   name: "msgpack",
   number: 4,
   encode(payload) {
-    if (isTooDeep(payload)) throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
+    if (isTooDeep(payload)) throw new EncodeError(`The payload can't be encoded: ${TOO_DEEP}.`);
     try {
       return { data: pack(withWideIntegers(payload)) };
     } catch (error) {
-      throw new EncodeError(`The payload has no form in msgpack: ${(error as Error).message}`);
+      throw new EncodeError(`The payload can't be encoded as msgpack: ${(error as Error).message}`);
     }
   },
   decode(data) {
     try {
       return unpack(data);
     } catch (error) {
-      throw new DecodeError(`${data.length} bytes are no msgpack: ${(error as Error).message}`);
+      throw new DecodeError(`The payload of ${data.length} bytes is not valid msgpack: ${(error as Error).message}`);
     }
   },
 };

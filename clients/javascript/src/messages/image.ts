@@ -66,7 +66,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
   if (!layout || !image.shape) throw new EncodeError('Raw pixels need a known encoding such as "rgb8" and a shape.');
   const [height, width, channels] = image.shape;
   if (channels !== layout[1] || height * width * channels * layout[0] !== data.length) {
-    throw new EncodeError(`${data.length} bytes are no "${image.encoding}" of ${height} × ${width} × ${channels}.`);
+    throw new EncodeError(`${data.length} bytes don't match "${image.encoding}" of ${height} × ${width} × ${channels}.`);
   }
   return { data, extension: { shape: [height, width, channels], encoding: image.encoding } };
 }
@@ -80,9 +80,9 @@ export function decodeImage(data: Buffer, extension: Extension): Image {
   const encoding = extension["encoding"];
   const layout = typeof encoding === "string" ? rawLayout(encoding) : undefined;
   if (!layout || !shape || typeof encoding !== "string")
-    throw new DecodeError(`${data.length} bytes are no picture.`);
+    throw new DecodeError(`The payload of ${data.length} bytes is not an image.`);
   if (shape[2] !== layout[1] || shape[0] * shape[1] * shape[2] * layout[0] !== data.length) {
-    throw new DecodeError(`${data.length} bytes are no "${encoding}" of ${shape.join(" × ")}.`);
+    throw new DecodeError(`${data.length} bytes don't match "${encoding}" of ${shape.join(" × ")}.`);
   }
   return { data, encoding, shape };
 }

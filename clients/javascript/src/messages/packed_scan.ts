@@ -22,14 +22,14 @@ export function checkPacked(packed: Uint8Array): void {
     missing--;
     const { end, items } = next(view, at);
     at = end;
-    if (items > view.byteLength - at) throw new RangeError("The list or map claims more items than there are bytes.");
+    if (items > view.byteLength - at) throw new RangeError("The list or map declares more items than the data contains.");
     if (items < 0) continue;
     open.push(missing);
     missing = items;
     if (open.length > MAX_LEVELS)
       throw new RangeError(`Lists and maps are nested more than ${MAX_LEVELS} levels deep.`);
   }
-  if (at !== view.byteLength) throw new RangeError("Something follows the value.");
+  if (at !== view.byteLength) throw new RangeError("The value is followed by other bytes.");
 }
 
 /** Return the end of the value or header at `at` and its number of items; -1 if it isn't a list or map. */
@@ -69,6 +69,6 @@ function next(view: DataView, at: number): { end: number; items: number } {
 }
 
 function within(view: DataView, end: number): { end: number; items: number } {
-  if (end > view.byteLength) throw new RangeError("The msgpack ends early.");
+  if (end > view.byteLength) throw new RangeError("The msgpack is truncated.");
   return { end, items: -1 };
 }

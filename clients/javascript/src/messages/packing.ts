@@ -28,7 +28,7 @@ export function unpackWithTextKeys(packed: Uint8Array): unknown {
 }
 
 function textKey(key: unknown): string {
-  if (typeof key !== "string") throw new RangeError(`The key ${String(key)} is no text.`);
+  if (typeof key !== "string") throw new RangeError(`The key ${String(key)} is not a string.`);
   return key;
 }
 

@@ -173,14 +173,14 @@ export function decodeAnswer(body: Buffer): { call: number; answer: Answer } {
   try {
     envelope = unpack(body);
   } catch (error) {
-    throw new WireError("msgpack", `The reply is no msgpack: ${String(error)}`);
+    throw new WireError("msgpack", `The reply is not valid msgpack: ${String(error)}`);
   }
-  if (!isMap(envelope)) throw new WireError("map", "The reply is no map.");
+  if (!isMap(envelope)) throw new WireError("map", "The reply is not a map.");
   const fields = new Fields(isMap(envelope["what"]) ? envelope["what"] : {}, "what");
   const call = envelope["re"];
   const answer = readAnswer(String(envelope["is"]), fields);
   if (!answer || (typeof call !== "number" && call !== undefined)) {
-    throw new WireError("answer", `"${String(envelope["is"])}" is no answer of this version.`);
+    throw new WireError("answer", `"${String(envelope["is"])}" is not a reply of this version.`);
   }
   return { call: call ?? 0, answer };
 }
@@ -347,6 +347,6 @@ class Fields {
   }
 
   private misfit(name: string): WireError {
-    return new WireError("field-type", `"${this.path}.${name}" has another type.`);
+    return new WireError("field-type", `"${this.path}.${name}" has the wrong type.`);
   }
 }

@@ -139,7 +139,7 @@ export class Sources {
   private leapt(source: Source, last: bigint, seq: bigint): boolean {
     if (source.leaptTo === 0n || source.leaptTo !== seq - 1n) {
       source.leaptTo = seq;
-      throw new WireError("seq-leap", `The message's number leaps from ${last} to ${seq}.`);
+      throw new WireError("seq-leap", `The sequence number jumps from ${last} to ${seq}.`);
     }
     source.leaptTo = 0n; // the sequence continues after the gap: restart counting
     source.promised = 0n;

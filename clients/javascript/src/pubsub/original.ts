@@ -39,7 +39,7 @@ export function fromFrame(topic: string, type: string, codec: string, frame: Buf
   else if (codec === "image" && frame.subarray(0, MAX_PREFIX_BYTES).includes(" ")) return undefined;
   if (codec !== "image") return body;
   const text = body.toString("latin1");
-  if (!BASE64.test(text)) throw new WireError("malformed", "A picture is not base64.");
+  if (!BASE64.test(text)) throw new WireError("malformed", "The image is not valid base64.");
   return Buffer.from(text, "base64");
 }
 

@@ -235,7 +235,7 @@ export class Publisher<T = unknown> {
       if (!(error instanceof EncodeError) || this.spec.strict) throw error;
       this.rejected++;
       this.problem = error.message;
-      this.warnRarely(`"${this.topic}": a message was not sent. ${error.message}`);
+      this.warnRarely(`"${this.topic}": a message was rejected. ${error.message}`);
       return undefined;
     }
   }
@@ -244,7 +244,7 @@ export class Publisher<T = unknown> {
     const bytes = encoded.data.length;
     if (this.early!.length >= MAX_EARLY_MESSAGES || (this.earlyBytes + bytes > WINDOW_BYTES && this.earlyBytes > 0)) {
       this.dropped++;
-      this.warnRarely(`"${this.topic}": messages are dropped, because the publisher is not connected yet.`);
+      this.warnRarely(`"${this.topic}": messages are dropped because the publisher isn't connected yet.`);
       return;
     }
     this.earlyBytes += bytes;
@@ -314,7 +314,7 @@ export class Publisher<T = unknown> {
       this.transport.sayBye(); // repeated, because a full queue drops it
     }
     if (!haveLeft())
-      this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
+      this.host.warn(`"${this.topic}" was closed before ${this.subscribers} subscriber(s) had received all messages.`);
   }
 
   /** @internal Wait for the first subscriber; without a master the expected number is unknown. */

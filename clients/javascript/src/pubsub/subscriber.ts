@@ -12,26 +12,26 @@ import { TopicReader, type TopicReaderHost } from "./topic_reader.js";
 const HANDSHAKE_MS = 500;
 const MAX_MESSAGES = 10_000;
 const MAX_BYTES = 256 * 2 ** 20;
-const MAX_TURN_MS = 10; // so long callbacks run in a row; then timers do
+const MAX_TURN_MS = 10; // maximum time for consecutive callbacks, after which timers run
 const WARN_INTERVAL_MS = 10_000;
 
-/** How a topic is subscribed to. */
+/** Options of a subscriber. */
 export interface SubscribeOptions {
-  /** Type under which the subscriber is listed. Default: `json`. The codec of a message decides how it is decoded. */
+  /** Type under which the subscriber is registered. Default: `json`. Messages are decoded by their own codec. */
   readonly type?: string;
-  /** `all` (default), or `latest`: messages that were not read in time are replaced by newer ones. */
+  /** `all` (default), or `latest`: a newer message replaces the unread one. */
   readonly keep?: "all" | "latest";
   /** Inbox size in messages; the oldest ones are dropped and counted in `lost`. Default: 10 000. */
   readonly maxMessages?: number;
   /** Inbox size in bytes. Default: 256 MiB. */
   readonly maxBytes?: number;
   /**
-   * Gets each message at once, ahead of all queues, instead of a callback; must return quickly.
+   * Called with each message on arrival, without queuing, instead of a callback; must return quickly.
    *
    * @internal
    */
   readonly sink?: (message: Message) => void;
-  /** Closes the subscriber when it is aborted. */
+  /** Signal that closes the subscriber when aborted. */
   readonly signal?: AbortSignal;
 }
 
@@ -41,30 +41,30 @@ export interface SubscriberSpec extends SubscribeOptions {
   readonly topic: string;
 }
 
-/** Can be connected without a master. */
+/** Interface of subscribers that can be connected without a master. */
 export interface Attachable {
   attach(endpoint: string, how: "bind" | "connect"): Promise<void>;
-  /** Wait until a publisher has greeted. */
+  /** Wait until an echo of a publisher has been received. */
   waitForAnybody(timeoutMs: number): Promise<void>;
 }
 
-/** What a subscriber needs from its node. */
+/** Interface of the node used by a subscriber. */
 export interface SubscriberHost {
   readonly hold: () => Hold;
   readonly warn: (message: string) => void;
   /** Whether the wire of the original NEP is used instead of the native one. */
   readonly isOriginal?: boolean;
-  /** Register; calls `connect` with the publishers that are there. */
+  /** Register; calls `connect` with the registered publishers. */
   register(subscriber: SessionSubscriber & Attachable): Promise<void>;
   unregister(subscriber: SessionSubscriber): void;
 }
 
-/** Called with each message. */
+/** Callback for each message. */
 export type MessageCallback<T = unknown> = (message: Message<T>) => void;
 
 /**
- * Receives the messages of a topic; made by `Node.subscribe`. Iterate over it, or pass a callback. A topic with
- * the level `*` or `**` is a pattern.
+ * Receives the messages of a topic; returned by `Node.subscribe`. Iterate over it, or pass a callback. A topic
+ * with the level `*` or `**` is a pattern.
  *
  * @example
  * for await (const message of node.subscribe("odometry")) {
@@ -72,7 +72,7 @@ export type MessageCallback<T = unknown> = (message: Message<T>) => void;
  * }
  */
 export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, SessionSubscriber, Attachable {
-  /** Resolves when all publishers of the topic are connected, after 0.5 s at most; rejects if it can't be registered. */
+  /** Resolves when all publishers of the topic are connected, after at most 0.5 s; rejects if registration fails. */
   readonly ready: Promise<this>;
   readonly isPattern: boolean;
   private readonly readers = new Map<string, TopicReader>();
@@ -122,22 +122,22 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     return this.spec.type ?? "json";
   }
 
-  /** Messages that arrived. */
+  /** Number of received messages. */
   get received(): number {
     return this.sum((each) => each.sources.received, this.totals.received);
   }
 
-  /** Messages that did not arrive, or were dropped here for lack of room. */
+  /** Number of messages that were not received, or were dropped because the inbox was full. */
   get lost(): number {
     return this.sum((each) => each.sources.lost, this.totals.lost);
   }
 
-  /** Received data that is not a message of the wire. */
+  /** Number of malformed messages that were rejected. */
   get refused(): number {
     return this.sum((each) => each.refused, this.totals.refused);
   }
 
-  /** Number of publishers that have greeted this subscriber. */
+  /** Number of publishers whose echo was received. */
   get publishers(): number {
     return this.sum((each) => each.sources.echoing, 0);
   }
@@ -152,7 +152,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     return total;
   }
 
-  // ---- the handshake
+  // ---- handshake
 
   private async begin(): Promise<this> {
     try {
@@ -243,7 +243,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     const dropped = this.inbox.put(message as Message);
     if (dropped > 0) {
       this.countDropped(dropped, reader);
-      this.warnRarely(`"${this.topic}": messages come faster than they are read; the oldest ones are dropped.`);
+      this.warnRarely(`"${this.topic}": messages arrive faster than they are read; the oldest ones are dropped.`);
     }
     if (this.callback) this.deliverSoon();
   }
@@ -257,7 +257,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     }
   }
 
-  /** Run callbacks now if this turn of the event loop has time left, else in the next one. */
+  /** Run callbacks now if the time for callbacks is not used up, otherwise in the next turn of the event loop. */
   private deliverSoon(): void {
     if (this.isDelivering) return;
     this.isDelivering = true;
@@ -294,12 +294,12 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   /**
    * Return the next message.
    *
-   * @param timeoutS Seconds; undefined waits until there is one.
-   * @returns undefined when none came in time, or the subscriber was closed.
-   * @throws {ClosedError} if it is closed already, or has a callback.
+   * @param timeoutS Seconds to wait; undefined waits without a time limit.
+   * @returns undefined after the timeout, or if the subscriber is closed.
+   * @throws {ClosedError} if the subscriber has a callback.
    */
   receive(timeoutS?: number): Promise<Message<T> | undefined> {
-    if (this.callback) return Promise.reject(new ClosedError(`"${this.topic}": messages go to the callback.`));
+    if (this.callback) return Promise.reject(new ClosedError(`The subscriber of "${this.topic}" has a callback.`));
     const message = this.inbox.take() as Message<T> | undefined;
     if (message || this.isClosed) return Promise.resolve(message);
     return new Promise((resolve) => {
@@ -316,7 +316,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     });
   }
 
-  /** Messages as they come; leaving the loop closes the subscriber. @throws when it can't be registered. */
+  /** Iterate over messages as they arrive; leaving the loop closes the subscriber. Throws if registration fails. */
   async *[Symbol.asyncIterator](): AsyncIterator<Message<T>, void, undefined> {
     try {
       await Promise.race([this.ready.catch(() => undefined), this.closedEarly()]);
@@ -348,12 +348,12 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     this.host.warn(message);
   }
 
-  // ---- the session
+  // ---- session
 
   /** @internal */
   counts(): SubscriberCount {
     const bounded = (count: number): bigint => BigInt(Math.max(0, count));
-    const refusal = this.refusal && `${this.refused} could not be read. ${this.refusal}`;
+    const refusal = this.refusal && `${this.refused} messages were rejected. ${this.refusal}`;
     const problem = problemText(this.problem || refusal);
     return {
       id: this.spec.id,
@@ -389,7 +389,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     for (const [topic, reader] of this.readers) {
       reader.tick(lastSeqs);
       if (!this.isPattern || reader.sources.byId.size > 0) continue;
-      this.readers.delete(topic); // the topic has no publishers any more
+      this.readers.delete(topic); // the topic has no publishers left
       this.totals.received += reader.sources.received;
       this.totals.lost += reader.sources.lost;
       this.totals.refused += reader.refused;
@@ -397,7 +397,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     }
   }
 
-  /** Unregister and forget what was not read. */
+  /** Unregister and discard unread messages. */
   close(): Promise<void> {
     this.closed ??= this.finish();
     return this.closed;
@@ -420,7 +420,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     return this.close();
   }
 
-  /** Begin to close at the end of a `using` block. */
+  /** Start to close at the end of a `using` block. */
   [Symbol.dispose](): void {
     void this.close();
   }

@@ -4,19 +4,19 @@ import { SendWindow } from "./byte_window.js";
 
 const MAX_SUBSCRIBERS = 10_000;
 
-/** A subscriber that said hello. */
+/** Subscriber whose hello was received. */
 interface Greeted {
-  /** First part of what is sent to it alone. */
+  /** Hello, the first part of messages and notices sent to this subscriber alone. */
   readonly hello: Buffer;
   readonly readsBatches: boolean;
-  /** Of a subscriber that tells what it has read. */
+  /** Flow control; undefined if the subscriber doesn't acknowledge messages. */
   readonly window: SendWindow | undefined;
 }
 
-/** A publisher's subscribers, from the subscriptions that its XPUB socket receives. */
+/** Subscribers of a publisher, derived from the subscriptions received by its XPUB socket. */
 export class Subscriptions {
   readonly greeted = new Map<bigint, Greeted>();
-  /** Topic filters of subscribers that don't read messages of one part, with their number. */
+  /** Number of subscribers that don't read messages of one part, by topic filter. */
   private readonly plainFilters = new Map<string, number>();
   private readonly topicPart: Buffer;
   private readonly topicFilter: string;
@@ -30,37 +30,37 @@ export class Subscriptions {
     this.topicFilter = this.topicPart.toString("latin1");
   }
 
-  /** Whether the topic has subscribers, with or without a hello. */
+  /** True if the topic has subscribers, with or without a hello. */
   get isHeard(): boolean {
     return this.greeted.size > 0 || this.plainFilters.size > 0;
   }
 
-  /** Whether all subscribers read messages of one part. */
+  /** True if all subscribers read messages of one part. */
   get readsOnePart(): boolean {
     return this.plainFilters.size === 0;
   }
 
-  /** Whether all subscribers read batches. */
+  /** True if all subscribers read batches. */
   get readsBatches(): boolean {
     if (this.plainFilters.size > 0) return false;
     for (const each of this.greeted.values()) if (!each.readsBatches) return false;
     return true;
   }
 
-  /** Whether all subscribers answer echoes. */
+  /** True if all subscribers acknowledge messages. */
   get tellsAll(): boolean {
     if (this.plainFilters.size > 0) return false;
     for (const each of this.greeted.values()) if (!each.window) return false;
     return true;
   }
 
-  /** Take note of a subscription or its end. Returns the id of a subscriber that is to be greeted. */
+  /** Handle a new or removed subscription. Return the id of the subscriber to which an echo must be sent, if any. */
   note(event: Buffer): bigint | undefined {
     const isAdded = event[0] === 1;
     const filter = event.subarray(1);
     const hello = parseHello(filter);
     if (hello) {
-      if (hello.topic !== this.topic) return undefined; // a subscriber of the program that had this port before
+      if (hello.topic !== this.topic) return undefined; // meant for the program that used this port before
       if (isAdded) return this.greet(hello.subscriber, hello.level, filter);
       this.greeted.delete(hello.subscriber);
       return undefined;
@@ -77,22 +77,22 @@ export class Subscriptions {
 
   private greet(subscriber: bigint, level: number, filter: Buffer): bigint | undefined {
     if (this.greeted.size >= MAX_SUBSCRIBERS && !this.greeted.has(subscriber)) {
-      this.refuse(`the hello of one more than ${MAX_SUBSCRIBERS} subscribers`);
+      this.refuse(`more than ${MAX_SUBSCRIBERS} subscribers`);
       return undefined;
     }
-    if (level >= 1) this.removePlain(this.topicFilter); // its own filter came before
+    if (level >= 1) this.removePlain(this.topicFilter); // its topic filter was counted before
     this.greeted.set(subscriber, {
       hello: Buffer.from(filter),
       readsBatches: level >= 3,
-      window: level >= 2 ? new SendWindow() : undefined, // a connection of its own: nothing is under way
+      window: level >= 2 ? new SendWindow() : undefined, // new connection: nothing is in flight
     });
     return subscriber;
   }
 
-  /** With XPUB_VERBOSE each addition of a filter is reported, but only the last removal of equal ones. */
+  /** Handle a topic filter. XPUB_VERBOSE reports each addition, but only the last removal of equal filters. */
   private notePlain(filter: Buffer, isAdded: boolean): void {
     if (!this.topicPart.subarray(0, filter.length).equals(filter)) {
-      this.refuse(`${filter.length} bytes that are no subscription of it`);
+      this.refuse(`an invalid filter of ${filter.length} bytes`);
       return;
     }
     const key = filter.toString("latin1");

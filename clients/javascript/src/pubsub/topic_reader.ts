@@ -15,16 +15,16 @@ const RECEIVE_MARK_IMAGES = 64;
 export interface TopicReaderHost {
   readonly hold: () => Hold;
   onMessage(message: Message, reader: TopicReader): void;
-  /** Bytes that are no message; `reason` says why. */
+  /** Called for each malformed message with the reason. */
   onRefused(reason: string): void;
-  /** An echo, or a publisher that can't be connected to. */
+  /** Called for each echo, and for each publisher to which no connection is possible. */
   onGreeted(): void;
 }
 
-/** Reads one topic from all of its publishers: a SUB socket, who was heard, and what was lost. */
+/** Receiver for one topic: a SUB socket connected to all publishers, and the counters of their messages. */
 export class TopicReader {
   readonly sources = new Sources();
-  /** Messages and notices that could not be understood. */
+  /** Number of malformed messages and notices. */
   refused = 0;
   private readonly socket: SubSocket;
   private readonly topicPart: Buffer;
@@ -40,13 +40,13 @@ export class TopicReader {
     this.hello = helloPart({ subscriber: id, topic, level: 3 });
     this.socket = new SubSocket(type === "image" ? RECEIVE_MARK_IMAGES : RECEIVE_MARK);
     this.socket.filter(this.topicPart);
-    this.socket.filter(this.hello); // sorts behind the topic: a publisher that sees it has the topic's filter
+    this.socket.filter(this.hello); // sorts after the topic: a publisher that receives it has the topic filter
     this.socket.read((parts) => this.read(parts), host.hold);
   }
 
   // ---- connections
 
-  /** Connect to a publisher; twice is once. All messages of one that `isNew` are still to come. */
+  /** Connect to a publisher, unless connected already. Losses of a new publisher count from its first message. */
   connect(remote: ReachablePublisher, isNew = false): void {
     for (const old of this.sources.replacedBy(remote)) this.sources.closing(old, 0n);
     const { endpoint } = remote;
@@ -56,7 +56,7 @@ export class TopicReader {
     source.endsAt = undefined;
     if (!endpoint || endpoint === source.endpoint) return;
     for (const [id, other] of this.sources.byId) {
-      if (other !== source && other.endpoint === endpoint) this.leave(id); // its port is another's now
+      if (other !== source && other.endpoint === endpoint) this.leave(id); // its port belongs to another publisher now
     }
     this.connectTo(source, endpoint);
   }
@@ -82,27 +82,27 @@ export class TopicReader {
     else this.socket.connectWatched(endpoint);
   }
 
-  /** These are all publishers of the topic: connect to new ones; others are silent. */
+  /** Handle the complete list of publishers: connect to new ones and mark the others as unlisted. */
   reconcile(remotes: readonly ReachablePublisher[]): void {
     for (const each of remotes) this.connect(each);
     const listed = new Set(remotes.map((each) => each.id));
     for (const [id, source] of this.sources.byId) if (source.remote && !listed.has(id)) source.isLapsed = true;
   }
 
-  /** A publisher is unlisted. Its connection stays until its bye comes, or it is replaced. */
+  /** Handle that a publisher is no longer listed. Its connection stays until its bye, or until it is replaced. */
   gone(id: bigint, lastSeq: bigint, isClosed: boolean): void {
     if (isClosed) this.sources.closing(id, lastSeq);
     else this.sources.lapsed(id, lastSeq);
   }
 
-  /** Leave publishers that have closed without a bye; compare with what the master knows of the others. */
+  /** Disconnect from publishers that closed without a bye, and count losses by the seqs reported by the master. */
   tick(lastSeqs: ReadonlyMap<bigint, bigint>): void {
     for (const id of this.sources.ended()) {
       this.sources.settle(id);
       this.leave(id);
     }
     if (this.socket.hasInput) return;
-    // libzmq never connects again after a failed handshake, as with a PULL socket of another program.
+    // libzmq doesn't reconnect after a failed handshake, for example with a PULL socket of another program.
     for (const source of this.sources.byId.values()) if (source.isSilent) this.connectTo(source, source.endpoint!);
     for (const [id, seq] of lastSeqs) this.sources.promised(id, seq);
   }
@@ -153,7 +153,7 @@ export class TopicReader {
   private message({ header, payload, extension }: WireMessage, isAlone: boolean): void {
     const { publisher, seq, flags } = header;
     if (flags & Flag.SHARED) {
-      throw new WireError("shared-memory", "The payload lies in shared memory, which was not agreed on.");
+      throw new WireError("shared-memory", "The payload is in shared memory, which was not offered.");
     }
     if (!isAlone && this.sources.isEarly(publisher)) return;
     if (!this.sources.arrived(publisher, seq, isAlone)) return;
@@ -167,7 +167,7 @@ export class TopicReader {
     );
   }
 
-  /** An echo, or the last word of a publisher that closes. */
+  /** Handle an echo, a bye or an offer. */
   private notice(header: Header): void {
     const { publisher, seq } = header;
     const source = this.sources.get(publisher);
@@ -183,6 +183,6 @@ export class TopicReader {
       }
     }
     this.host.onGreeted();
-    if (!isPossible) throw new WireError("seq-leap", `The publisher's number leaps from ${source.last} to ${seq}.`);
+    if (!isPossible) throw new WireError("seq-leap", `The sequence number jumps from ${source.last} to ${seq}.`);
   }
 }

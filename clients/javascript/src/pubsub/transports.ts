@@ -1,31 +1,31 @@
-/** What publishers and subscribers need from the wire they use: the native one, or that of the original NEP. */
+/** Interface of the wires of publishers: the native one and that of the original NEP. */
 import type { Encoded } from "../messages/codecs.js";
 
-/** A publisher's side. */
+/** Wire of a publisher. */
 export interface PublisherTransport {
-  /** Messages sent or skipped: the seq of the newest one. */
+  /** Number of messages sent or skipped, which is the seq of the newest one. */
   readonly count: number;
   readonly bytes: number;
   readonly lastStampNs: bigint | undefined;
-  /** Whether the topic has subscribers, with or without a hello. */
+  /** True if the topic has subscribers, with or without a hello. */
   readonly isHeard: boolean;
   /** Number of connected subscribers. */
   readonly subscribers: number;
-  /** Whether this subscriber is connected. */
+  /** Return true if this subscriber is connected. */
   hasGreeted(subscriber: bigint): boolean;
-  /** Be bound at these hosts of this computer and no others. Returns the endpoints. */
+  /** Bind at exactly these addresses of this computer. Resolves to the endpoints. */
   move(hosts: readonly string[]): Promise<string[]>;
-  /** Bind or connect at one endpoint, without a master. */
+  /** Bind or connect to one endpoint without a master. */
   attach(endpoint: string, how: "bind" | "connect"): Promise<void>;
   /** Read subscriptions now. */
   wake(): void;
-  /** Count a message without sending it: the topic has no subscribers. */
+  /** Count a message without sending it, because the topic has no subscribers. */
   skip(): void;
   send(encoded: Encoded, stampNs?: bigint): void;
-  /** Announce the end to all subscribers. Returns false if the wire has no bye. */
+  /** Send a bye to all subscribers. Return false if the wire has no bye. */
   sayBye(): boolean;
-  /** Resolves when everything is handed to libzmq. */
+  /** Resolves when all messages have been passed to libzmq. */
   flush(): Promise<void>;
-  /** Close; libzmq sends what it holds for at most `lingerMs`. */
+  /** Close; libzmq sends queued messages for at most `lingerMs`. */
   close(lingerMs?: number): void;
 }

@@ -12,16 +12,16 @@ import type { PublisherTransport } from "./transports.js";
 
 const SEND_MARK = 50_000;
 const MAX_SUBSCRIPTION_BYTES = 4096;
-const SMALL_BYTES = 16_384; // larger messages: copying them together costs more than parts
+const SMALL_BYTES = 16_384; // for larger messages, copying into one part costs more than several parts
 const MAX_SENT_TOGETHER = 64;
 /**
- * Up to here zeromq.js copies a buffer; of larger ones its thread wakes Node.js to release each. A string is copied at
- * any size, so text is sent as one, in parts: a third less time for 1 kB.
+ * zeromq.js copies buffers up to this size; for each larger one its thread wakes Node.js to release it. Strings are
+ * always copied, so text is sent as a string in a separate part, which takes a third less time for 1 kB.
  */
 const MAX_COPIED_BYTES = 128;
 const FULL_BATCH_BYTES = 65_536;
 
-/** A message that waits for the socket and goes out alone or in a batch, or finished parts. */
+/** Entry of the send queue: a message that may be batched, or the parts of a finished message. */
 type Entry =
   | { readonly payload: Buffer; readonly text: string | undefined; readonly seq: number; readonly stampNs: bigint }
   | { readonly parts: Part[] };
@@ -31,17 +31,17 @@ export interface XpubSpec {
   readonly topic: string;
   readonly codecNumber: number;
   readonly latched: boolean;
-  /** Messages kept for late subscribers. */
+  /** Number of messages kept for late subscribers. */
   readonly history: number;
   readonly batch: boolean;
 }
 
 /**
- * A publisher's XPUB socket with its subscribers: greets them, sends each message in the form that all of them
- * read, and drops messages for those that have no room.
+ * XPUB socket of a publisher: sends echoes to new subscribers, sends each message in a form that all subscribers
+ * read, and drops messages for subscribers whose send window is full.
  */
 export class XpubTransport implements PublisherTransport {
-  /** Messages sent or skipped: the seq of the newest one. */
+  /** Number of messages sent or skipped, which is the seq of the newest one. */
   count = 0;
   bytes = 0;
   lastStampNs: bigint | undefined;
@@ -52,7 +52,7 @@ export class XpubTransport implements PublisherTransport {
   private readonly backlog = new Backlog();
   private readonly bindings: Bindings;
   private settledBytes = 0;
-  private settleAt = 0; // from so many bytes on a message is not simply sent to all
+  private settleAt = 0; // total bytes from which send windows must be checked before sending
 
   constructor(
     private readonly spec: XpubSpec,
@@ -80,14 +80,14 @@ export class XpubTransport implements PublisherTransport {
     return this.subscriptions.greeted.has(subscriber);
   }
 
-  // ---- where it is reached
+  // ---- endpoints
 
-  /** Be bound at these hosts and no others, each with a port of its own. Returns the endpoints. */
+  /** Bind at exactly these hosts, each with its own port. Resolves to the endpoints. */
   move(hosts: readonly string[]): Promise<string[]> {
     return this.bindings.move(hosts);
   }
 
-  /** Bind or connect at one endpoint, without a master. */
+  /** Bind or connect to one endpoint without a master. */
   async attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
     if (how === "bind") await this.socket.bind(endpoint);
     else this.socket.connect(endpoint);
@@ -99,7 +99,7 @@ export class XpubTransport implements PublisherTransport {
 
   // ---- sending
 
-  /** Count a message without sending it: the topic has no subscribers. */
+  /** Count a message without sending it, because the topic has no subscribers. */
   skip(): void {
     this.count++;
     this.lastStampNs = nowNs();
@@ -121,7 +121,7 @@ export class XpubTransport implements PublisherTransport {
     }
   }
 
-  /** Header, payload and extension of a message. */
+  /** Return header, payload and extension of a message. */
   private tail(data: Buffer, extension: Buffer | undefined, seq: number, stampNs: bigint): Buffer[] {
     const flags = (this.spec.latched ? Flag.LATCHED : 0) | (extension ? Flag.EXTENSION : 0);
     const header = this.header(flags, data.length, seq, stampNs);
@@ -139,11 +139,11 @@ export class XpubTransport implements PublisherTransport {
     });
   }
 
-  /** To all at once; while somebody has no room, to everybody else alone. */
+  /** Send to all subscribers at once; if the window of one is full, to each of the others separately. */
   private sendSettled(tail: Buffer[], size: number): void {
     this.history.add(tail, size);
     const windows = [...this.subscriptions.greeted.values()].filter((each) => each.window);
-    const since = this.bytes - size - this.settledBytes; // sent to all
+    const since = this.bytes - size - this.settledBytes; // sent to all subscribers
     if (since > 0) for (const each of windows) each.window!.sent(this.count - 1, since);
     this.settledBytes = this.bytes;
     const { tellsAll } = this.subscriptions;
@@ -153,7 +153,7 @@ export class XpubTransport implements PublisherTransport {
       if (!tellsAll) this.backlog.sent(tail[1]!, size + since);
       this.settleAt = this.bytes + (tellsAll ? STEP_BYTES : BACKLOG_STEP_BYTES);
     } else {
-      this.settleAt = 0; // each message is looked at until all have room again
+      this.settleAt = 0; // check each message until all windows have room again
       for (const each of roomy) this.socket.send({ parts: [each.hello, ...tail] });
       for (const each of windows) if (!roomy.includes(each)) each.window!.missed();
     }
@@ -162,7 +162,7 @@ export class XpubTransport implements PublisherTransport {
     for (const each of windows) if (each.window!.takeAsk(now, roomy.includes(each))) this.notify(each.hello, 0);
   }
 
-  /** The next message for libzmq: those that wait anyway go together where all read that. */
+  /** Return the parts of the next message; queued messages are batched if all subscribers read batches. */
   private take(queue: Entry[]): Part[] {
     const first = queue.shift()!;
     if ("parts" in first) return first.parts;
@@ -190,7 +190,7 @@ export class XpubTransport implements PublisherTransport {
     ];
   }
 
-  /** Resolves when everything is handed to libzmq. */
+  /** Resolves when all messages have been passed to libzmq. */
   flush(): Promise<void> {
     return this.socket.flush();
   }
@@ -207,7 +207,7 @@ export class XpubTransport implements PublisherTransport {
     this.onSubscribers();
   }
 
-  /** What is kept for late subscribers, then the echo: from here on the subscriber counts. */
+  /** Send the history and then the echo, from which the subscriber counts losses. */
   private greet(subscriber: bigint): void {
     const greeted = this.subscriptions.greeted.get(subscriber)!;
     for (const each of this.history.kept) this.socket.send({ parts: [greeted.hello, ...each.parts] });
@@ -219,7 +219,7 @@ export class XpubTransport implements PublisherTransport {
     this.socket.send({ parts: [hello, this.header(flags, 0, this.count, nowNs())] });
   }
 
-  /** Tell all subscribers that nothing comes any more. */
+  /** Send a bye to all subscribers. */
   sayBye(): boolean {
     for (const each of this.subscriptions.greeted.values()) this.notify(each.hello, Flag.BYE);
     return true;

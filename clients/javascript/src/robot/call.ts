@@ -1,17 +1,17 @@
 import type { Clock } from "./clock.js";
 import { checkSendable } from "./text.js";
 
-/** Thrown where an action waits when it is to end. Let it pass, after putting away what it holds. */
+/** Error thrown by waits of an action that is canceled. Release resources and let it propagate. */
 export class Canceled extends Error {
   override readonly name = "Canceled";
 }
 
-/** Throw it when an action can't be done; people see its sentence: `new Failed("no ball in sight")`. */
+/** Error to throw when an action fails, with a message for the user: `new Failed("no ball in sight")`. */
 export class Failed extends Error {
   override readonly name = "Failed";
 }
 
-/** One run of an action. */
+/** One execution of an action. */
 export class Call {
   private readonly controller = new AbortController();
   private readonly callbacks = new Set<() => void>();
@@ -23,47 +23,48 @@ export class Call {
     private readonly report: (values: Record<string, unknown>) => void,
   ) {}
 
-  /** Aborted once the action is to end; for `fetch`, `timers/promises` and all else that takes a signal. */
+  /** Signal that is aborted when the action is canceled, for `fetch`, `timers/promises` and others. */
   get signal(): AbortSignal {
     return this.controller.signal;
   }
 
-  /** Whether the action is to end. */
+  /** True if the action is canceled. */
   get canceled(): boolean {
     return this.controller.signal.aborted;
   }
 
-  /** Call back once, as soon as the action is to end; at once if it is already. Returns a function that undoes it. */
+  /** Call a function once when the action is canceled, at once if it already is. Returns a function that removes it. */
   onCancel(callback: () => void): () => void {
     if (this.canceled) callback();
     else this.callbacks.add(callback);
     return () => this.callbacks.delete(callback);
   }
 
-  /** Wait; rejects with {@link Canceled} as soon as the action is to end. */
+  /** Wait for some seconds; rejects with {@link Canceled} as soon as the action is canceled. */
   wait(seconds: number): Promise<void> {
     const waited = new Promise<void>((resolve, reject) => {
       if (this.canceled) {
         reject(new Canceled());
         return;
       }
-      const forget = this.onCancel(() => {
+      const remove = this.onCancel(() => {
         clear();
         reject(new Canceled());
       });
       const clear = this.clock.after(seconds, () => {
-        forget();
+        remove();
         resolve();
       });
     });
-    waited.catch(() => undefined); // not awaited: no unhandled rejection
+    waited.catch(() => undefined); // avoids an unhandled rejection if it isn't awaited
     return waited;
   }
 
   /**
-   * Wait until a condition is true (true) or `forS` seconds are over (false); look every `everyS` seconds.
+   * Wait until a condition is met. Return false if it isn't met within `forS` seconds.
    *
-   * @throws {Canceled} as soon as the action is to end.
+   * @param condition Evaluated every `everyS` seconds.
+   * @throws {Canceled} as soon as the action is canceled.
    */
   async until(
     condition: () => boolean,
@@ -77,19 +78,19 @@ export class Call {
     return true;
   }
 
-  /** Tell how far the action is. @throws {Canceled} when it is to end. */
+  /** Report the progress of the action. @throws {Canceled} if it is canceled. */
   feedback(values: Record<string, unknown>): void {
     if (this.canceled) throw new Canceled();
     this.last(values);
   }
 
-  /** Tell how far the action came, also when it is canceled. */
+  /** Report the final progress of the action, even if it is canceled. */
   last(values: Record<string, unknown>): void {
     checkSendable(values);
     this.report({ ...values });
   }
 
-  /** @internal End the action. Errors of callbacks are passed to `onError`. */
+  /** @internal Cancel the action. Errors of callbacks are passed to `onError`. */
   cancel(onError: (error: unknown) => void): void {
     const callbacks = [...this.callbacks];
     this.callbacks.clear();

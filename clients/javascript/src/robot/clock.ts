@@ -1,12 +1,12 @@
-/** Time of a robot, so that tests can bring their own. */
+/** Clock of a robot, replaceable in tests. */
 export interface Clock {
-  /** Seconds that never run backwards. */
+  /** Return the monotonic time in seconds. */
   now(): number;
-  /** Call back after some seconds. Returns a function that cancels it. */
+  /** Call a function after some seconds. Returns a function that cancels the call. */
   after(seconds: number, callback: () => void): () => void;
 }
 
-/** The computer's own clock. */
+/** Monotonic clock of the computer. */
 export const systemClock: Clock = {
   now: () => performance.now() / 1000,
   after(seconds, callback) {
@@ -15,7 +15,7 @@ export const systemClock: Clock = {
   },
 };
 
-/** A clock that stands still until it is advanced. */
+/** Clock that only changes when it is advanced. */
 export class ManualClock implements Clock {
   private seconds = 100;
   private readonly timers = new Set<{ readonly due: number; readonly callback: () => void }>();
@@ -34,7 +34,7 @@ export class ManualClock implements Clock {
     return () => this.timers.delete(timer);
   }
 
-  /** Let time pass. Timers that become due fire once, earliest first. */
+  /** Advance the time. Timers that become due fire once, earliest first. */
   advance(seconds: number): void {
     this.seconds += seconds;
     const due = [...this.timers].filter((each) => each.due <= this.seconds).sort((a, b) => a.due - b.due);

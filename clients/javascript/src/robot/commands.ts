@@ -1,4 +1,4 @@
-// Commands on a robot's command topic become tasks and stops.
+// Conversion of commands on a robot's command topic to tasks and stops.
 import { createHash } from "node:crypto";
 import { Failed } from "./call.js";
 import type { Description, RobotAction } from "./description.js";
@@ -21,21 +21,21 @@ import {
 const MAX_ID_LENGTH = 200;
 const MAX_ENDED = 100;
 
-/** What the command desk of a robot needs from it. */
+/** Interface of the robot used by its command desk. */
 export interface DeskHost {
   readonly description: Description;
   readonly rejected: RejectedMessages;
   publish(answer: Members): void;
 }
 
-/** Who asks for a task. */
+/** Sender of a command. */
 interface TaskOrigin {
   readonly program?: ProgramId | undefined;
   readonly publisher?: bigint | undefined;
   readonly epoch: number;
 }
 
-/** The commands of one robot in its own dialect. */
+/** Commands of one robot in the native dialect. */
 export class CommandDesk implements Dialect {
   private readonly openIds = new Set<string>();
   private readonly ended: string[] = []; // programs
@@ -45,7 +45,7 @@ export class CommandDesk implements Dialect {
     private readonly host: DeskHost,
   ) {}
 
-  /** Tell that the robot lives. */
+  /** Publish the heartbeat. */
   beat(notEnded: readonly string[], error: string | undefined): void {
     const told = { op: "alive", id: "", action: "", state: "running", not_ended: notEnded, error: error ?? null };
     const { count: rejected } = this.host.rejected;
@@ -101,7 +101,7 @@ export class CommandDesk implements Dialect {
   }
 
   private invoke(id: string, command: Members, origin: TaskOrigin): void {
-    if (this.openIds.has(id)) return; // the same command a second time
+    if (this.openIds.has(id)) return; // duplicate command
     const { action: name, input = null } = command;
     const answer = this.answerer(id, "invoke", quotable(name ?? ""));
     if (this.ended.includes(textOf(command["from"]) ?? "")) {
@@ -128,7 +128,7 @@ export class CommandDesk implements Dialect {
     return `${robot} can't “${quotable(name ?? "")}”${close === undefined ? "" : `; did you mean “${close}”?`}`;
   }
 
-  /** Return a task that runs an action with a checked input. */
+  /** Return a task that runs an action; the caller has validated the input. */
   task(
     id: string,
     action: RobotAction,
@@ -166,18 +166,18 @@ export class CommandDesk implements Dialect {
   }
 }
 
-/** The name in `from` of the program that is ended by who knows `key`. */
+/** Return the name in `from` of the program whose key is `key`; a stop with the key ends this program. */
 function programOf(key: string): string {
   return `program-${createHash("sha256").update(key, "utf8").digest("hex").slice(0, 16)}`;
 }
 
-/** The id to which an answer can be sent. */
+/** Return the id of a command if a reply can contain it. */
 function idOf({ id }: Members): string | undefined {
   const text = textOf(id);
   return text === undefined || text.length > MAX_ID_LENGTH || hasSurrogates(text) ? undefined : text;
 }
 
-/** The input with the defaults of what it leaves out. */
+/** Return the input with defaults for missing parameters. */
 function complete({ parameters }: RobotAction, input: Members): Record<string, unknown> {
   const completed: Record<string, unknown> = {};
   for (const [name, parameter] of Object.entries(parameters)) {
@@ -187,7 +187,7 @@ function complete({ parameters }: RobotAction, input: Members): Record<string, u
   return completed;
 }
 
-/** What an action returned, as the output of its answer. @throws {Failed} if no message can hold it. */
+/** Return the output of an action's reply. @throws {Failed} if the returned value is invalid or can't be encoded. */
 function outputOf({ name, output }: RobotAction, returned: unknown): Members {
   const value = returned === undefined || returned === null ? {} : returned;
   const members = isMembers(value) ? value : { value };

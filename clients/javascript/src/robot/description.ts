@@ -1,4 +1,4 @@
-// The description of a robot: a W3C Thing Description, from which NEP Studio makes blocks and forms.
+// Description of a robot: a W3C Thing Description, from which NEP Studio creates blocks and forms.
 import { NepError } from "../errors.js";
 import type { Call } from "./call.js";
 import { given, inputSchema, objectSchema, type Parameter, problemsOf, schemaOf, type Value } from "./schema.js";
@@ -10,11 +10,11 @@ const NAME = /^[A-Za-z_][A-Za-z0-9_-]{0,63}$/;
 const RESERVED = ["description", "command", "answer", "state", "world"];
 const MAX_BYTES = 1_000_000;
 
-/** Something that a robot can do. */
+/** Declaration of an action. */
 export interface ActionSpec {
-  /** Its block, with `%name` where a parameter stands: `turn %angle °`. */
+  /** Text of its block, with placeholders `%name` for parameters: `turn %angle °`. */
   readonly text: string;
-  /** The same in the third person. */
+  /** The text in the third person. */
   readonly says?: string;
   /** Heading in the toolbox, such as `Movement`. */
   readonly category: string;
@@ -23,90 +23,90 @@ export interface ActionSpec {
   readonly title?: string;
   readonly description?: string;
   readonly parameters?: Readonly<Record<string, Parameter>>;
-  /** Resources that it needs, such as `motor`; two actions never use one at the same time. */
+  /** Required resources, such as `motor`; a resource is used by one action at a time. */
   readonly uses?: readonly string[];
-  /** If a resource is in use: `queue` (default) waits, `replace` ends the other action, `reject` refuses. */
+  /** What to do if a resource is in use: `queue` (default) waits, `replace` cancels the other action, `reject` fails. */
   readonly onBusy?: "queue" | "replace" | "reject";
-  /** Seconds after which it fails. */
+  /** Time limit in seconds, after which the action fails. */
   readonly timeoutS?: number;
-  /** Studio asks before the robot `moves` or `locomotes` (leaves its place) for the first time. */
+  /** `moves` or `locomotes` (leaves its place): Studio asks before the first such action. */
   readonly risk?: "moves" | "locomotes";
-  /** Default: true. */
+  /** False if the action can't be canceled. Default: true. */
   readonly cancellable?: boolean;
-  /** It stays in motion when `run` has returned (a speed); other tools send it again so often. */
+  /** For actions that leave the robot in motion, such as a speed: interval in seconds at which tools repeat it. */
   readonly repeatS?: number;
   /** Named values that `run` returns. */
   readonly output?: Readonly<Record<string, Value>>;
-  /** Named values that `call.feedback` tells. */
+  /** Named values reported by `call.feedback`. */
   readonly feedback?: Readonly<Record<string, Value>>;
-  /** RIZE's primitive for it, such as `say`: its input becomes the first parameter, its options those of their names. */
+  /** RIZE primitive, such as `say`: its input becomes the first parameter, its options the parameters of the same names. */
   readonly rize?: string;
-  /** Input that RIZE's input and options stand for, if their names alone don't tell. Throws if there is none. */
+  /** Convert RIZE's input and options if the default conversion doesn't fit. Throws for invalid values. */
   fromRize?(input: string, options: Members): Members;
-  /** Gets the checked input. Wait with `call.wait`, or pass `call.signal` on: that is where a stop ends it. */
+  /** Execute the action with validated input. Wait with `call.wait` or pass on `call.signal`, so that a stop ends it. */
   run(input: any, call: Call): unknown;
 }
 
-/** Pictures. */
+/** Declaration of a camera. */
 export interface Camera {
   readonly type: "camera";
   readonly width: number;
   readonly height: number;
-  /** Horizontal field of view. */
+  /** Horizontal field of view in degrees. */
   readonly hfovDeg: number;
   readonly title?: string;
 }
 
-/** Something that a robot tells all the time: a value, an object (`fields`), or pictures of a camera. */
+/** Declaration of a sensor: a value, an object (`fields`), or images of a camera. */
 export type SensorSpec = (Value | Camera) & {
-  /** Its block. */
+  /** Text of its block. */
   readonly text?: string;
   readonly icon?: string;
   readonly rateHz?: number;
 };
 
-/** Something that happens. */
+/** Declaration of an event. */
 export interface EventSpec {
-  /** Its block: `when %robot bumps on the %side`. */
+  /** Text of its block: `when %robot bumps on the %side`. */
   readonly text: string;
   readonly title?: string;
   readonly icon: string;
   readonly fields?: Readonly<Record<string, Value>>;
   /** Fields that the block offers as a choice. */
   readonly choose?: readonly string[];
-  /** What RIZE's blackboard gets: a primitive and its inputs, such as `["bumpers", { left: 1 }]`. */
+  /** Return a primitive and its inputs for RIZE's blackboard, such as `["bumpers", { left: 1 }]`. */
   rize?(data: Members): readonly [string, Members];
 }
 
-/** How a robot is stopped. */
+/** Declaration of the stop. */
 export interface StopSpec {
-  /** Name of the stop as an action. Default: `stop`. */
+  /** Name of the stop action. Default: `stop`. */
   readonly name?: string;
-  /** The robot stops when the program that moves it is silent for so many seconds. Default: 1. */
+  /** Seconds without a message from the program that moves the robot, after which it stops. Default: 1. */
   readonly watchdogS?: number;
-  /** Seconds after which the robot stands still at the latest. Default: 0.2. */
+  /** Maximum seconds until the robot stands still. Default: 0.2. */
   readonly withinS?: number;
-  /** Return when the robot stands still; throw `Failed` if that is not sure. */
+  /** Stop the robot and return once it stands still; throw `Failed` if that can't be guaranteed. */
   run(): unknown;
 }
 
-/** A kind of robot. */
+/** Declaration of a kind of robot. */
 export interface RobotSpec {
   readonly model: string;
   readonly title: string;
   readonly description?: string;
-  /** Nothing real moves. */
+  /** True for a simulated robot. */
   readonly virtual?: boolean;
   readonly kinds?: readonly string[];
   readonly actions: Readonly<Record<string, ActionSpec>>;
   readonly sensors?: Readonly<Record<string, SensorSpec>>;
   readonly events?: Readonly<Record<string, EventSpec>>;
   readonly stop: StopSpec;
-  /** Disconnect from the robot; called when the driver ends. */
+  /** Disconnect from the robot; called when the driver exits. */
   close?(): unknown;
 }
 
-/** An action with its defaults. */
+/** Action with defaults applied. */
 export interface RobotAction {
   readonly name: string;
   readonly title: string;
@@ -120,7 +120,7 @@ export interface RobotAction {
   run(input: any, call: Call): unknown;
 }
 
-/** What the driver needs of a described robot. */
+/** Description of a robot in the form that the driver needs. */
 export interface Description {
   readonly name: string;
   readonly document: Members;
@@ -128,12 +128,12 @@ export interface Description {
   readonly stopAction: string;
 }
 
-/** Return the topic of a robot's part: `/My_robot/camera`. */
+/** Return the topic of a sensor or another part of a robot, such as `/My_robot/camera`. */
 export function topicOf(name: string, leaf: string): string {
   return `/${name.replace(/[^\p{L}\p{N}_.-]/gu, "_")}/${leaf}`;
 }
 
-/** Return the description of a robot of this kind and name. @throws {NepError} that says what is wrong. */
+/** Return the description of a robot with this declaration and name. @throws {NepError} if the declaration is invalid. */
 export function describe(spec: RobotSpec, name: string): Description {
   const stopAction = spec.stop.name ?? "stop";
   checkNames(spec, stopAction);
@@ -146,26 +146,26 @@ export function describe(spec: RobotSpec, name: string): Description {
 function checkNames({ actions, sensors = {}, events = {}, model }: RobotSpec, stopAction: string): void {
   const names = [model, stopAction, ...Object.keys(actions), ...Object.keys(sensors), ...Object.keys(events)];
   for (const each of names) {
-    if (!NAME.test(each)) throw new NepError(`"${each}" is no name. Use letters, digits, - and _ without spaces.`);
+    if (!NAME.test(each)) throw new NepError(`Invalid name "${each}". Use letters, digits, - and _ without spaces.`);
   }
   if (Object.hasOwn(actions, stopAction))
-    throw new NepError(`"${stopAction}" is the stop; name the action differently.`);
+    throw new NepError(`"${stopAction}" is the name of the stop; choose another name for the action.`);
   for (const each of [...Object.keys(sensors), ...Object.keys(events)]) {
     if (RESERVED.includes(each) || (Object.hasOwn(sensors, each) && Object.hasOwn(events, each)))
-      throw new NepError(`"${each}" names two things of one robot; their topics would be the same.`);
+      throw new NepError(`The name "${each}" is used twice or reserved; the topics would be the same.`);
   }
 }
 
 function checkAction(name: string, { text, says = "", parameters = {} }: ActionSpec): void {
   for (const [, used] of `${text} ${says}`.matchAll(/%([A-Za-z_][\w-]*)/g)) {
     if (used !== "robot" && !Object.hasOwn(parameters, used!))
-      throw new NepError(`${name}: its text uses %${used}, which is no parameter.`);
+      throw new NepError(`${name}: the text contains %${used}, which is not a parameter.`);
   }
   for (const [each, parameter] of Object.entries(parameters)) {
-    if (!NAME.test(each) || each === "robot") throw new NepError(`${name}: a parameter can't have the name "${each}".`);
+    if (!NAME.test(each) || each === "robot") throw new NepError(`${name}: invalid parameter name "${each}".`);
     if (parameter.default === undefined) continue;
     const [problem] = problemsOf({ [each]: parameter }, { [each]: parameter.default });
-    if (problem) throw new NepError(`${name}: the default is wrong: ${problem}.`);
+    if (problem) throw new NepError(`${name}: invalid default: ${problem}.`);
   }
 }
 
@@ -289,10 +289,10 @@ function commandForm(name: string): Members {
   return { ...asked, "rb:answer": `nep:${topicOf(name, "answer")}` };
 }
 
-/** Return what is published of a sensor's value. @throws {NepError} when it is not of the sensor's type. */
+/** Return the payload for a sensor's value. @throws {NepError} if the value doesn't match the sensor's type. */
 export function sensedValue(name: string, sensor: SensorSpec, value: unknown): unknown {
   if (sensor.type === "camera") return value;
   const [problem] = problemsOf({ value: { ...sensor, title: "the value" } }, { value: value ?? null });
-  if (problem) throw new NepError(`The sensor "${name}": ${problem}.`);
+  if (problem) throw new NepError(`Sensor "${name}": ${problem}.`);
   return sensor.type === "object" && isMembers(value) ? value : { value };
 }

@@ -1,5 +1,5 @@
-// Messages to a robot: stops are carried out on arrival, before any other message is decoded; everything else waits
-// for its turn.
+// Reception of messages to a robot: stops are executed on arrival, before any other message is decoded; all other
+// messages are queued.
 import { DecodeError } from "../errors.js";
 import type { Message } from "../messages/message.js";
 import type { Tasks } from "./tasks.js";
@@ -8,25 +8,25 @@ import { asMembers, type Members } from "./text.js";
 const MAX_COMMAND_BYTES = 64_000;
 const MAX_BACKLOG = 2000;
 const MAX_BACKLOG_BYTES = 16_000_000;
-const MAX_TURN_MS = 5; // then the sockets are read: a stop may be there
+const MAX_TURN_MS = 5; // maximum time for consecutive messages, after which sockets are read, because of stops
 const END_BYTES = 2048;
 const WARN_INTERVAL_MS = 10_000;
 const ID = /"id"\s*:\s*"([\w .:/-]{1,200})"/;
 const OPERATION = /"op"\s*:\s*"(\w{1,20})"/;
 
-/** Gives the commands of one topic their meaning. */
+/** Interpretation of the commands on one topic. */
 export interface Dialect {
-  /** Whether a command stops the robot. */
+  /** Return true if a command stops the robot. */
   isStop(command: Members): boolean;
-  /** Carry a stop out. */
+  /** Execute a stop. */
   stop(command: Members): void;
   /** Handle a command; `epoch` is `Tasks.epoch` when it was received. */
   receive(command: Members, publisher: bigint | undefined, epoch: number): void;
-  /** Answer a command that was not decoded. */
+  /** Reply to a command that was not decoded. */
   refuse(id: string, operation: string, error: string): void;
 }
 
-/** Counts messages to one robot that were not handled, and warns at intervals. */
+/** Counter of rejected messages to one robot; warns at intervals. */
 export class RejectedMessages {
   count = 0;
   private warnedAt = -Infinity;
@@ -50,7 +50,7 @@ interface Backlogged {
   readonly use: (members: Members, message: Message) => void;
 }
 
-/** Decodes the messages of one topic in turns that leave room for stops. Bounded. */
+/** Bounded queue that decodes the messages of one topic in short turns, so that stops are not delayed. */
 export class MessageQueue {
   private readonly backlog: Backlogged[] = [];
   private backlogBytes = 0;
@@ -63,7 +63,7 @@ export class MessageQueue {
     private readonly maxMessageBytes: number,
   ) {}
 
-  /** Decode a message later and use its members. Returns a sentence if it is too large. */
+  /** Queue a message; `use` is called with its members. Return an error message if it is too large. */
   put(message: Message, use: (members: Members, message: Message) => void): string | undefined {
     const size = message.data.length;
     if (size > this.maxMessageBytes) {
@@ -111,14 +111,14 @@ export class MessageQueue {
   }
 }
 
-/** Takes the commands of one topic. */
+/** Receiver of the commands on one topic. */
 export class CommandReceiver {
   private readonly queue: MessageQueue;
   private readonly stopWords: readonly Buffer[];
 
   /**
-   * @param stopWords Each command that stops the robot contains one of these texts.
-   * @param queuesStops A stop that was carried out also gets its turn, because `Dialect.receive` answers it.
+   * @param stopWords Texts of which every stop command contains at least one.
+   * @param queuesStops True to also queue executed stops, so that `Dialect.receive` can reply to them.
    */
   constructor(
     topic: string,
@@ -132,7 +132,7 @@ export class CommandReceiver {
     this.stopWords = stopWords.map((each) => Buffer.from(JSON.stringify(each).slice(1, -1)));
   }
 
-  /** Take a message: carry out a stop at once, queue everything else. Throws nothing. */
+  /** Handle a message: execute a stop at once, queue other commands. Never throws. */
   readonly take = (message: Message): void => {
     const stop = this.stopIn(message);
     if (stop) this.tasks.act(() => this.dialect.stop(stop));
@@ -154,12 +154,12 @@ export class CommandReceiver {
       const command = asMembers(message.payload);
       return this.dialect.isStop(command) ? command : undefined;
     } catch {
-      return undefined; // reported when its turn comes
+      return undefined; // reported when it is dequeued
     }
   }
 }
 
-/** The member of a command that is too large to decode, if it is in the first or last 2 kB. */
+/** Return a member of a command that is too large to decode, if it is in the first or last 2 kB. */
 function found(pattern: RegExp, data: Buffer): string {
   const ends = [data.subarray(0, END_BYTES), data.subarray(-END_BYTES)];
   for (const each of ends) {

@@ -1,6 +1,6 @@
-// The dialect of RIZE: `robot_action` in, `action_state` out. A command is {"node": "action", "primitives": {...} or
-// [...], "robots": "Pepper", "state": "idle", ...}; a list of primitives runs side by side. The answer is the same
-// object with the state "success" or "failure".
+// Dialect of RIZE: commands on `robot_action`, replies on `action_state`. A command is {"node": "action",
+// "primitives": {...} or [...], "robots": "Pepper", "state": "idle", ...}; a list of primitives runs in parallel. The
+// reply is the same object with the state "success" or "failure".
 import type { Call } from "./call.js";
 import type { CommandDesk } from "./commands.js";
 import type { ActionSpec, Description, RobotAction } from "./description.js";
@@ -17,7 +17,7 @@ export const BLACKBOARD = "/blackboard";
 const MAX_WAIT_S = 3600;
 const MAX_PRIMITIVES = 100;
 
-/** What the dialect needs from a robot. */
+/** Interface of the robot used by the dialect. */
 export interface RizeHost {
   readonly description: Description;
   readonly specs: Readonly<Record<string, ActionSpec>>;
@@ -25,9 +25,9 @@ export interface RizeHost {
   publish(answer: Members): void;
 }
 
-/** The commands of RIZE for one robot. */
+/** RIZE commands for one robot. */
 export class RizeDialect implements Dialect {
-  /** Actions by RIZE's primitive. */
+  /** Names of actions by RIZE primitive. */
   private readonly byPrimitive = new Map<string, string>();
   private readonly begun = new WeakSet<Task>();
   private lastNumber = 0;
@@ -47,7 +47,7 @@ export class RizeDialect implements Dialect {
     );
   }
 
-  /** Stop the robot at once; the message is answered when `receive` comes to it. */
+  /** Stop the robot at once; `receive` replies to the message later. */
   stop(): void {
     this.tasks.stop(undefined);
   }
@@ -58,9 +58,9 @@ export class RizeDialect implements Dialect {
     else if (command["node"] === "action") this.run(command, epoch);
   }
 
-  /** Do nothing: RIZE's answer repeats the whole command. */
+  /** Do nothing: a RIZE reply repeats the whole command, which was not decoded. */
   refuse(): void {
-    // See above.
+    // no reply
   }
 
   private isForMe({ robots }: Members): boolean {
@@ -100,7 +100,7 @@ export class RizeDialect implements Dialect {
     }
     const id = `rize:${++this.lastNumber}`;
     const action = actions.get(name);
-    const options = asMembers(primitive["options"]); // "none" if there are none
+    const options = asMembers(primitive["options"]); // "none" without options
     const input = action && this.inputOf(action, given, options);
     let task: Task | undefined;
     if (input && problemsOf(action.parameters, input).length === 0)
@@ -114,7 +114,7 @@ export class RizeDialect implements Dialect {
     this.tasks.submit(task);
   }
 
-  /** The input of an action that RIZE's input and options stand for; undefined if there is none. */
+  /** Convert RIZE's input and options to the input of an action; return undefined if they are invalid. */
   private inputOf(action: RobotAction, given: string, options: Members): Members | undefined {
     const { fromRize } = this.host.specs[action.name]!;
     if (!fromRize) return inputByName(action, given, options);
@@ -130,19 +130,19 @@ function primitivesOf({ primitives }: Members): readonly unknown[] {
   return Array.isArray(primitives) ? (primitives as unknown[]) : [primitives];
 }
 
-/** RIZE's input is text; other programs also send numbers. */
+/** Return RIZE's input as text; other programs also send numbers. */
 function inputText(input: unknown): string {
   if (typeof input === "string") return input;
   return input === undefined || input === null || input === false || input === 0 ? "" : quotable(input);
 }
 
-/** A number that RIZE may have sent as text; NaN if it is none. */
+/** Convert a number, or a number sent as text; NaN for other values. */
 function numberOf(value: unknown): number {
   if (typeof value === "number") return value;
   return typeof value === "string" && value.trim() !== "" ? Number(value) : NaN;
 }
 
-/** The input goes to the first parameter, options to those of their names; the others are left out. */
+/** Assign the input to the first parameter and options to the parameters of the same names; ignore other options. */
 function inputByName({ parameters }: RobotAction, given: string, options: Members): Members {
   const [first] = Object.entries(parameters);
   const input: [string, unknown][] = first && given ? [[first[0], converted(first[1], given)]] : [];
@@ -151,7 +151,7 @@ function inputByName({ parameters }: RobotAction, given: string, options: Member
   return Object.fromEntries(input);
 }
 
-/** RIZE sends numbers as text, and switches as text or booleans. */
+/** Convert a value to the parameter's type: RIZE sends numbers as text, and booleans as text or booleans. */
 function converted({ type, choices }: Parameter, value: unknown): unknown {
   if (typeof value !== "string" || choices) return value;
   if (type === "number" || type === "integer") {

@@ -19,9 +19,9 @@ const MAX_WARNED = 100;
 const MAX_WORLD_BYTES = 1_000_000;
 const USAGE = "usage: [--name NAME] [--master HOST:PORT] [--owner-pid PID] [--test-clock]";
 
-/** How a robot is started. */
+/** Options of `Robot.start`. */
 export interface StartOptions {
-  /** The robot's name; its topics begin with it. Default: the title of its kind. */
+  /** Name of the robot, with which its topics begin. Default: the title in its declaration. */
   readonly name?: string;
   /** Host and port of the master. Default: `NEP_MASTER`, else `127.0.0.1:7780`. */
   readonly master?: string;
@@ -34,30 +34,30 @@ interface Running {
   readonly description: Description;
   readonly tasks: Tasks;
   readonly rejected: RejectedMessages;
-  /** By topic. */
+  /** Publishers by topic. */
   readonly publishers: Map<string, Publisher>;
   readonly subscribers: Subscriber[];
 }
 
-/** The newest value of a topic that is not open yet. */
+/** Newest value for a topic that isn't open yet. */
 interface UnsentValue {
   readonly topicOf: (name: string) => string;
   readonly value: unknown;
 }
 
-/** Called with each message of a topic. */
+/** Callback for each message of a topic. */
 export type MembersCallback = (message: Members) => void;
 
-/** A topic besides the robot's own ones. */
+/** Additional topic joined by the robot. */
 interface JoinedTopic {
   readonly topicOf: (name: string) => string;
   readonly changed: MembersCallback;
-  /** Of a topic that the robot publishes, too. */
+  /** Options of the robot's publisher; undefined if it only subscribes. */
   readonly sharing: { readonly latched: boolean } | undefined;
 }
 
 /**
- * The driver of one robot: announces it, carries out its commands, and stops it.
+ * Driver of one robot: publishes its description, executes commands, and stops the robot.
  *
  * @example
  * const robot = new Robot({
@@ -81,22 +81,22 @@ export class Robot {
   private readonly unsent = new Map<string, UnsentValue>();
   private readonly joined: JoinedTopic[] = [];
 
-  /** @throws {NepError} for a declaration that is wrong. */
+  /** @throws {NepError} if the declaration is invalid. */
   constructor(readonly spec: RobotSpec) {
     describe(spec, spec.title);
   }
 
-  /** Return the W3C Thing Description that the robot announces under a name. */
+  /** Return the W3C Thing Description that a robot of this name publishes. */
   describe(name = this.spec.title): Members {
     return describe(this.spec, name).document;
   }
 
-  /** Connect to a master (waiting for one), take commands, and announce the robot. */
+  /** Connect to a master, waiting for it without a time limit; accept commands, and publish the description. */
   async start({ name = this.spec.title, master, clock = systemClock }: StartOptions = {}): Promise<void> {
-    if (this.running) throw new NepError(`${name} runs already.`);
+    if (this.running) throw new NepError(`${name} is already running.`);
     const description = describe(this.spec, name);
     const node = new Node(name, { master, masterWaitS: null });
-    const warned = new Set<string>(); // each topic of the robot warns that there is no master
+    const warned = new Set<string>(); // without a master, each topic emits the same warning
     node.on("warning", (message) => {
       if (!warned.has(message)) warn(message);
       if (warned.size < MAX_WARNED) warned.add(message);
@@ -129,7 +129,7 @@ export class Robot {
     ]);
   }
 
-  /** Stop the robot, answer what is open, and leave the network. */
+  /** Stop the robot, reply to pending commands, and close the node. */
   async close(): Promise<void> {
     const { running } = this;
     if (!running) return;
@@ -141,22 +141,22 @@ export class Robot {
   }
 
   /**
-   * Publish a sensor's new value; a camera takes what a publisher of type `image` takes.
+   * Publish a new value of a sensor; for a camera, an image as for publishers of type `image`.
    *
-   * @throws {NepError} when it is not of the sensor's type.
+   * @throws {NepError} if the value doesn't match the sensor's type.
    */
   sense(sensor: string, value: unknown): void {
     const { sensors = {} } = this.spec;
-    if (!Object.hasOwn(sensors, sensor)) throw new NepError(`There is no sensor "${sensor}".`);
+    if (!Object.hasOwn(sensors, sensor)) throw new NepError(`Unknown sensor "${sensor}".`);
     this.publishWhenOpen((name) => topicOf(name, sensor), sensedValue(sensor, sensors[sensor]!, value));
   }
 
-  /** Publish an event, also to RIZE's blackboard if declared so. @throws {NepError} when its values are not as declared. */
+  /** Publish an event, also to RIZE's blackboard if declared. @throws {NepError} if its values don't match the declaration. */
   happen(event: string, data: Members = {}): void {
     const { events = {} } = this.spec;
-    if (!Object.hasOwn(events, event)) throw new NepError(`There is no event "${event}".`);
+    if (!Object.hasOwn(events, event)) throw new NepError(`Unknown event "${event}".`);
     const [problem] = problemsOf(events[event]!.fields ?? {}, data);
-    if (problem) throw new NepError(`The event "${event}": ${problem}.`);
+    if (problem) throw new NepError(`Event "${event}": ${problem}.`);
     if (!this.running) return;
     const { name } = this.running.description;
     this.publish(topicOf(name, event), data);
@@ -164,7 +164,7 @@ export class Robot {
     if (told) this.publish(BLACKBOARD, { primitive: told[0], input: told[1], robot: name });
   }
 
-  /** Publish on a topic of the robot that its description doesn't name, such as `state`. */
+  /** Publish on a topic of the robot that isn't in its description, such as `state`. */
   async tell(leaf: string, value: unknown): Promise<void> {
     if (!this.running) return;
     const topic = topicOf(this.running.description.name, leaf);
@@ -172,14 +172,14 @@ export class Robot {
     this.publish(topic, value);
   }
 
-  /** Number of subscribers of a sensor: nobody needs a picture that nobody sees. */
+  /** Return the number of subscribers of a sensor, for example to skip images that nobody receives. */
   watchers(sensor: string): number {
     if (!this.running) return 0;
     const { description, publishers } = this.running;
     return publishers.get(topicOf(description.name, sensor))?.subscribers ?? 0;
   }
 
-  /** Let people act on a virtual robot's world: `changed` gets each message of `/NAME/world`, in turns that let stops pass. */
+  /** Call `changed` with each message of `/NAME/world`, by which people change a virtual robot's world. */
   onWorld(changed: MembersCallback): void {
     this.add({ topicOf: (name) => topicOf(name, "world"), changed, sharing: undefined });
   }
@@ -187,8 +187,8 @@ export class Robot {
   /**
    * Join a topic that several robots share.
    *
-   * @param changed Gets each message, also those of this robot.
-   * @returns a function that publishes a message. Before the topic is open, only the newest one is kept.
+   * @param changed Called with each message, including those of this robot.
+   * @returns a function that publishes a message. Until the topic is open, only the newest message is kept.
    */
   share(topic: string, changed: MembersCallback, { latched = false } = {}): MembersCallback {
     this.add({ topicOf: () => topic, changed, sharing: { latched } });
@@ -196,9 +196,9 @@ export class Robot {
   }
 
   /**
-   * Be the robot's program: read the command line, run until Ctrl+C or SIGTERM, then stop the robot and end.
+   * Main function of a driver program: parse the command line, run until Ctrl+C or SIGTERM, stop the robot and exit.
    *
-   * Errors that reach the top of the program stop the robot and are printed; the program goes on.
+   * Uncaught errors are printed and stop the robot; the program continues.
    */
   async main(argv: readonly string[] = process.argv.slice(2)): Promise<void> {
     const options = chosen(argv);
@@ -216,7 +216,7 @@ export class Robot {
     const ended = new Promise<void>((resolve) => endsOn(resolve, options["owner-pid"]));
     const clock = options["test-clock"] ? clockOnStdin() : systemClock;
     const started = this.start({ name, master: options.master, clock }).then(
-      () => console.log(`${name}: the robot is ready, Ctrl+C ends it`),
+      () => console.log(`${name}: the robot is ready; press Ctrl+C to stop it`),
       (error: unknown) => {
         console.error(`${name}: ${errorText(error)}`);
         process.exit(1);
@@ -311,7 +311,7 @@ function chosen(argv: readonly string[]) {
   }
 }
 
-/** Call back on Ctrl+C, SIGTERM, or when the process that started this one is gone. */
+/** Call `end` on Ctrl+C, SIGTERM, or when the owner process has exited. */
 function endsOn(end: () => void, ownerPid: string | undefined): void {
   for (const signal of ["SIGINT", "SIGTERM"]) process.on(signal, end);
   if (ownerPid === undefined) return;
@@ -327,7 +327,7 @@ function endsOn(end: () => void, ownerPid: string | undefined): void {
   }, OWNER_CHECK_MS).unref();
 }
 
-/** A clock for tests: each line on stdin is a number of seconds to advance, and is answered by the new time. */
+/** Return a clock for tests: each line on stdin advances it by a number of seconds; the new time is printed. */
 function clockOnStdin(): Clock {
   const clock = new ManualClock();
   createInterface({ input: process.stdin }).on("line", (line) => {

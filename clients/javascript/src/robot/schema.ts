@@ -1,39 +1,39 @@
-// From declared parameters to the data schemas of a robot's description.
+// Conversion of declared values to data schemas of a robot's description, and validation.
 import { NepError } from "../errors.js";
 import { isMembers, type Members } from "./text.js";
 
-/** A value of an action, a sensor or an event. */
+/** Declaration of a value of an action, a sensor or an event. */
 export interface Value {
   readonly type: "number" | "integer" | "boolean" | "string" | "colour" | "image" | "list" | "object";
-  /** What forms call it. Default: its name. */
+  /** Label in forms. Default: the name. */
   readonly title?: string;
   readonly minimum?: number;
   readonly maximum?: number;
-  /** Step that editors offer. */
+  /** Step in editors. */
   readonly step?: number;
-  /** As UCUM writes it: `m`, `deg`, `s`, `m/s`, `%`. */
+  /** Unit in UCUM notation: `m`, `deg`, `s`, `m/s`, `%`. */
   readonly unit?: string;
-  /** `angle` draws a dial. */
+  /** Widget in forms; `angle` is a dial. */
   readonly widget?: string;
-  /** Allowed values, or allowed values with the words that people see. */
+  /** Allowed values, or a map from allowed values to their labels. */
   readonly choices?: readonly (string | number)[] | Readonly<Record<string, string>>;
-  /** Of a text: characters; of a list: values. */
+  /** Minimum number of characters of a text or values of a list. */
   readonly minLength?: number;
   readonly maxLength?: number;
-  /** What each value of a list is. */
+  /** Declaration of each value of a list. */
   readonly items?: Value;
   /** Named values of an object. */
   readonly fields?: Readonly<Record<string, Value>>;
 }
 
-/** An input of an action. One without a default must be given. */
+/** Declaration of a parameter of an action. Required unless it has a default or is optional. */
 export interface Parameter extends Value {
   readonly default?: unknown;
-  /** May be left out or null. */
+  /** True if it may be omitted or null. */
   readonly optional?: boolean;
-  /** What forms start with; it must be given all the same. */
+  /** Initial value in forms; the parameter remains required. */
   readonly suggested?: unknown;
-  /** Folded away in forms. */
+  /** Collapsed in forms. */
   readonly advanced?: boolean;
 }
 
@@ -50,7 +50,7 @@ const UNIT_WORDS: Readonly<Record<string, string>> = {
   percent: "%",
 };
 
-/** Return the schema of a value. @throws {NepError} for what can't be described. */
+/** Return the schema of a value. @throws {NepError} for an unknown unit. */
 export function schemaOf(name: string, value: Value | Parameter): Members {
   checkUnit(name, value.unit);
   const isList = value.type === "list";
@@ -111,7 +111,7 @@ export function inputSchema(parameters: Readonly<Record<string, Parameter>>): Me
   return given({ ...objectSchema(parameters), required: required.length > 0 ? required : undefined });
 }
 
-/** Whether a parameter must be given. */
+/** Return true if a parameter is required. */
 export function isRequired(parameter: Parameter): boolean {
   return parameter.default === undefined && !parameter.optional;
 }
@@ -129,9 +129,9 @@ function checkUnit(name: string, unit: string | undefined): void {
     throw new NepError(`${name}: unknown unit "${unit}"; use UCUM, such as "m", "deg" or "m/s".`);
 }
 
-// ---- checking values
+// ---- validation
 
-/** Return one sentence for each thing that is wrong with an input; none if the action may run. */
+/** Return an error message for each invalid or missing value of an input; empty if the input is valid. */
 export function problemsOf(parameters: Readonly<Record<string, Parameter>>, input: unknown): string[] {
   if (!isMembers(input)) return ["the input must be an object with named values"];
   const unknown = Object.keys(input).filter((name) => !Object.hasOwn(parameters, name));

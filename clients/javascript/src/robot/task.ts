@@ -1,15 +1,15 @@
 import type { Call } from "./call.js";
 import type { Members } from "./text.js";
 
-/** How a command stands; `error` is a sentence for people. */
+/** State of a command; `error` is a message for people. */
 export interface Answer {
   readonly state: "accepted" | "running" | "succeeded" | "failed" | "canceled";
   readonly output?: Members;
   readonly feedback?: Members;
   readonly error?: string;
-  /** Actions that are done first. */
+  /** Actions that must end before. */
   readonly waitsFor?: readonly string[];
-  /** Actions that were ended for it. */
+  /** Actions that were canceled for it. */
   readonly replaces?: readonly string[];
 }
 
@@ -17,23 +17,23 @@ export function isFinal({ state }: Answer): boolean {
   return state !== "accepted" && state !== "running";
 }
 
-/** Who asks a robot to act: the name in `from` and the publisher it came from, which only together can't be forged. */
+/** Id of a program that sends commands: the name in `from` and the publisher's id; the name alone could be forged. */
 export type ProgramId = string;
 
 export function programId(name: string, publisher: bigint | undefined): ProgramId {
   return `${publisher ?? ""}:${name}`;
 }
 
-/** One thing that a robot is asked to do. */
+/** One requested execution of an action. */
 export class Task {
   call: Call | undefined;
-  /** When it is overdue, by the robot's clock. */
+  /** Deadline by the robot's clock. */
   dueS: number | undefined;
-  /** What will be answered, whatever the function does: it was told to end. */
+  /** Final reply of a task that is being canceled, whatever its function returns. */
   ending: Answer | undefined;
-  /** Its final answer was given, also while its function goes on. */
+  /** True once the final reply was sent, even if the function is still running. */
   isAnswered = false;
-  /** A stop of the robot told it to end. */
+  /** True if it is being canceled by a stop of the robot. */
   isStopped = false;
 
   constructor(
@@ -49,20 +49,20 @@ export class Task {
       readonly isCancellable: boolean;
       readonly program: ProgramId | undefined;
       readonly publisher: bigint | undefined;
-      /** It stays in motion when it has succeeded (a speed): its program must go on to live. */
+      /** True if the robot stays in motion after success (a speed), so that the watchdog must monitor the program. */
       readonly goesOn: boolean;
-      /** `Tasks.epoch` when it was received: it is not run after a later stop. */
+      /** `Tasks.epoch` at reception; the task is not run after a later stop. */
       readonly epoch: number;
     },
   ) {}
 
-  /** Ask the function to end. */
+  /** Cancel the function. */
   end(how: Answer, onError: (error: unknown) => void): void {
     this.ending ??= how;
     this.call?.cancel(onError);
   }
 
-  /** Give the final answer, once. */
+  /** Send the final reply, once. */
   finish(answer: Answer): void {
     if (this.isAnswered) return;
     this.isAnswered = true;

@@ -1,5 +1,5 @@
-// Runs what a robot is asked to do: order, busy policies, cancel, stop, watchdog. A stop is carried out in the call of
-// `stop` itself, whatever is queued; commands that were received before it are not run after it.
+// Execution of a robot's tasks: order, busy policies, cancel, stop, watchdog. `stop` is executed synchronously, whatever
+// is queued; commands that were received before it are not run afterwards.
 import { Call, Canceled, Failed } from "./call.js";
 import type { Clock } from "./clock.js";
 import { type Answer, type ProgramId, Task } from "./task.js";
@@ -17,7 +17,7 @@ const STOPPED_BEFORE: Answer = { state: "canceled", error: "the robot was stoppe
 
 export const NOTHING_RUNS = "no running task has this id";
 
-/** What the tasks of a robot need from it. */
+/** Interface of the robot used by its tasks. */
 export interface TasksHost {
   readonly name: string;
   readonly clock: Clock;
@@ -25,12 +25,12 @@ export interface TasksHost {
   readonly watchdogS: number;
   /** The robot's stop function. */
   stop(): unknown;
-  /** Tell that the robot lives, twice a second while it does something. */
+  /** Publish the heartbeat; called twice a second while tasks run. */
   beat(notEnded: readonly string[], error: string | undefined): void;
   warn(message: string): void;
 }
 
-/** A stop that is not answered yet. */
+/** Stop without a reply yet. */
 interface PendingStop {
   run: number;
   readonly limitS: number;
@@ -40,17 +40,17 @@ interface PendingStop {
 export class Tasks {
   /** Number of stops so far. */
   epoch = 0;
-  /** Errors that were survived. */
+  /** Number of internal errors that were caught. */
   errors = 0;
   private running: Task[] = [];
   private queue: Task[] = [];
   private pendingStops: PendingStop[] = [];
   private readonly watchdog: Watchdog;
   private readonly patienceS: number;
-  private requestedRun = 0; // of the stop function
+  private requestedRun = 0; // last requested run of the stop function
   private endedRun = 0;
   private isStopLate = false;
-  private notStopped: string | undefined; // why the last stop that nobody asked for failed
+  private notStopped: string | undefined; // error of the last stop without a requester
   private nextBeatS = 0;
   private toldNotEnded = "[[],null]";
   private isTicking = false;
@@ -63,9 +63,9 @@ export class Tasks {
   }
 
   /**
-   * Stop the robot at once and end everything.
+   * Stop the robot at once and cancel all tasks.
    *
-   * `answer` gets `succeeded` when the stop function has returned and every action has ended.
+   * `answer` is called with `succeeded` once the stop function has returned and every action has ended.
    */
   stop(answer: ((answer: Answer) => void) | undefined, why = "stopped"): void {
     this.epoch++;
@@ -90,7 +90,7 @@ export class Tasks {
     });
   }
 
-  /** Stop the robot and wait until it stands still, or until it is late. */
+  /** Stop the robot and wait until it stands still or the time limit expires. */
   close(): Promise<void> {
     return new Promise((resolve) => {
       const end = (answer: Answer): void => {
@@ -103,12 +103,12 @@ export class Tasks {
     });
   }
 
-  /** Run a task as soon as what it uses is free; refuse it, or end others, by its busy policy. */
+  /** Run a task as soon as its resources are free; reject it or cancel others according to its busy policy. */
   submit(task: Task): void {
     this.act(() => this.accept(task));
   }
 
-  /** End the tasks that are wanted. Returns why none is, if so. */
+  /** Cancel the matching tasks. Return an error message if none can be canceled. */
   cancel(isWanted: (task: Task) => boolean): string | undefined {
     const found = [...this.running, ...this.queue].filter(isWanted);
     if (found.length === 0) return NOTHING_RUNS;
@@ -122,12 +122,12 @@ export class Tasks {
     return undefined;
   }
 
-  /** A program said something; `watch` begins to expect more. */
+  /** Record a sign of life of a program; `watch` starts monitoring it. */
   signOfLife(program: ProgramId, watch: boolean): void {
     this.act(() => this.watchdog.hear(program, this.host.clock.now(), watch));
   }
 
-  /** Do something, count its error, and look at the clock. */
+  /** Call a function, catch and count its errors, and handle expired deadlines. */
   act(what: () => void): void {
     try {
       what();
@@ -137,7 +137,7 @@ export class Tasks {
     if (!this.isTicking) this.tick();
   }
 
-  // ---- inside
+  // ---- internal
 
   private readonly survive = (error: unknown): void => {
     this.errors++;
@@ -163,7 +163,7 @@ export class Tasks {
     this.startReady();
   }
 
-  /** Why nothing more is accepted now, if so. */
+  /** Return the reason why new tasks are rejected, or undefined. */
   private refusal(busyWith: Task | undefined): string | undefined {
     const stopped = this.running.filter((each) => each.isStopped);
     if (this.isStopLate || stopped.some((each) => each.isAnswered)) return this.stillMoving(this.notEnded());
@@ -198,7 +198,7 @@ export class Tasks {
         this.queue.splice(this.queue.indexOf(task), 1);
         this.begin(task);
       }
-      for (const each of task.spec.uses) taken.add(each); // also for one that waits: nothing overtakes it
+      for (const each of task.spec.uses) taken.add(each); // also for a waiting task, so that no other overtakes it
     }
   }
 
@@ -216,7 +216,7 @@ export class Tasks {
   }
 
   private async work(task: Task, call: Call): Promise<void> {
-    await null; // the function begins in a turn of its own: a stop may come before it
+    await null; // start the function in a later turn, so that a stop can precede it
     let done: Answer;
     try {
       if (call.canceled) throw new Canceled();
@@ -239,7 +239,7 @@ export class Tasks {
     this.running.splice(this.running.indexOf(task), 1);
     if (done.state === "succeeded" && !task.ending) this.watchdog.endsWell(task);
     if (task.isStopped && !this.isStopping) {
-      // It may have moved the robot after the stop: the robot is stopped once more, and only then stands still.
+      // It may have moved the robot after the stop, so the stop function is called again.
       this.isStopLate = task.isAnswered;
       this.requestedRun++;
       for (const each of this.pendingStops) each.run = this.requestedRun;
@@ -254,11 +254,11 @@ export class Tasks {
 
   private async runStop(run: number): Promise<void> {
     let error: string | undefined;
-    const stop = async (): Promise<unknown> => this.host.stop(); // one that throws at once rejects like the others
+    const stop = async (): Promise<unknown> => this.host.stop(); // converts a synchronous exception to a rejection
     try {
       await stop();
     } catch (problem) {
-      if (!(problem instanceof Failed)) this.host.warn(`${this.host.name}: its stop failed. ${errorText(problem)}`);
+      if (!(problem instanceof Failed)) this.host.warn(`${this.host.name}: the stop function failed. ${errorText(problem)}`);
       const why = problem instanceof Failed ? errorText(problem) : `the stop command failed: ${errorText(problem)}`;
       error = this.mayMove(why);
     }
@@ -280,7 +280,7 @@ export class Tasks {
     for (const each of waiting) each.answer(failed);
   }
 
-  /** Answer the stops whose run of the stop function has ended, once no task runs. */
+  /** Reply to the stops whose run of the stop function has ended, once no task runs. */
   private settle(): void {
     if (this.running.length > 0) return;
     for (const each of this.takePending(({ run }) => run <= this.endedRun)) each.answer({ state: "succeeded" });
@@ -292,7 +292,7 @@ export class Tasks {
     return taken;
   }
 
-  /** The answer to a stop that nobody asked for: a failure is told by each sign of life. */
+  /** Handle the result of a stop without a requester: a failure is reported in heartbeats. */
   private readonly takeUnasked = (answer: Answer): void => {
     if (answer.state !== "failed") return;
     if (answer.error !== this.notStopped) this.host.warn(answer.error ?? "");

@@ -3,13 +3,13 @@ import { codecFor } from "../messages/codecs.js";
 
 const QUOTED = 200;
 const MAX_ERROR = 1000;
-// What moves a cursor, turns the direction of writing, hides, or is half a letter.
+// Characters that move the cursor, change the writing direction or are invisible.
 const CONTROLS = /[\u0000-\u001f\u007f-\u009f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]/gu;
 const SURROGATES = /[\ud800-\udfff]/gu;
 
 export type Members = Readonly<Record<string, unknown>>;
 
-/** Return the value if it is an object with named members, else an empty one. */
+/** Return the value if it is an object with named members, otherwise an empty object. */
 export function asMembers(value: unknown): Members {
   return isMembers(value) ? value : {};
 }
@@ -18,7 +18,7 @@ export function isMembers(value: unknown): value is Members {
   return typeof value === "object" && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
 }
 
-/** Return the text, or undefined for something else and for an empty one. */
+/** Return a nonempty string; undefined for other values. */
 export function textOf(value: unknown): string | undefined {
   return typeof value === "string" && value !== "" ? value : undefined;
 }
@@ -27,7 +27,7 @@ export function hasSurrogates(text: string): boolean {
   return text.search(SURROGATES) >= 0;
 }
 
-/** Return a stranger's word or value as a sentence may quote it. */
+/** Return an untrusted value as text that can be quoted in a message: shortened, without control characters. */
 export function quotable(value: unknown): string {
   let text: string | undefined;
   try {
@@ -38,7 +38,7 @@ export function quotable(value: unknown): string {
   return shortened(text ?? typeof value, QUOTED).replace(CONTROLS, escaped);
 }
 
-/** Return the sentence of an error, shortened. Never throws. */
+/** Return the message of an error, shortened. Never throws. */
 export function errorText(error: unknown): string {
   try {
     const text = error instanceof Error ? error.message || error.name : String(error);
@@ -56,7 +56,7 @@ function escaped(character: string): string {
   return `\\u${character.charCodeAt(0).toString(16).padStart(4, "0")}`;
 }
 
-/** Return the known word that is close to a wrong one, if any. */
+/** Return the known word that is most similar to a wrong one, if any. */
 export function nearMiss(wrong: string, known: Iterable<string>): string | undefined {
   if (wrong.length > 100) return undefined;
   let best: string | undefined;
@@ -81,8 +81,8 @@ function editDistance(a: string, b: string): number {
   return row[b.length]!;
 }
 
-/** @throws {EncodeError} for what no JSON message can hold. */
+/** @throws {EncodeError} if a value can't be encoded as an object in JSON. */
 export function checkSendable(value: unknown): void {
-  if (value !== undefined && !isMembers(value)) throw new EncodeError("These are no named values.");
+  if (value !== undefined && !isMembers(value)) throw new EncodeError("The value must be an object with named values.");
   codecFor("json").encode(value ?? {});
 }

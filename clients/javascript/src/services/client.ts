@@ -25,25 +25,25 @@ import {
 } from "./wire.js";
 
 const DEFAULT_TIMEOUT_S = 5;
-const IDLE_MS = 200; // then the connection is closed: it would keep the process alive
-const DRAIN_MS = 20; // answers that were received before the connection ended are read first
-const RETRY_MS = 100; // after a failed handshake, as with a PUB socket of another program
+const IDLE_MS = 200; // idle connections are closed, because they keep the process alive
+const DRAIN_MS = 20; // time to read replies that arrived before the connection ended
+const RETRY_MS = 100; // after a failed handshake, for example with a PUB socket of another program
 
-/** How a service is called. */
+/** Options of a client. */
 export interface ClientOptions {
   /** `json` (default), `msgpack`, `string` or `bytes`. */
   readonly type?: string;
-  /** Seconds that a call waits for a server and its answer; `null` waits for ever. Default: 5. */
+  /** Seconds that a call waits for a server and its reply; `null` waits without a time limit. Default: 5. */
   readonly timeoutS?: number | null;
 }
 
 export interface CallOptions {
   readonly timeoutS?: number | null;
-  /** Gives up waiting; the server may still carry the call out. */
+  /** Signal that ends the wait; the server may still execute the call. */
   readonly signal?: AbortSignal;
 }
 
-/** What a client needs from its node. */
+/** Interface of the node used by a client. */
 export interface ClientHost {
   readonly warn: (message: string) => void;
   register(client: SessionSubscriber): Promise<void>;
@@ -60,34 +60,34 @@ interface PendingCall {
   settle(outcome: { readonly answer: unknown } | { readonly error: Error }): void;
 }
 
-/** The connection to one server. */
+/** Connection to one server. */
 interface Connection {
   readonly server: bigint;
   readonly socket: DealerSocket;
   readonly calls: Map<bigint, PendingCall>;
-  /** Whether its handshake has succeeded: calls may have been sent. */
+  /** True after a successful handshake, when calls may have been sent. */
   isOpen: boolean;
   idle: NodeJS.Timeout | undefined;
 }
 
 /**
- * Calls a service; made by `Node.client`. Any number of calls may be under way.
+ * Calls a service; returned by `Node.client`. Any number of calls may be in progress.
  *
  * @example
  * const { sum } = await node.client("/sum").call({ a: 2, b: 3 });
  */
 export class Client<Request = unknown, Answer = unknown> implements SessionSubscriber {
-  /** Resolves when the client is registered; rejects if it can't be. */
+  /** Resolves when the client is registered; rejects if registration fails. */
   readonly ready: Promise<this>;
-  /** Calls that were answered, also with an error. */
+  /** Number of calls that received a reply, including errors. */
   answered = 0;
-  /** Calls that ended without an answer. */
+  /** Number of calls without a reply. */
   failed = 0;
-  /** Answers that came too late, or were none. */
+  /** Number of late and malformed replies. */
   late = 0;
   private readonly servers = new Map<bigint, ReachablePublisher>();
   private readonly connections = new Map<bigint, Connection>();
-  /** Servers whose handshake failed, until they are tried again. */
+  /** Retry timers of servers whose handshake failed. */
   private readonly retries = new Map<bigint, NodeJS.Timeout>();
   private readonly waiting = new Set<PendingCall>();
   private lastNumber = 0n;
@@ -101,7 +101,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     private readonly host: ClientHost,
   ) {
     this.ready = this.begin();
-    this.ready.catch(() => undefined); // each call rejects
+    this.ready.catch(() => undefined); // reported by each call
   }
 
   private async begin(): Promise<this> {
@@ -116,14 +116,14 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   }
 
   /**
-   * Call the service and return its answer.
+   * Call the service and return its reply.
    *
-   * @throws {NoServerError} nothing was sent: no server was reached in time.
-   * @throws {ServiceTimeoutError} it was sent, and no answer came in time.
-   * @throws {ServerGoneError} the server ended meanwhile.
-   * @throws {ServiceError} the server's callback raised.
-   * @throws {RequestRefusedError} the server did not carry it out.
-   * @throws {EncodeError | DecodeError} the request can't be sent; the answer can't be read.
+   * @throws {NoServerError} if no server was reached before the timeout; nothing was sent.
+   * @throws {ServiceTimeoutError} if the call was sent and no reply arrived before the timeout.
+   * @throws {ServerGoneError} if the server exited during the call.
+   * @throws {ServiceError} if the server's callback threw an error.
+   * @throws {RequestRefusedError} if the server rejected the call.
+   * @throws {EncodeError | DecodeError} if the request can't be encoded or the reply can't be decoded.
    */
   call(request: Request, options: CallOptions = {}): Promise<Answer> {
     const codec = codecFor(this.options.type ?? "json");
@@ -132,7 +132,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
       options.signal?.throwIfAborted();
       const payload = codec.encode(request).data;
       if (payload.length > MAX_PAYLOAD_BYTES)
-        throw new EncodeError(`The request has ${payload.length} bytes, 64 MiB are allowed.`);
+        throw new EncodeError(`The request has ${payload.length} bytes; the limit is 64 MiB.`);
       const { timeoutS = this.options.timeoutS === undefined ? DEFAULT_TIMEOUT_S : this.options.timeoutS } = options;
       const pending: PendingCall = {
         number: ++this.lastNumber,
@@ -161,7 +161,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     const name = `"${this.service}"`;
     const error = pending.connection?.isOpen
       ? new ServiceTimeoutError(
-          `${name} did not answer within ${pending.timeoutS} s; it may still carry the call out.`,
+          `${name} did not reply within ${pending.timeoutS} s; it may still execute the call.`,
         )
       : new NoServerError(`No server of ${name} was reached within ${pending.timeoutS} s.`);
     this.fail(pending, error);
@@ -229,13 +229,13 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
       return;
     }
     const error = new ServerGoneError(
-      `The server of "${this.service}" ended; it may or may not have carried the call out.`,
+      `The server of "${this.service}" exited during the call, which may or may not have been executed.`,
     );
     for (const each of [...connection.calls.values()]) this.fail(each, error);
     this.drop(connection);
   }
 
-  /** Nothing was sent: other servers get the calls, and this one when it is connected again. */
+  /** Handle a failed handshake: calls, which were not sent, go to other servers, or wait for this one. */
   private retryLater(connection: Connection): void {
     const { server, calls } = connection;
     if (this.connections.get(server) !== connection) return;
@@ -258,7 +258,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     } catch (error) {
       if (!(error instanceof WireError)) throw error;
       this.late++;
-      this.host.warn(`"${this.service}": received a malformed answer. ${error.message}`);
+      this.host.warn(`"${this.service}": received a malformed reply. ${error.message}`);
       return;
     }
     const pending = connection.calls.get(answer.number);
@@ -269,7 +269,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     if (answer.kind === CallKind.REFUSED) {
       this.fail(
         pending,
-        new RequestRefusedError(`The server of "${this.service}" refused: ${readFailure(answer.payload).reason}`),
+        new RequestRefusedError(`The server of "${this.service}" rejected the call: ${readFailure(answer.payload).reason}`),
       );
       return;
     }
@@ -285,14 +285,14 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     try {
       const codec = codecNumbered(answer.codec);
       if (!codec)
-        throw new WireError("codec", `The answer has codec ${answer.codec}, which this nep-js does not know.`);
+        throw new WireError("codec", `The reply has codec ${answer.codec}, which this version of nep-js doesn't support.`);
       return { answer: codec.decode(answer.payload, {}) };
     } catch (error) {
       return { error: error as Error };
     }
   }
 
-  // ---- the session
+  // ---- session
 
   /** @internal */
   counts(): SubscriberCount {
@@ -311,17 +311,17 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     this.connect(remotes);
   }
 
-  /** @internal No more calls go there; those under way end with the connection. */
+  /** @internal Send no further calls to a server; calls in progress end with the connection. */
   gone(id: bigint): void {
     this.servers.delete(id);
   }
 
   /** @internal */
   tick(): void {
-    // Answers have no seqs.
+    // Replies have no seqs.
   }
 
-  /** Unregister; calls under way reject with `ClosedError`. */
+  /** Unregister; calls in progress reject with `ClosedError`. */
   close(): Promise<void> {
     this.closed ??= this.finish();
     return this.closed;
@@ -341,7 +341,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     return this.close();
   }
 
-  /** Begin to close at the end of a `using` block. */
+  /** Start to close at the end of a `using` block. */
   [Symbol.dispose](): void {
     void this.close();
   }

@@ -9,10 +9,10 @@ const MAX_CALLS = 1000;
 const MAX_CALL_BYTES = 256 * 2 ** 20;
 const CLOSE_S = 2;
 
-/** Answers a call; what it throws is raised at the client as `ServiceError`. Nothing (`undefined`) is an empty map. */
+/** Callback that handles a call. An error that it throws becomes a `ServiceError` at the client; `undefined` becomes an empty map. */
 export type ServiceCallback<Request = unknown, Answer = unknown> = (request: Request) => Answer | Promise<Answer>;
 
-/** What a server needs from its node. */
+/** Interface of the node used by a server. */
 export interface ServerHost {
   readonly warn: (message: string) => void;
   register(server: Server): Promise<{ expected: ExpectedSubscriber[] }>;
@@ -20,22 +20,22 @@ export interface ServerHost {
 }
 
 /**
- * Answers the calls of a service; made by `Node.serve` and `Node.new_server`. Calls are carried out at once, also
- * several at a time where the callback is asynchronous.
+ * Handles the calls of a service; returned by `Node.serve` and `Node.new_server`. Each call is handled on arrival; calls
+ * of an asynchronous callback overlap.
  *
  * @example
  * await node.serve("/sum", ({ a, b }) => ({ sum: a + b }));
  */
 export class Server {
-  /** Resolves when the service is registered; rejects if it can't be. */
+  /** Resolves when the service is registered; rejects if registration fails. */
   readonly ready: Promise<this>;
-  /** Calls that were answered, also with an error. */
+  /** Number of calls that were answered, including those that failed. */
   calls = 0;
-  /** Answers that were errors. */
+  /** Number of calls that failed. */
   errors = 0;
-  /** Calls that were refused: closing, too many under way, or not decodable. */
+  /** Number of rejected calls: the server was closing or busy, or the call could not be decoded. */
   refused = 0;
-  /** Received messages that are not calls. */
+  /** Number of malformed calls. */
   unreadable = 0;
   private readonly socket = new RouterSocket(MAX_PAYLOAD_BYTES);
   private readonly bindings = new Bindings(this.socket);
@@ -97,11 +97,11 @@ export class Server {
   }
 
   private refusal(call: CallParts): string | undefined {
-    if (this.closed) return `"${this.service}" closes`;
+    if (this.closed) return `"${this.service}" is closing`;
     if (this.running.size >= MAX_CALLS || this.runningBytes + call.payload.length > MAX_CALL_BYTES) {
-      return `"${this.service}" has too many calls waiting`;
+      return `"${this.service}" has too many pending calls`;
     }
-    return codecNumbered(call.codec) ? undefined : `codec ${call.codec} is not known`;
+    return codecNumbered(call.codec) ? undefined : `unknown codec ${call.codec}`;
   }
 
   private async answer(client: Buffer, call: CallParts): Promise<void> {
@@ -119,7 +119,7 @@ export class Server {
       const answer = (await this.callback(request)) ?? {};
       const encoded = codec.encode(answer);
       if (encoded.data.length > MAX_PAYLOAD_BYTES)
-        throw new EncodeError(`The answer has ${encoded.data.length} bytes, 64 MiB are allowed.`);
+        throw new EncodeError(`The reply has ${encoded.data.length} bytes; the limit is 64 MiB.`);
       this.calls++;
       this.send(client, call, CallKind.ANSWER, encoded);
     } catch (error) {
@@ -151,7 +151,7 @@ export class Server {
   }
 
   /**
-   * Unregister, refuse calls that still come, let callbacks that run answer, and close.
+   * Unregister, reject new calls, wait for running callbacks, and close.
    *
    * @param timeoutS Seconds to wait for callbacks. Default: 2.
    */
@@ -175,7 +175,7 @@ export class Server {
     return this.close();
   }
 
-  /** Begin to close at the end of a `using` block. */
+  /** Start to close at the end of a `using` block. */
   [Symbol.dispose](): void {
     void this.close();
   }

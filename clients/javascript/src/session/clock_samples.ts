@@ -1,13 +1,13 @@
-/** Compares this computer's clock with the master's, by the times in renewals: docs/wire.md, *Clocks*. No sockets. */
+/** Comparison of this computer's clock with the master's, from the times in renewals: docs/wire.md, *Clocks*. No sockets. */
 import { abs, driftNs, isClock, MAX_UNCERTAINTY_NS } from "../messages/clocks.js";
 import { nowNs, steadyNs } from "../system/clock.js";
 
 const MAX_SAMPLES = 8;
-const SLEW_PARTS = 2000n; // a clock that is adjusted slowly changes by one part of so many
+const SLEW_PARTS = 2000n; // a clock adjusted by slewing deviates by at most 1/2000
 const STEP_NS = 50_000n;
-const RESOLUTION_NS = 1_000_000n; // of Date.now(), which nowNs() follows
+const RESOLUTION_NS = 1_000_000n; // of Date.now(), on which nowNs() is based
 
-/** One moment by both clocks; `slackNs` is how long it took to read them. */
+/** A moment by both clocks; `slackNs` is the maximum difference between the two readings. */
 export interface Moment {
   readonly wallNs: bigint;
   readonly steadyNs: bigint;
@@ -20,7 +20,7 @@ interface Sample {
   readonly steadyNs: bigint;
 }
 
-/** Knows what to add to this computer's time for the master's, as NTP does. */
+/** Estimator of the offset from this computer's clock to the master's, as in NTP. */
 export class ClockSamples {
   private samples: Sample[] = [];
   private seen: Moment | undefined;
@@ -30,7 +30,7 @@ export class ClockSamples {
     private readonly steady = steadyNs,
   ) {}
 
-  /** Return this moment. Everything is forgotten if this computer's clock was set since the last one. */
+  /** Return the current moment. Discards all samples if this computer's clock was set since the last call. */
   now(): Moment {
     const before = this.steady();
     const wallNs = this.wall();
@@ -41,7 +41,13 @@ export class ClockSamples {
     return moment;
   }
 
-  /** A renewal that was sent at `sent` was received and answered at these times, and the answer is here. */
+  /**
+   * Add a sample when the reply to a renewal is received. Return false if it is invalid.
+   *
+   * @param sent When the renewal was sent.
+   * @param receivedNs When the master received it, by the master's clock.
+   * @param answeredNs When the master replied, by the master's clock.
+   */
   add(sent: Moment, receivedNs: bigint, answeredNs: bigint): boolean {
     const now = this.now();
     const awayNs = now.steadyNs - sent.steadyNs - (answeredNs - receivedNs);
@@ -51,13 +57,13 @@ export class ClockSamples {
     const uncertaintyNs = (awayNs > 0n ? awayNs : 0n) / 2n + RESOLUTION_NS + slackNs;
     if (!isClock(offsetNs, uncertaintyNs)) return false;
     const best = this.best(now.steadyNs);
-    if (best && abs(offsetNs - best.offsetNs) > uncertaintyNs + uncertaintyAt(best, now.steadyNs)) this.forget(); // both can't be true
+    if (best && abs(offsetNs - best.offsetNs) > uncertaintyNs + uncertaintyAt(best, now.steadyNs)) this.forget(); // contradiction: the master's clock was set
     this.samples.push({ offsetNs, uncertaintyNs, steadyNs: now.steadyNs });
     if (this.samples.length > MAX_SAMPLES) this.samples.shift();
     return true;
   }
 
-  /** Return offset and uncertainty for a renewal; empty if they are unknown. */
+  /** Return offset and uncertainty for a renewal; empty if unknown. */
   offset(): readonly bigint[] {
     const { steadyNs: now } = this.now();
     const best = this.best(now);
@@ -66,7 +72,7 @@ export class ClockSamples {
     return uncertaintyNs > MAX_UNCERTAINTY_NS ? [] : [best.offsetNs, uncertaintyNs];
   }
 
-  /** Forget all samples: another master may have another clock. */
+  /** Discard all samples: another master may have another clock. */
   forget(): void {
     this.samples = [];
   }
@@ -83,7 +89,7 @@ function uncertaintyAt(sample: Sample, now: bigint): bigint {
   return sample.uncertaintyNs + driftNs(now - sample.steadyNs);
 }
 
-/** Whether both clocks went on by as much between two moments. */
+/** Return true if both clocks advanced by the same time between two moments. */
 function fits(then: Moment, now: Moment): boolean {
   const bySteady = now.steadyNs - then.steadyNs;
   const allowed = STEP_NS + then.slackNs + now.slackNs + 2n * RESOLUTION_NS;

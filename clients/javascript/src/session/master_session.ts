@@ -17,41 +17,42 @@ import { RpcClient } from "./rpc.js";
 
 const RENEW_S = 1;
 const MAX_RENEW_S = 30;
-const ANSWER_MS = 1000; // a renewal without an answer is sent again after this, ...
-const RESEND_MS = 300; // ... then at this interval, ...
-const RECONNECT_MS = 3000; // ... and over a new connection when nothing was heard for so long
+const ANSWER_MS = 1000; // a renewal without a reply is sent again after this time
+const RESEND_MS = 300; // ... and then at this interval
+const RECONNECT_MS = 3000; // ... over a new connection, if nothing was received for this time
 const JOIN_AGAIN_MS = 500;
 const MAX_TIMED_RENEWALS = 8;
 const MAX_CPU_RATIO = 1024;
-/** How long `publisher` and `subscriber` wait for a master before they fail or warn. */
+/** Default time that registrations wait for a master before they fail or warn. */
 export const MASTER_WAIT_S = 2;
 
-/** A publisher or server as its session needs it. */
+/** Interface of publishers and servers used by the session. */
 export interface SessionPublisher {
   counts(): PublisherCount;
-  /** Be reached at these hosts of this computer from now on; returns the endpoints. */
+  /** Bind at exactly these addresses of this computer; resolves to the endpoints. */
   move(hosts: readonly string[]): Promise<string[]>;
 }
 
-/** A subscriber or client as its session needs it. */
+/** Interface of subscribers and clients used by the session. */
 export interface SessionSubscriber {
   counts(): SubscriberCount;
   /**
-   * These publishers are there, too. `endpoint` of each is the one to connect to. `areNew`: they have sent nothing
-   * before, and the subscriber was registered already.
+   * Connect to further publishers.
+   *
+   * @param areNew True if they were created after this subscriber was registered, so that losses count from seq 1.
    */
   connect(remotes: readonly ReachablePublisher[], areNew?: boolean): void;
-  /** These are all publishers of `topic`; with a pattern there are several topics. */
+  /** Handle the complete list of the publishers of one topic; a pattern has several topics. */
   reconcile(topic: string, remotes: readonly ReachablePublisher[]): void;
-  /** A publisher is not listed any more. */
+  /** Handle that a publisher is no longer listed. */
   gone(id: bigint, lastSeq: bigint, isClosed: boolean): void;
-  /** By node: how the clocks of other computers differ from this one's. No others are known. */
+  /** Set the clock differences to other computers, by node, replacing all previous ones. */
   correct?(clocks: ReadonlyMap<string, ClockDifference>): void;
-  /** Called with each renewal: the newest messages of publishers that the master knows. */
+  /** Called after each renewal with the seqs of the publishers' newest messages, as known to the master. */
   tick(lastSeqs: ReadonlyMap<bigint, bigint>): void;
 }
 
-/** A publisher with the endpoint at which this node reaches it; undefined when there is none. */
+/** Publisher with the endpoint at which this node reaches it; undefined if there is none. */
 export interface ReachablePublisher extends RemotePublisher {
   readonly endpoint: string | undefined;
 }
@@ -64,7 +65,7 @@ interface Registered<R, T> {
 
 type Found = Extract<Answer, { is: "found" }>;
 
-/** What a node has registered with its master: renews the lease, joins again, hears of publishers. */
+/** Registration of a node with one master: renews the lease, rejoins, and handles pushed changes. */
 export class MasterSession {
   private readonly rpc: RpcClient;
   private readonly publishers = new Map<bigint, Registered<PublisherRecord, SessionPublisher>>();
@@ -73,7 +74,7 @@ export class MasterSession {
   private revision = 0n;
   private renewS = RENEW_S;
   private timer: NodeJS.Timeout | undefined;
-  /** Whether the newest renewal has no answer yet. */
+  /** True while the last renewal has no reply. */
   private isUnanswered = false;
   private joinAgainAt = -Infinity;
   private connectedAt = performance.now();
@@ -83,7 +84,7 @@ export class MasterSession {
   private isClosed = false;
   private readonly clock = new ClockSamples();
   private clocks: ReadonlyMap<string, ClockDifference> = new Map();
-  /** When the newest renewals were sent, by call. */
+  /** Times at which the last renewals were sent, by call. */
   private readonly renewals = new Map<number, Moment>();
   private cpu = process.cpuUsage();
   private cpuAt = performance.now();
@@ -102,12 +103,12 @@ export class MasterSession {
     );
   }
 
-  /** Whether the master has answered at all. */
+  /** True once the master has replied. */
   get isKnown(): boolean {
     return this.epoch !== 0n;
   }
 
-  /** The addresses of this computer at which publishers are to be reached. */
+  /** Return the addresses of this computer at which publishers must be reachable. */
   async hosts(): Promise<string[]> {
     if (isLoopback(this.address)) return [LOOPBACK, ...this.servedHosts];
     this.ownHost = await hostTowards(this.address);
@@ -121,8 +122,8 @@ export class MasterSession {
   /**
    * Register a publisher or server, and bind it at the hosts that the master serves.
    *
-   * @param waitS Seconds to wait for the master; undefined waits until there is one.
-   * @returns the subscribers to expect and those known not to answer.
+   * @param waitS Seconds to wait for the master; undefined waits without a time limit.
+   * @returns the expected subscribers, and those that did not respond recently.
    * @throws {MasterUnreachableError | RequestRefusedError}
    */
   async addPublisher(
@@ -149,7 +150,7 @@ export class MasterSession {
   }
 
   /**
-   * Register a subscriber or client; `connect` is called with the publishers that are there.
+   * Register a subscriber or client; `connect` is called with the registered publishers.
    *
    * @throws {MasterUnreachableError | RequestRefusedError}
    */
@@ -157,7 +158,7 @@ export class MasterSession {
     const registered = { record, owner, isConfirmed: false };
     this.subscribers.set(record.id, registered);
     const request = { do: "subscriber+", node: this.node, subscriber: record } as const;
-    // Connects before the next push is read, which may say that one of these publishers closes.
+    // Connect before the next push is handled, which may report that one of these publishers closed.
     const connect = (found: Answer): void => {
       if (found.is !== "found") return;
       registered.isConfirmed = true;
@@ -166,7 +167,7 @@ export class MasterSession {
     const found = await this.register(() => this.rpc.ask(request, waitS, connect), this.subscribers, record.id);
     if (record.pattern && found.is === "found" && !found.pattern) {
       this.removeSubscriber(record.id);
-      throw new NepError(`The master at ${this.address} is older and knows no wildcards. Start a newer one.`);
+      throw new NepError(`The master at ${this.address} is too old to support wildcards. Start a newer one.`);
     }
   }
 
@@ -188,16 +189,16 @@ export class MasterSession {
     if (this.subscribers.delete(id)) this.rpc.tell({ do: "subscriber-", node_id: this.node.id, id });
   }
 
-  /** Tell the master which subscribers did not answer a new publisher. */
+  /** Report subscribers that did not connect to a new publisher. */
   reportMissing(publisherId: bigint, subscriberIds: readonly bigint[]): void {
     this.rpc.tell({ do: "missing", node_id: this.node.id, publisher_id: publisherId, subscriber_ids: subscriberIds });
   }
 
-  /** Renew once more, so that subscribers learn what was sent last; then leave. Waits at most `timeoutS`. */
+  /** Renew once more, to report the last seqs, and leave. Waits at most `timeoutS` seconds. */
   async leave(timeoutS: number): Promise<void> {
     if (this.isClosed) return;
     clearTimeout(this.timer);
-    this.isClosed = true; // nothing is joined from now on
+    this.isClosed = true; // prevents rejoining
     if (this.isKnown) {
       this.renew();
       try {
@@ -209,7 +210,7 @@ export class MasterSession {
     this.rpc.close();
   }
 
-  // ---- the lease
+  // ---- lease
 
   private schedule(): void {
     if (this.timer || this.isClosed) return;
@@ -267,7 +268,7 @@ export class MasterSession {
     return Math.min(MAX_CPU_RATIO, ratio);
   }
 
-  /** Move publishers when the master serves other addresses, or this computer has another one. */
+  /** Rebind publishers if the addresses served by the master or those of this computer have changed. */
   private async followHosts(): Promise<void> {
     const hosts = await this.hosts();
     if (String(hosts) === this.movedTo || this.isClosed) return;
@@ -280,13 +281,13 @@ export class MasterSession {
         each.record = { ...each.record, endpoints };
         this.rpc.tell({ do: "publisher+", node: this.node, publisher: each.record });
       } catch (error) {
-        this.movedTo = ""; // tried again with the next renewal
-        this.warn(`Can't serve ${String(hosts)}: ${String(error)}`);
+        this.movedTo = ""; // retried at the next renewal
+        this.warn(`Can't bind at ${String(hosts)}: ${String(error)}`);
       }
     }
   }
 
-  // ---- what the master says
+  // ---- replies and pushes
 
   private obey(answer: Answer, call: number): void {
     this.compareClocks(answer, call);
@@ -319,7 +320,7 @@ export class MasterSession {
     if (!sent || answer.is !== "renewed" || answer.epoch !== this.epoch || answer.times.length !== 2) return;
     const wasKnown = this.clock.offset().length > 0;
     const [receivedNs, answeredNs] = answer.times as [bigint, bigint];
-    if (this.clock.add(sent, receivedNs, answeredNs) && !wasKnown) setImmediate(() => this.renew()); // others wait for it
+    if (this.clock.add(sent, receivedNs, answeredNs) && !wasKnown) setImmediate(() => this.renew()); // other nodes need the offset
   }
 
   private correct(clocks: ReadonlyMap<string, ClockDifference>): void {
@@ -350,7 +351,7 @@ export class MasterSession {
     for (const each of this.subscribers.values()) each.owner.tick(answer.lastSeqs);
   }
 
-  /** Register everything again, once at a time. */
+  /** Register the node again with all its publishers and subscribers, unless a join is in progress. */
   private join(): void {
     this.renewS = RENEW_S;
     const now = performance.now();

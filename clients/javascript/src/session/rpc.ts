@@ -11,11 +11,11 @@ interface PendingCall {
 }
 
 /**
- * Requests to the master over one DEALER. A connection that stays silent is replaced by a new one, over which
- * the calls under way are sent again: so nothing piles up while the master is away.
+ * Requests to the master over one DEALER socket. A silent connection is replaced by a new one, over which pending calls
+ * are sent again, so that nothing is queued while there is no master.
  */
 export class RpcClient {
-  /** When the master was last heard, by `performance.now()`. */
+  /** Time of the last message from the master, by `performance.now()`. */
   heardAt = -Infinity;
   private nextCall = 1;
   private readonly pending = new Map<number, PendingCall>();
@@ -39,7 +39,7 @@ export class RpcClient {
     );
   }
 
-  /** Replace the connection and send the calls that wait for an answer again. */
+  /** Replace the connection and resend pending calls. */
   reconnect(): void {
     if (this.isClosed) return;
     this.socket.close();
@@ -47,12 +47,12 @@ export class RpcClient {
     this.resend();
   }
 
-  /** Send the calls that wait for an answer again, which does no harm. */
+  /** Resend pending calls; the master accepts repeated requests. */
   resend(): void {
     for (const [call, each] of this.pending) this.socket.send([encodeRequest(each.request, call)]);
   }
 
-  /** Send a request whose answer only reaches `onAnswer`. Returns the number of the call. */
+  /** Send a request whose reply is passed only to `onAnswer`. Return the number of the call. */
   tell(request: Request): number {
     const call = this.nextCall++;
     if (!this.isClosed) this.socket.send([encodeRequest(request, call)]);
@@ -60,12 +60,12 @@ export class RpcClient {
   }
 
   /**
-   * Send a request and return its answer.
+   * Send a request and return its reply.
    *
-   * @param timeoutS Seconds; undefined waits until the master answers.
-   * @param onReply Called with the answer before anything else that the master says is read.
-   * @throws {MasterUnreachableError} when there was no answer in time.
-   * @throws {RequestRefusedError} when the master refused it.
+   * @param timeoutS Seconds; undefined waits without a time limit.
+   * @param onReply Called with the reply before any later message of the master is handled.
+   * @throws {MasterUnreachableError} if no reply arrived before the timeout.
+   * @throws {RequestRefusedError} if the master rejected the request.
    */
   ask(request: Request, timeoutS?: number, onReply?: (answer: Answer) => void): Promise<Answer> {
     if (this.isClosed) return Promise.reject(new ClosedError("The node is closed."));
@@ -98,7 +98,7 @@ export class RpcClient {
   private read(parts: Buffer[]): void {
     let read: { call: number; answer: Answer };
     try {
-      if (parts.length !== 1) throw new WireError("part-count", `A reply has 1 part, this one has ${parts.length}.`);
+      if (parts.length !== 1) throw new WireError("part-count", `A reply has one part, this one has ${parts.length}.`);
       read = decodeAnswer(parts[0]!);
     } catch (error) {
       if (!(error instanceof WireError)) throw error;

@@ -8,16 +8,16 @@ interface Bindable {
   unbind(endpoint: string): Promise<void>;
 }
 
-/** Where a socket is bound: at each host with a port of its own, none of the original NEP's. */
+/** Addresses at which a socket is bound, each with its own port; avoids the ports of the original NEP. */
 export class Bindings {
   private readonly bound = new Map<string, string>();
   private moving: Promise<unknown> = Promise.resolve();
 
   constructor(private readonly socket: Bindable) {}
 
-  /** Be bound at these hosts and no others. Returns the endpoints, in the order of the hosts. */
+  /** Bind at exactly these hosts. Resolves to the endpoints in the order of the hosts. */
   move(hosts: readonly string[]): Promise<string[]> {
-    const moved = this.moving.then(() => this.bindAt(hosts)); // one after the other
+    const moved = this.moving.then(() => this.bindAt(hosts)); // sequentially
     this.moving = moved.catch(() => undefined);
     return moved;
   }
@@ -38,6 +38,6 @@ export class Bindings {
       if (isFreePort(Number(endpoint.slice(endpoint.lastIndexOf(":") + 1)))) return endpoint;
       await this.socket.unbind(endpoint);
     }
-    throw new NepError(`No free port at ${host}.`);
+    throw new NepError(`No free port was found at ${host}.`);
   }
 }

@@ -1,9 +1,9 @@
 /**
- * The only module that uses zeromq.js: the sockets of the wire behind one narrow interface.
+ * The only module that uses zeromq.js: wrappers of the sockets that the wire needs.
  *
- * zeromq.js 6 refuses a second `send` while one is under way (EBUSY; zeromq.js #381, #406, #427), so each
+ * zeromq.js 6 rejects a second `send` while one is in progress (EBUSY; zeromq.js #381, #406, #427), so each
  * socket has its own send queue. A pending `receive` keeps a Node.js process alive; a `Reader` therefore polls
- * with an unreferenced timer while its owner needs nothing.
+ * with an unreferenced timer while its owner doesn't need the process to stay alive.
  */
 import { Dealer, Router, Subscriber, XPublisher } from "zeromq";
 
@@ -11,27 +11,27 @@ const ZMQ_SNDHWM = 23;
 const HELD_RECEIVE_MS = 1000;
 const BRIEF_RECEIVE_MS = 20;
 const POLL_MS = 10;
-const MAX_UNREAD_CALLS = 100; // of each client, in libzmq; more wait there
+const MAX_UNREAD_CALLS = 100; // per client, in the server's libzmq; further calls stay in the client's queue
 const LOOK_INTERVAL_MS = 0.5;
 const RECONNECT_MS = 2000;
-const MAX_TURN_MS = 10; // then timers run: renewals of the lease above all
+const MAX_TURN_MS = 10; // maximum time for consecutive messages, after which timers run, such as lease renewals
 
 const immediate = (): Promise<void> => new Promise((resolve) => setImmediate(resolve));
 
 type ReadableSocket = Dealer | Router | Subscriber | XPublisher;
 type WritableSocket = Dealer | Router | XPublisher;
 
-/** A part of a message to send; a string is sent as UTF-8. */
+/** Part of a message to send; strings are sent as UTF-8. */
 export type Part = Buffer | string;
 
-/** How long a {@link Reader} may keep the process alive: not at all, for a moment, or until it is closed. */
+/** How long a {@link Reader} keeps the process alive: not at all, briefly, or until it is closed. */
 export type Hold = "none" | "brief" | "long";
 
-/** Reads a socket until it is closed and hands each multipart message to `onParts`. */
+/** Reads a socket until it is closed and passes each multipart message to `onParts`. */
 class Reader {
   private isClosed = false;
   private isReading = false;
-  /** What the socket's receive timeout is set for. */
+  /** Value of `hold` for which the socket's receive timeout is set. */
   private timedFor: Hold | undefined;
   private timer: NodeJS.Timeout | undefined;
 
@@ -43,7 +43,7 @@ class Reader {
     this.wake();
   }
 
-  /** Read now; call it when `hold` may have changed to a longer one. */
+  /** Read now. Call it when `hold` may return a longer time than before. */
   wake(): void {
     if (this.isClosed || this.isReading) return;
     clearTimeout(this.timer);
@@ -91,10 +91,10 @@ class Reader {
   }
 }
 
-/** Sends in order; whatever zeromq.js can't take yet waits in `queue`. */
+/** Sends messages in order; `queue` holds those that zeromq.js can't accept yet. */
 class Sender<T> {
   private readonly queue: T[] = [];
-  /** Parts that zeromq.js refused because another send is under way. */
+  /** Parts that zeromq.js rejected because another send is in progress. */
   private unsent: Part[] | undefined;
   private last: Promise<void> = Promise.resolve();
   private isInFlight = false;
@@ -105,9 +105,9 @@ class Sender<T> {
 
   constructor(
     private readonly socket: WritableSocket,
-    /** Takes entries from the queue, oldest first, and returns the parts of the next message. */
+    /** Remove entries from the queue, oldest first, and return the parts of the next message. */
     private readonly take: (queue: T[]) => Part[],
-    /** Whether input must be read before the next message is taken. */
+    /** Return true if input must be read before the next message is sent. */
     private readonly mustRead: () => boolean = () => false,
   ) {}
 
@@ -120,7 +120,7 @@ class Sender<T> {
     if (!this.waiting) this.pump();
   }
 
-  /** Resolves when everything is handed to libzmq. */
+  /** Resolves when all messages have been passed to libzmq. */
   async flush(): Promise<void> {
     while (this.waiting) await this.waiting;
     await this.last;
@@ -135,7 +135,7 @@ class Sender<T> {
       const parts = this.unsent ?? this.take(this.queue);
       if (!this.trySend(parts)) {
         this.unsent = parts;
-        // EBUSY without a send under way: the socket is being bound.
+        // EBUSY without a send in progress: the socket is being bound.
         this.pumpAfter(this.isInFlight ? this.last : immediate());
         return;
       }
@@ -152,7 +152,7 @@ class Sender<T> {
 
   private trySend(parts: Part[]): boolean {
     try {
-      // A ROUTER's EHOSTUNREACH, and a socket that is being closed: there is no peer any more.
+      // Rejections are ignored: EHOSTUNREACH of a ROUTER, or the socket is being closed.
       this.isInFlight = true;
       this.last = (this.socket as XPublisher).send(parts).then(this.onSent, this.onSent);
       return true;
@@ -166,14 +166,14 @@ class Sender<T> {
 
 const firstEntry = (queue: Buffer[][]): Buffer[] => queue.shift()!;
 
-/** Gets to know when a connection begins and ends. */
+/** Observer of the start and end of a connection. */
 export interface ConnectionWatcher {
   onOpen(): void;
-  /** Also called when the handshake failed; then `onOpen` was not. */
+  /** Also called after a failed handshake, without a previous `onOpen`. */
   onEnd(): void;
 }
 
-/** The node's connection to the master, or a client's to a server: a DEALER. */
+/** DEALER socket: connection of a node to the master, or of a client to a server. */
 export class DealerSocket {
   private readonly socket = new Dealer({ linger: 0 });
   private readonly sender = new Sender<Buffer[]>(this.socket, firstEntry);
@@ -197,7 +197,7 @@ export class DealerSocket {
     this.reader.wake();
   }
 
-  /** Resolves when everything is handed to libzmq. */
+  /** Resolves when all messages have been passed to libzmq. */
   flush(): Promise<void> {
     return this.sender.flush();
   }
@@ -208,7 +208,7 @@ export class DealerSocket {
   }
 }
 
-/** A server's socket: a ROUTER. */
+/** ROUTER socket of a server. */
 export class RouterSocket {
   private readonly socket: Router;
   private readonly sender: Sender<Buffer[]>;
@@ -246,7 +246,7 @@ export class RouterSocket {
   }
 }
 
-/** A subscriber's socket: a SUB that connects. */
+/** SUB socket of a subscriber. */
 export class SubSocket {
   private readonly socket: Subscriber;
   private reader: Reader | undefined;
@@ -254,7 +254,7 @@ export class SubSocket {
   /** @param receiveMark High-water mark in messages. */
   constructor(receiveMark: number) {
     this.socket = new Subscriber({ linger: 0, receiveHighWaterMark: receiveMark });
-    // zeromq.js has no name for it; libzmq silently drops filters beyond 1000 otherwise.
+    // zeromq.js has no property for this option; otherwise libzmq silently drops filters beyond 1000.
     (this.socket as unknown as { setInt32Option(option: number, value: number): void }).setInt32Option(ZMQ_SNDHWM, 0);
   }
 
@@ -266,7 +266,7 @@ export class SubSocket {
     this.reader?.wake();
   }
 
-  /** Whether input is pending. */
+  /** True if input is pending. */
   get hasInput(): boolean {
     return !this.socket.closed && this.socket.readable;
   }
@@ -275,7 +275,7 @@ export class SubSocket {
     this.socket.subscribe(filter);
   }
 
-  /** Send a notice to all publishers: subscribe to a filter and unsubscribe at once. */
+  /** Send a notice to all publishers by subscribing to a filter and unsubscribing at once. */
   say(filter: Buffer): void {
     if (this.socket.closed) return;
     this.socket.subscribe(filter);
@@ -286,7 +286,7 @@ export class SubSocket {
     this.socket.connect(endpoint);
   }
 
-  /** Connect to a program that no master lists, also after its address had a socket of another kind. */
+  /** Connect without a master; reconnects if a socket of another type was bound at the address before. */
   connectWatched(endpoint: string): void {
     let timer: NodeJS.Timeout | undefined;
     const reconnect = (): void => {
@@ -294,7 +294,7 @@ export class SubSocket {
       this.disconnect(endpoint);
       this.connect(endpoint);
     };
-    // libzmq connects again after every end, unless the handshake has failed.
+    // libzmq reconnects after each disconnection, except after a failed handshake.
     this.socket.events.on("disconnect", () => {
       clearTimeout(timer);
       timer = setTimeout(reconnect, RECONNECT_MS).unref();
@@ -311,7 +311,7 @@ export class SubSocket {
     try {
       if (!this.socket.closed) this.socket.disconnect(endpoint);
     } catch (error) {
-      if ((error as NodeJS.ErrnoException).code !== "ENOENT") throw error; // the peer has gone already
+      if ((error as NodeJS.ErrnoException).code !== "ENOENT") throw error; // the peer has already disconnected
     }
   }
 
@@ -321,7 +321,7 @@ export class SubSocket {
   }
 }
 
-/** A publisher's socket: an XPUB that binds and sees each subscription. */
+/** XPUB socket of a publisher, which reports each subscription. */
 export class XpubSocket<T> {
   private readonly socket: XPublisher;
   private readonly sender: Sender<T>;
@@ -330,9 +330,9 @@ export class XpubSocket<T> {
 
   /**
    * @param sendMark High-water mark in messages for each connection.
-   * @param maxSubscriptionBytes Peers that subscribe to more are disconnected.
-   * @param take Takes queued entries, oldest first, and returns the parts of the next message.
-   * @param verbosity Which equal subscriptions are seen: those that come, or also those that go.
+   * @param maxSubscriptionBytes Peers that send a longer subscription are disconnected.
+   * @param take Removes queued entries, oldest first, and returns the parts of the next message.
+   * @param verbosity Which duplicate subscriptions are reported: additions only, or also removals.
    */
   constructor(
     sendMark: number,
@@ -345,7 +345,7 @@ export class XpubSocket<T> {
     this.sender = new Sender<T>(this.socket, take, () => this.hasSubscriptions());
   }
 
-  /** Whether subscriptions wait to be read, which decide about the form of the next message. */
+  /** Return true if subscriptions are pending, which determine the form of the next message. */
   private hasSubscriptions(): boolean {
     const now = performance.now();
     if (now < this.lookedAt + LOOK_INTERVAL_MS) return false;
@@ -359,7 +359,7 @@ export class XpubSocket<T> {
     return this.socket.closed;
   }
 
-  /** Number of entries that libzmq has not taken yet. */
+  /** Number of entries that have not been passed to libzmq yet. */
   get queueLength(): number {
     return this.sender.length;
   }
@@ -388,12 +388,12 @@ export class XpubSocket<T> {
     if (!this.socket.closed) this.sender.send(entry);
   }
 
-  /** Resolves when everything is handed to libzmq. */
+  /** Resolves when all messages have been passed to libzmq. */
   flush(): Promise<void> {
     return this.sender.flush();
   }
 
-  /** Close. What libzmq still holds is sent for at most `lingerMs`. */
+  /** Close; libzmq sends queued messages for at most `lingerMs`. */
   close(lingerMs = 0): void {
     this.reader?.close();
     if (this.socket.closed) return;

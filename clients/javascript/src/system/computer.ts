@@ -6,7 +6,7 @@ import { hostname } from "node:os";
 const REGISTRY_KEY = "HKLM\\SOFTWARE\\Microsoft\\Cryptography";
 let known: string | undefined;
 
-/** Return 16 hexadecimal digits: the same in programs of one running system, others elsewhere; "" if unknown. */
+/** Return an id of the running system, 16 hexadecimal digits, equal for all of its programs; "" if unknown. */
 export function computerId(): string {
   known ??= digitsOf(clockName());
   return known;
@@ -16,7 +16,7 @@ function digitsOf(name: string): string {
   return name && createHash("sha256").update(`nep clock ${name}`, "utf8").digest("hex").slice(0, 16);
 }
 
-/** What the system calls itself, as in nep for Python; "" if it doesn't say. */
+/** Return a name of the running system, as nep for Python does; "" if unknown. */
 function clockName(): string {
   try {
     switch (process.platform) {

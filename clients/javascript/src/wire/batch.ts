@@ -3,17 +3,17 @@ import { Flag, HEADER_BYTES, type Header, writeHeader } from "./header.js";
 
 export const MAX_BATCH = 256;
 
-/** One message of a batch. */
+/** Message of a batch. */
 export interface BatchEntry {
   readonly stampNs: bigint;
   readonly payload: Buffer;
 }
 
 /**
- * Return several messages of one publisher as one part.
+ * Encode several messages of one publisher as one part.
  *
  * @param topic The topic part.
- * @param first Codec, publisher and seq of the first message; the others count on from it.
+ * @param first Codec, publisher and seq of the first message; the others have consecutive seqs.
  * @param entries 1 to 256 messages.
  */
 export function packBatch(
@@ -34,7 +34,7 @@ export function packBatch(
   return part;
 }
 
-/** Read the messages in what follows the header of a batch. @throws {WireError} */
+/** Decode the messages after the header of a batch. @throws {WireError} */
 export function readBatchBody(body: Buffer): BatchEntry[] {
   const count = body.length >= 4 ? body.readUInt32LE(0) : 0;
   if (count < 1 || count > MAX_BATCH) {
@@ -51,7 +51,7 @@ export function readBatchBody(body: Buffer): BatchEntry[] {
     at = end;
   }
   if (entries.length !== count || at !== body.length) {
-    throw new WireError("batch-sizes", "The messages of the batch have other sizes than its table says.");
+    throw new WireError("batch-sizes", "The sizes of the batch's messages don't match its table.");
   }
   return entries;
 }

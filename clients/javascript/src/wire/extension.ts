@@ -1,2 +1,2 @@
-/** Named values that travel beside a payload, such as an image's shape. */
+/** Named values sent with a payload, such as the shape of an image. */
 export type Extension = Readonly<Record<string, unknown>>;

@@ -6,17 +6,17 @@ export const MAX_SIZE = 2 ** 32 - 1;
 
 /** Bits of {@link Header.flags}. */
 export const Flag = {
-  /** The publisher keeps this message and sends it to late subscribers. */
+  /** The publisher keeps the message for late subscribers. */
   LATCHED: 1,
   /** A fourth part follows: a msgpack map. */
   EXTENSION: 2,
-  /** Of notices: the publisher closes and has sent everything. */
+  /** In notices: the publisher is closing and sends no more messages. */
   BYE: 4,
-  /** The part holds several messages. */
+  /** The part contains several messages. */
   BATCH: 8,
-  /** The payload lies in shared memory. */
+  /** The payload is in shared memory. */
   SHARED: 16,
-  /** Of notices: payloads may lie in shared memory. */
+  /** In notices: the publisher offers shared memory. */
   OFFER: 32,
 } as const;
 
@@ -24,9 +24,9 @@ export const Flag = {
 export interface Header {
   readonly codec: number;
   readonly flags: number;
-  /** Counts the publisher's messages from 1. */
+  /** Sequence number, counted from 1 by the publisher. */
   readonly seq: bigint;
-  /** The publisher's clock, nanoseconds since 1970. */
+  /** Time by the publisher's clock, in nanoseconds since 1970. */
   readonly stampNs: bigint;
   /** The publisher's id. */
   readonly publisher: bigint;
@@ -34,11 +34,11 @@ export interface Header {
   readonly size: number;
 }
 
-// Buffer's methods for 64-bit numbers go byte by byte through several bigints; DataView's compile to one store or load.
+// Buffer's methods for 64-bit numbers process single bytes with bigints; DataView's compile to one load or store.
 const scratch = new Uint8Array(HEADER_BYTES);
 const scratchView = new DataView(scratch.buffer);
 
-/** Write a header into `buffer` at `offset`. A size beyond 32 bits is written as 0 ("unknown"). */
+/** Write a header to `buffer` at `offset`. A size beyond 32 bits is written as 0 (unknown). */
 export function writeHeader(buffer: Buffer, offset: number, header: Header): void {
   scratch[0] = VERSION;
   scratch[1] = header.codec;
@@ -57,7 +57,7 @@ export function packHeader(header: Header): Buffer {
   return packed;
 }
 
-/** Read a header from its part. @throws {WireError} `header-size`, or `version` for another version than ours. */
+/** Read a header from its part. @throws {WireError} `header-size`, or `version` for an unsupported version. */
 export function readHeaderPart(part: Buffer): Header {
   if (part.length !== HEADER_BYTES) {
     throw new WireError("header-size", `A header has ${HEADER_BYTES} bytes, this one has ${part.length}.`);
@@ -66,13 +66,13 @@ export function readHeaderPart(part: Buffer): Header {
   if (version !== VERSION) {
     throw new WireError(
       "version",
-      `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`,
+      `The message has version ${version}; this nep-js supports version ${VERSION}. Update nep-js.`,
     );
   }
   return readHeaderAt(part, 0);
 }
 
-/** Read the header at `offset`, whose size and version were checked. */
+/** Read the header at `offset`; the caller has checked its size and version. */
 export function readHeaderAt(part: Buffer, offset: number): Header {
   for (let index = 0; index < HEADER_BYTES; index++) scratch[index] = part[offset + index]!;
   return {

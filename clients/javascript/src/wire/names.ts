@@ -11,36 +11,36 @@ function hasAllowedSize(name: string): boolean {
 }
 
 /**
- * Return `topic` if the wire allows it: 1 to 200 bytes of UTF-8 without white space, control characters and `{`.
+ * Return `topic` if it is valid: 1 to 200 bytes of UTF-8 without white space, control characters and `{`.
  *
- * @throws {BadTopicError} with the reason.
+ * @throws {BadTopicError} if it is invalid; the message contains the reason.
  */
 export function checkTopic(topic: string): string {
-  if (typeof topic !== "string") throw new BadTopicError("A topic is a string.");
+  if (typeof topic !== "string") throw new BadTopicError("A topic must be a string.");
   if (!hasAllowedSize(topic)) {
-    throw new BadTopicError(`"${shortened(topic)}" is no topic: 1 to ${MAX_NAME_BYTES} bytes are allowed.`);
+    throw new BadTopicError(`Invalid topic "${shortened(topic)}": it must have 1 to ${MAX_NAME_BYTES} bytes.`);
   }
   const found = NOT_IN_TOPIC.exec(topic) ?? CONTROL.exec(topic);
   if (found) {
-    throw new BadTopicError(`"${shortened(topic)}" is no topic: the character ${escaped(found[0])} is not allowed.`);
+    throw new BadTopicError(`Invalid topic "${shortened(topic)}": the character ${escaped(found[0])} is not allowed.`);
   }
   return topic;
 }
 
 /**
- * Return `name` if a node may have it: 1 to 200 bytes of UTF-8 without control characters.
+ * Return `name` if it is a valid node name: 1 to 200 bytes of UTF-8 without control characters.
  *
- * @throws {BadNameError} with the reason.
+ * @throws {BadNameError} if it is invalid; the message contains the reason.
  */
 export function checkNodeName(name: string): string {
-  if (typeof name !== "string") throw new BadNameError("A node name is a string.");
+  if (typeof name !== "string") throw new BadNameError("A node name must be a string.");
   if (!hasAllowedSize(name)) {
-    throw new BadNameError(`"${shortened(name)}" is no node name: 1 to ${MAX_NAME_BYTES} bytes are allowed.`);
+    throw new BadNameError(`Invalid node name "${shortened(name)}": it must have 1 to ${MAX_NAME_BYTES} bytes.`);
   }
   const found = CONTROL.exec(name);
   if (found) {
     throw new BadNameError(
-      `"${shortened(name)}" is no node name: the character ${escaped(found[0])} is not allowed.`,
+      `Invalid node name "${shortened(name)}": the character ${escaped(found[0])} is not allowed.`,
     );
   }
   return name;

@@ -1,23 +1,23 @@
 import { decodeUtf8 } from "./utf8.js";
 
-/** What a hello filter says: who subscribes to what, and which forms of messages it reads. */
+/** Content of a hello filter: the subscriber, its topic and the message forms that it reads. */
 export interface Hello {
   readonly subscriber: bigint;
   readonly topic: string;
-  /** 0 three parts only, 1 also one part, 2 also answers echoes, 3 also reads batches. */
+  /** 0: three parts only; 1: also one part; 2: also acknowledges messages; 3: also reads batches. */
   readonly level: 0 | 1 | 2 | 3;
 }
 
-/** A subscriber has read everything of a publisher up to `seq`. */
+/** Acknowledgement: the subscriber has read all messages of a publisher up to `seq`. */
 export interface Read {
   readonly subscriber: bigint;
   readonly publisher: bigint;
   readonly seq: bigint;
-  /** How many bytes it wants under way at most. */
+  /** Maximum number of bytes in flight that the subscriber accepts. */
   readonly boundBytes: bigint;
 }
 
-/** A subscriber reads a publisher's shared memory of this generation. */
+/** Acceptance of a publisher's offer of shared memory. */
 export interface Shares {
   readonly subscriber: bigint;
   readonly publisher: bigint;
@@ -36,12 +36,12 @@ function prefixed(text: string): Buffer {
   return Buffer.concat([Buffer.from([0xff]), Buffer.from(text, "utf8")]);
 }
 
-/** Return the filter by which a subscriber says hello: also the first part of what is sent to it alone. */
+/** Return the hello filter of a subscriber, which is also the first part of messages sent to it alone. */
 export function helloPart(hello: Hello): Buffer {
   return prefixed(`hello${hello.level || ""}/${hex(hello.subscriber)}/${hello.topic}`);
 }
 
-/** Parse a hello filter; undefined for anything else. */
+/** Parse a hello filter; return undefined for other filters. */
 export function parseHello(part: Buffer): Hello | undefined {
   const match = HELLO.exec(part.toString("latin1", 0, 32));
   if (!match) return undefined;
@@ -53,12 +53,12 @@ export function parseHello(part: Buffer): Hello | undefined {
   }
 }
 
-/** Return the filter that answers an echo. */
+/** Return the filter that acknowledges messages. */
 export function readPart(read: Read): Buffer {
   return prefixed(`read/${[read.subscriber, read.publisher, read.seq, read.boundBytes].map(hex).join("/")}`);
 }
 
-/** Parse the answer to an echo; undefined for anything else. */
+/** Parse an acknowledgement; return undefined for other filters. */
 export function parseRead(part: Buffer): Read | undefined {
   const numbers = parseNumbers(READ, part);
   if (!numbers) return undefined;
@@ -66,12 +66,12 @@ export function parseRead(part: Buffer): Read | undefined {
   return { subscriber: subscriber!, publisher: publisher!, seq: seq!, boundBytes: boundBytes! };
 }
 
-/** Return the filter that answers an offer of shared memory. */
+/** Return the filter that accepts an offer of shared memory. */
 export function sharesPart(shares: Shares): Buffer {
   return prefixed(`shares/${[shares.subscriber, shares.publisher, shares.generation].map(hex).join("/")}`);
 }
 
-/** Parse the answer to an offer; undefined for anything else. */
+/** Parse the acceptance of an offer; return undefined for other filters. */
 export function parseShares(part: Buffer): Shares | undefined {
   const numbers = parseNumbers(SHARES, part);
   if (!numbers) return undefined;

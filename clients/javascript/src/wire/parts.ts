@@ -19,48 +19,48 @@ import { checkTopic } from "./names.js";
 
 export const NO_EXTENSION: Extension = Object.freeze({});
 
-/** A message as read from its parts. */
+/** Decoded message. */
 export interface WireMessage {
   readonly header: Header;
   readonly payload: Buffer;
   readonly extension: Extension;
 }
 
-/** First part of a topic's messages and the filter of its subscribers: the name and a zero byte. */
+/** Return the topic part, which is also the filter of subscribers: the name and a zero byte. */
 export function topicPart(topic: string): Buffer {
   return Buffer.from(`${topic}\0`, "utf8");
 }
 
-/** Encode the fourth part of a message. @throws {WireError} `extension` for a value without a msgpack form. */
+/** Encode the fourth part of a message. @throws {WireError} `extension` for a value that msgpack doesn't support. */
 export function packExtension(extension: Extension): Buffer {
   try {
     return pack(extension);
   } catch (error) {
-    throw new WireError("extension", `The extension can't be packed: ${String(error)}`);
+    throw new WireError("extension", `The extension can't be encoded: ${String(error)}`);
   }
 }
 
-/** Read the fourth part of a message. @throws {WireError} `extension` */
+/** Decode the fourth part of a message. @throws {WireError} `extension` */
 export function readExtension(part: Buffer): Extension {
   let value: unknown;
   try {
     value = unpackWithTextKeys(part);
   } catch (error) {
-    throw new WireError("extension", `The extension is no msgpack with text keys: ${String(error)}`);
+    throw new WireError("extension", `The extension is not msgpack with text keys: ${String(error)}`);
   }
-  if (!isMap(value)) throw new WireError("extension", "The extension is no map.");
+  if (!isMap(value)) throw new WireError("extension", "The extension is not a map.");
   if (isTooDeep(value)) throw new WireError("extension", "The extension is nested too deeply.");
   return value;
 }
 
-/** Return the parts of a message; sets the flag EXTENSION if there is an extension. */
+/** Return the parts of a message, with the flag EXTENSION if there is an extension. */
 export function joinParts(topic: string, header: Header, payload: Buffer, extension?: Extension): Buffer[] {
   if (!extension || Object.keys(extension).length === 0) return [topicPart(topic), packHeader(header), payload];
   const flagged = { ...header, flags: header.flags | Flag.EXTENSION };
   return [topicPart(topic), packHeader(flagged), payload, packExtension(extension)];
 }
 
-/** Return a message in one part. */
+/** Encode a message as one part. */
 export function onePart(topic: Buffer, header: Header, payload: Buffer): Buffer {
   const part = Buffer.allocUnsafe(topic.length + HEADER_BYTES + payload.length);
   topic.copy(part, 0);
@@ -70,8 +70,8 @@ export function onePart(topic: Buffer, header: Header, payload: Buffer): Buffer 
 }
 
 /**
- * Read one message in one part without slicing it into three; undefined for whatever is not the plain case, which
- * {@link splitParts} and {@link readRest} then read or refuse.
+ * Fast path for a message in one part that is not split into three. Return undefined in all other cases, which
+ * {@link splitParts} and {@link readRest} decode or reject.
  *
  * @param topic The topic part.
  */
@@ -102,24 +102,24 @@ export function splitParts(parts: readonly Buffer[]): { first: Buffer; rest: rea
 }
 
 /**
- * Read what follows the first part: one message, or those of a batch.
+ * Decode the parts after the first one: one message, or those of a batch.
  *
- * @param isOnePart Whether all came in one part, as batches do.
- * @throws {WireError} for everything that docs/wire.md does not allow, in its order of checks.
+ * @param isOnePart True if the message had one part, as batches have.
+ * @throws {WireError} if docs/wire.md doesn't allow the message, in its order of checks.
  */
 export function readRest(rest: readonly Buffer[], isOnePart: boolean): WireMessage[] {
   const [head, payload, packed] = rest;
   const header = readHeaderPart(head!);
   const expected = header.flags & Flag.EXTENSION ? 3 : 2;
   if (rest.length !== expected || !payload) {
-    throw new WireError("part-count", `The message has ${rest.length + 1} parts, its flags ask for ${expected + 1}.`);
+    throw new WireError("part-count", `The message has ${rest.length + 1} parts, but its flags require ${expected + 1}.`);
   }
   const found =
     header.flags & Flag.BATCH ? readBatch(header, payload, isOnePart) : [readOne(header, payload, packed)];
   if (!codecNumbered(header.codec)) {
     throw new WireError(
       "codec",
-      `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`,
+      `The message has codec ${header.codec}, which this nep-js doesn't support. Update nep-js.`,
     );
   }
   return found;
@@ -127,16 +127,16 @@ export function readRest(rest: readonly Buffer[], isOnePart: boolean): WireMessa
 
 function readOne(header: Header, payload: Buffer, packed: Buffer | undefined): WireMessage {
   if (header.size !== 0 && header.size !== payload.length) {
-    throw new WireError("payload-size", `The header says ${header.size} bytes, the payload has ${payload.length}.`);
+    throw new WireError("payload-size", `The header declares ${header.size} bytes, the payload has ${payload.length}.`);
   }
   return { header, payload, extension: packed ? readExtension(packed) : NO_EXTENSION };
 }
 
 function readBatch(header: Header, body: Buffer, isOnePart: boolean): WireMessage[] {
   if (!isOnePart || header.flags !== Flag.BATCH)
-    throw new WireError("batch-form", "A batch is one part and has no other flags.");
+    throw new WireError("batch-form", "A batch must have one part and no other flags.");
   if (header.size !== body.length) {
-    throw new WireError("payload-size", `The header says ${header.size} bytes, the batch has ${body.length}.`);
+    throw new WireError("payload-size", `The header declares ${header.size} bytes, the batch has ${body.length}.`);
   }
   return readBatchBody(body).map(({ stampNs, payload }, index) => ({
     header: { ...header, flags: 0, seq: header.seq + BigInt(index), stampNs, size: payload.length },
@@ -145,7 +145,7 @@ function readBatch(header: Header, body: Buffer, isOnePart: boolean): WireMessag
   }));
 }
 
-/** Read the messages in `parts` and their topic. @throws {WireError} for everything that docs/wire.md does not allow. */
+/** Decode the messages in `parts` and their topic. @throws {WireError} if docs/wire.md doesn't allow them. */
 export function readParts(parts: readonly Buffer[]): { topic: string; messages: WireMessage[] } {
   const { first, rest } = splitParts(parts);
   return { topic: readTopicPart(first), messages: readRest(rest, parts.length === 1) };

@@ -1,11 +1,11 @@
-/** Whether a level of the topic is a wildcard: `*` for one level, `**` for any number of levels. */
+/** Return true if a level of the topic is a wildcard: `*` for one level, `**` for any number of levels. */
 export function isPattern(topic: string): boolean {
   return topic.split("/").some((level) => level === "*" || level === "**");
 }
 
 /**
- * Whether a topic matches a pattern. A `*` stands for one level that is not empty, `**` for any number of
- * levels or none; all else is compared. Takes no longer than both have levels, multiplied.
+ * Return true if a topic matches a pattern. `*` matches one nonempty level, `**` any number of levels including none;
+ * other levels are compared. The running time is at most proportional to the product of the numbers of levels.
  */
 export function matchesPattern(pattern: string, topic: string): boolean {
   const parts = pattern.split("/");

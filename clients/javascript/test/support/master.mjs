@@ -1,7 +1,7 @@
-// Tests with a master, which tests/clients/test_javascript.py starts; they are skipped without NEP_MASTER.
+// Options of tests that need a master, which tests/clients/test_javascript.py starts; skipped without NEP_MASTER.
 import { Node } from "../../dist/index.mjs";
 
-/** Options of tests that need a master: without one they are skipped, and none waits for ever. */
+/** Options of tests that need a master: skipped without one, with a time limit. */
 export const hasMaster = {
   skip: process.env.NEP_MASTER ? false : 'needs a master: start one with "nep master" and set NEP_MASTER to its address',
   timeout: 60_000,
@@ -9,6 +9,6 @@ export const hasMaster = {
 
 if (process.env.NEP_MASTER) {
   const node = new Node("asking");
-  await node.publisher("asking"); // fails if none answers
+  await node.publisher("asking"); // fails if no master replies
   await node.close();
 }

@@ -26,7 +26,7 @@ from nep.errors import DecodeError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import CallKind, Reply
 
-_HEAD_BYTES, _CDR_BYTES = 20, 4
+_CDR_AND_CALL_ID_BYTES, _CDR_HEADER_BYTES = 20, 4
 _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILURE_HEADER = struct.Struct("<QqB")
 _BATCH_SIZE = 256
@@ -74,7 +74,7 @@ class ServiceChannel:
         kind: Service type.
         entry_id: Id of the server or client.
         guid: Client id in the calls of a client; None for a server.
-        on_part: Called with each received request or response, in the participant's thread.
+        on_sample: Called with each received request or response, in the participant's thread.
         on_failure: Called with each received error, in the participant's thread.
     """
 
@@ -83,27 +83,27 @@ class ServiceChannel:
         participant: Participant,
         node_id: str,
         service: str,
-        kind: TypedService,
+        service_type: TypedService,
         entry_id: int,
         *,
         guid: int | None = None,
-        on_part: Callable[[ReceivedSample], None],
+        on_sample: Callable[[ReceivedSample], None],
         on_failure: Callable[[CallId, Reply], None] | None = None,
     ) -> None:
-        self.kind = kind
+        self.service_type = service_type
         self.participant = participant
         self.is_closed = False
         self.node_id = node_id
-        self._on_part = on_part
+        self._on_sample = on_sample
         self._on_failure = on_failure
         self._is_server = is_server = guid is None
         self._guid = guid
-        self._ready: frozenset[bytes] = frozenset()
+        self._ready_servers: frozenset[bytes] = frozenset()
         self._ready_handles: tuple[int, ...] = ()
-        self._is_all_ready = False
+        self._has_only_ready_servers = False
         self._known_writers: dict[int, DdsEndpoint] = {}
-        self._first_seen: dict[bytes, float] = {}
-        rq, rr = dds_service(service)
+        self._first_seen_times: dict[bytes, float] = {}
+        request_topic, response_topic = dds_service(service)
         types = participant.types
         pair_id = ".".join(f"{each:x}" for each in secrets.token_bytes(16))
         self._user_data = {
@@ -111,9 +111,13 @@ class ServiceChannel:
             "nepnode": node_id,
             "nepid": f"{entry_id:x}",
         }
-        request, response = request_type_of(kind.name), response_type_of(kind.name)
-        self._topics = ((rr, response), (rq, request)) if is_server else ((rq, request), (rr, response))
-        self._hashes = {name: types.type_hash(name) for name in (request, response)}
+        request_type, response_type = request_type_of(service_type.name), response_type_of(service_type.name)
+        self._topics = (
+            ((response_topic, response_type), (request_topic, request_type))
+            if is_server
+            else ((request_topic, request_type), (response_topic, response_type))
+        )
+        self._hashes = {name: types.type_hash(name) for name in (request_type, response_type)}
         self._readers: list[Any] = []
         self._writers: list[Any] = []
         with participant.changed:
@@ -121,13 +125,13 @@ class ServiceChannel:
             self._sample_class = participant.topics.service_class(out_type)
             self._add_writer(participant.topics.service_topic(out_topic, out_type), out_type)
             self._add_reader(participant.topics.service_topic(in_topic, in_type), in_type, self._read)
-            if not kind.is_nep:
-                self._add_failure_topic(rq)
+            if not service_type.is_nep:
+                self._add_failure_topic(request_topic)
 
     # ---- owned objects; call with the participant's lock held
 
-    def _add_failure_topic(self, rq: str) -> None:
-        name = f"nep_failures/{rq.removeprefix('rq/')}"
+    def _add_failure_topic(self, request_topic: str) -> None:
+        name = f"nep_failures/{request_topic.removeprefix('rq/')}"
         topic = self.participant.topics.topic(name, _FAILURE_TYPE)
         self._failure_class = self.participant.topics.sample_class(_FAILURE_TYPE)
         if self._is_server:
@@ -162,22 +166,25 @@ class ServiceChannel:
         reader = participant.dds.sub.DataReader(participant.entity, topic, self._qos(ros_type))
         self._readers.append(reader)
         participant.assign(self.node_id, "reader", reader)
-        ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
-        participant.watch(reader, ready, lambda: read(reader, ready))
+        condition = core.ReadCondition(
+            reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any
+        )
+        participant.watch(reader, condition, lambda: read(reader, condition))
 
     # ---- receiving, in the participant's thread, with its lock held
 
-    def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        while samples := reader.take(_BATCH_SIZE, ready):
+    def _read(self, reader: Any, condition: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        while samples := reader.take(_BATCH_SIZE, condition):
             for sample in samples:
                 cdr = getattr(sample, "cdr", None)
-                if cdr is None or len(cdr) < _CDR_BYTES + 16 or cdr[0] != 0 or cdr[1] > 1:
+                if cdr is None or len(cdr) < _CDR_HEADER_BYTES + 16 or cdr[0] != 0 or cdr[1] > 1:
                     continue  # a disposed writer, or not CDR
-                guid, number = struct.unpack_from(f"{'<' if cdr[1] else '>'}Qq", cdr, _CDR_BYTES)
+                guid, number = struct.unpack_from(f"{'<' if cdr[1] else '>'}Qq", cdr, _CDR_HEADER_BYTES)
                 call = CallId(guid, number)
                 if self._is_own_call(call):
                     writer = self._writer_of(reader, sample.sample_info.publication_handle)
-                    self._on_part(ReceivedSample(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
+                    fields = bytes(cdr[:_CDR_HEADER_BYTES] + cdr[_CDR_AND_CALL_ID_BYTES:])
+                    self._on_sample(ReceivedSample(call, fields, writer))
             if len(samples) < _BATCH_SIZE:
                 return
 
@@ -196,16 +203,16 @@ class ServiceChannel:
             writer = self._known_writers[handle] = self.participant.to_endpoint(sample)
         return writer
 
-    def _read_failures(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        for sample in reader.take(_BATCH_SIZE, ready):
+    def _read_failures(self, reader: Any, condition: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        for sample in reader.take(_BATCH_SIZE, condition):
             cdr = getattr(sample, "cdr", None)
             if cdr is None or self._on_failure is None:
                 continue  # a disposed writer
             try:
-                announced: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
+                decoded: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
             except DecodeError:
                 continue
-            data: bytes = announced["data"]
+            data: bytes = decoded["data"]
             if len(data) >= _FAILURE_HEADER.size:
                 guid, number, kind = _FAILURE_HEADER.unpack_from(data)
                 failure_kind = next((each for each in _FAILURE_KINDS if each == kind), None)
@@ -217,7 +224,7 @@ class ServiceChannel:
     def send(self, call: CallId, cdr: bytes) -> None:
         """Write a request or response. Raises `WireError`, or `DDSException` if the channel is closed."""
         order = "<" if cdr[1] else ">"
-        framed_cdr = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
+        framed_cdr = cdr[:_CDR_HEADER_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_HEADER_BYTES:]
         codes = self.participant.dds.core.DDSException
         try:
             self._writers[0].write(create_sample(self._sample_class, framed_cdr))
@@ -267,14 +274,14 @@ class ServiceChannel:
         """
         if self.is_closed:
             return frozenset()
-        found_here = self._match_handles()
-        if found_here != self._ready_handles:
-            self._ready = self._find_ready_servers()
-            self._ready_handles = found_here if self._is_all_ready else ()
-        return self._ready
+        handles = self._match_handles()
+        if handles != self._ready_handles:
+            self._ready_servers = self._find_ready_servers()
+            self._ready_handles = handles if self._has_only_ready_servers else ()
+        return self._ready_servers
 
     def _match_handles(self) -> tuple[int, ...]:
-        # Changes whenever the set of matches changes.
+        # Returns a value that changes whenever the set of matches changes.
         readers = (each.get_matched_publications() for each in self._readers)
         return (
             *self._writers[0].get_matched_subscriptions(),
@@ -283,45 +290,45 @@ class ServiceChannel:
         )
 
     def _find_ready_servers(self) -> frozenset[bytes]:
-        self._is_all_ready = True
+        self._has_only_ready_servers = True
         now = time.monotonic()
         readers, writers = (
             self._matched_endpoints(self._writers[0]),
             self._matched_endpoints(self._readers[0]),
         )
-        failing = [self._matched_endpoints(each) for each in self._readers[1:]]
+        failure_writers = [self._matched_endpoints(each) for each in self._readers[1:]]
         ready: set[bytes] = set()
         for reader in readers:
             matching_writers = [each for each in writers if each.participant == reader.participant]
-            since = self._first_seen.setdefault(reader.gid, now) if matching_writers else now
+            first_seen = self._first_seen_times.setdefault(reader.gid, now) if matching_writers else now
             if "nepid" not in reader.user_data:
                 is_ready = bool(matching_writers) and (
-                    now - since >= _READY_DELAY_S or self._is_local(reader)
+                    now - first_seen >= _READY_DELAY_S or self._is_local(reader)
                 )
             else:
-                is_ready = bool(matching_writers) and self._is_confirmed(reader, writers, failing)
-            self._is_all_ready = self._is_all_ready and is_ready
+                is_ready = bool(matching_writers) and self._is_confirmed(reader, writers, failure_writers)
+            self._has_only_ready_servers = self._has_only_ready_servers and is_ready
             if is_ready:
                 ready.update(each.gid for each in matching_writers)
-        self._first_seen = {each.gid: self._first_seen.get(each.gid, now) for each in readers}
+        self._first_seen_times = {each.gid: self._first_seen_times.get(each.gid, now) for each in readers}
         return frozenset(ready)
 
     def _is_local(self, endpoint: DdsEndpoint) -> bool:
         return bool(endpoint.gid[:PREFIX_BYTES] == self.participant.gid[:PREFIX_BYTES])
 
     def _is_confirmed(
-        self, reader: DdsEndpoint, writers: list[DdsEndpoint], failing: list[list[DdsEndpoint]]
+        self, reader: DdsEndpoint, writers: list[DdsEndpoint], failure_writers: list[list[DdsEndpoint]]
     ) -> bool:
         # True if a nep server has reported matches with all endpoints of this client.
         pairs = [(self._writers[0], [reader]), (self._readers[0], writers)]
-        pairs += zip(self._readers[1:], failing, strict=True)
+        pairs += zip(self._readers[1:], failure_writers, strict=True)
         return all(
             any(
-                self.participant.matches.is_confirmed(entity.guid.bytes, other.gid, other.participant)
-                for other in others
-                if other.participant == reader.participant
+                self.participant.matches.is_confirmed(entity.guid.bytes, endpoint.gid, endpoint.participant)
+                for endpoint in endpoints
+                if endpoint.participant == reader.participant
             )
-            for entity, others in pairs
+            for entity, endpoints in pairs
         )
 
     def matched_servers(self) -> frozenset[bytes]:
@@ -329,7 +336,7 @@ class ServiceChannel:
         return (
             frozenset()
             if self.is_closed
-            else frozenset(e.gid for e in self._matched_endpoints(self._readers[0]))
+            else frozenset(each.gid for each in self._matched_endpoints(self._readers[0]))
         )
 
     def can_reply_to(self, client: DdsEndpoint) -> bool:
@@ -338,15 +345,13 @@ class ServiceChannel:
         Args:
             client: Request writer of the client.
         """
-        found_here = [
+        endpoints = [
             each
             for each in self._matched_endpoints(self._writers[0])
             if each.participant == client.participant
         ]
         pair_id = client.user_data.get("clientid")
-        return any(
-            pair_id is None or each.user_data.get("clientid") in {None, pair_id} for each in found_here
-        )
+        return any(pair_id is None or each.user_data.get("clientid") in {None, pair_id} for each in endpoints)
 
     # ---- closing
 

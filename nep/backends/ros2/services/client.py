@@ -67,7 +67,7 @@ class Ros2Client(ClientCalls[_Call]):
         self._node_id = node_id
         self._deadlines = deadlines
         self._on_close = on_close
-        self._requests, _answers = dds_service(spec.service)
+        self._request_topic, _response_topic = dds_service(spec.service)
         self._guid = secrets.randbits(63)
         self._channel: ServiceChannel | None = None
         given_name = service_type_name(spec.msg_type)
@@ -89,7 +89,7 @@ class Ros2Client(ClientCalls[_Call]):
         with self._participant.changed:
             type_names = [
                 name
-                for each in self._participant.endpoints("reader", self._requests)
+                for each in self._participant.endpoints("reader", self._request_topic)
                 if (name := service_type_of(each.type)) is not None
             ]
             type_name = (
@@ -98,7 +98,11 @@ class Ros2Client(ClientCalls[_Call]):
                 else next(iter(sorted(type_names)), "")
             )
             channel = self._channel
-            if not type_name or self.is_closed or (channel is not None and channel.kind.name == type_name):
+            if (
+                not type_name
+                or self.is_closed
+                or (channel is not None and channel.service_type.name == type_name)
+            ):
                 return channel
             if channel is not None:
                 channel.close()
@@ -109,7 +113,7 @@ class Ros2Client(ClientCalls[_Call]):
                 self._specified_type or find_service_type(self._participant.types, type_name),
                 self.spec.id,
                 guid=self._guid,
-                on_part=self._handle_response,
+                on_sample=self._handle_response,
                 on_failure=self._handle_failure,
             )
             return self._channel
@@ -163,23 +167,23 @@ class Ros2Client(ClientCalls[_Call]):
                 except NepError as error:  # the server's type is unknown here
                     type_error = error
             with self._lock:
-                waiting = [each for each in self._calls.values() if each.servers is None]
-                for call in waiting if servers else ():
+                waiting_calls = [each for each in self._calls.values() if each.servers is None]
+                for call in waiting_calls if servers else ():
                     call.servers = servers
         if type_error is not None:
-            for call in waiting:
+            for call in waiting_calls:
                 self._finish(call, type_error)
         elif servers and channel is not None:
-            for call in waiting:
+            for call in waiting_calls:
                 self._send(channel, call)
 
     def _ready_servers(self) -> frozenset[bytes]:
         return frozenset() if self._channel is None else self._channel.ready_servers()
 
     def _send(self, channel: ServiceChannel, call: _Call) -> None:
-        left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         try:
-            cdr = channel.kind.encode_call(self.spec.codec, call.data, left_s)
+            cdr = channel.service_type.encode_call(self.spec.codec, call.data, remaining_s)
             channel.send(CallId(self._guid, call.number), cdr)
         except NepError as error:
             self._finish(call, error)
@@ -190,16 +194,16 @@ class Ros2Client(ClientCalls[_Call]):
 
     # ---- outcomes
 
-    def _handle_response(self, part: ReceivedSample) -> None:
+    def _handle_response(self, sample: ReceivedSample) -> None:
         # Runs in the participant's thread.
         channel = self._channel
         if channel is None:
             return
         try:
-            outcome: Outcome = channel.kind.decode_reply(part.cdr, self.spec.codec)
+            outcome: Outcome = channel.service_type.decode_reply(sample.cdr, self.spec.codec)
         except NepError as error:
             outcome = error
-        self._finish_by_number(part.id.number, outcome)
+        self._finish_by_number(sample.id.number, outcome)
 
     def _handle_failure(self, call: CallId, reply: Reply) -> None:
         # Runs in the participant's thread: an error from a nep server.
@@ -223,31 +227,31 @@ class Ros2Client(ClientCalls[_Call]):
     def expire(self, now: float) -> float:
         """Send waiting calls, fail expired ones, and return the next deadline. See `ExpiringClient.expire`.
 
-        Calls whose servers were missing at the previous check, too, fail as well.
+        A call also fails if its servers are missing in two consecutive checks.
         """
         with self._lock:
             is_waiting = any(each.servers is None for each in self._calls.values())
         if is_waiting:
             self._send_waiting_calls()
         with self._participant.changed:
-            existing = self._channel.matched_servers() if self._channel is not None else frozenset()
+            matched_servers = self._channel.matched_servers() if self._channel is not None else frozenset()
         with self._lock:
             calls = tuple(self._calls.values())
         for call in calls:
-            is_server_gone = call.servers is not None and not call.servers & existing
+            is_server_gone = call.servers is not None and not call.servers & matched_servers
             if is_server_gone and call.is_server_missing:
                 self._finish(call, ServerGoneError(self.spec.service))
             elif is_server_gone:
                 call.is_server_missing = True  # its replies may have arrived, but not been read yet
             elif call.deadline <= now:
-                kind = NoServerError if call.servers is None else ServiceTimeoutError
-                self._finish(call, kind(self.spec.service, call.timeout_s or 0.0))
+                error_class = NoServerError if call.servers is None else ServiceTimeoutError
+                self._finish(call, error_class(self.spec.service, call.timeout_s or 0.0))
         with self._lock:
-            dues = [
+            deadlines = [
                 min(each.deadline, now + (_DISCOVERY_POLL_S if each.servers is None else _SERVER_CHECK_S))
                 for each in self._calls.values()
             ]
-        return min(dues, default=math.inf)
+        return min(deadlines, default=math.inf)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""

@@ -96,9 +96,9 @@ def find_service_type(types: MessageTypes, name: str) -> TypedService:
 
 def _find_definition(name: str) -> tuple[str, str] | None:
     # Returns the parts of the .srv file before and after its separator.
-    package, _srv, last = name.split("/")
+    package, _srv, type_name = name.split("/")
     for folder in filter(None, os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep)):
-        for path in sorted(Path(folder).rglob(f"{last}.srv")):
+        for path in sorted(Path(folder).rglob(f"{type_name}.srv")):
             file_package = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
             if file_package != package:
                 continue
@@ -107,15 +107,15 @@ def _find_definition(name: str) -> tuple[str, str] | None:
                     _("'{path}' is too large; choose a folder with .srv files only").format(path=path)
                 )
             lines = path.read_text(encoding="utf-8").splitlines()
-            bounds = [number for number, line in enumerate(lines) if line.strip() == "---"]
-            if len(bounds) != 1:
+            separator_lines = [index for index, line in enumerate(lines) if line.strip() == "---"]
+            if len(separator_lines) != 1:
                 raise NepError(
                     _(
                         "'{path}' isn't a valid .srv file; write one line '---' between the request and "
                         "the response"
                     ).format(path=path)
                 )
-            return "\n".join(lines[: bounds[0]]), "\n".join(lines[bounds[0] + 1 :])
+            return "\n".join(lines[: separator_lines[0]]), "\n".join(lines[separator_lines[0] + 1 :])
     return None
 
 

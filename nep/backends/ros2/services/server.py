@@ -49,7 +49,7 @@ class Ros2Server:
         self._rejections = RejectionCounter()
         self._type = service_type_for(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
-            participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request
+            participant, node_id, spec.service, self._type, spec.id, on_sample=self._handle_request
         )
         try:
             wait_for_matches(participant, self._channel.discovered_peers, lambda: self._channel.entities)
@@ -67,26 +67,26 @@ class Ros2Server:
     @property
     def counts(self) -> PublisherCount:
         """Statistics shown in the graph."""
-        tally = self.stats
-        return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
+        stats = self.stats
+        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 
-    def _handle_request(self, part: ReceivedSample) -> None:
+    def _handle_request(self, sample: ReceivedSample) -> None:
         # Runs in the participant's thread, with its lock held.
         try:
-            request = self._type.decode_call(part.cdr)
+            request = self._type.decode_call(sample.cdr)
         except NepError as error:
             if self._rejections.add(str(error)):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
-            self._reply(part, error_reply(CallKind.REJECTED, "", str(error)))
+            self._reply(sample, error_reply(CallKind.REJECTED, "", str(error)))
             return
         deadline = None if request.timeout_s is None else time.monotonic() + request.timeout_s
         incoming = IncomingCall(
-            request.data, request.codec, deadline, lambda reply: self._reply(part, limit_reply_size(reply))
+            request.data, request.codec, deadline, lambda reply: self._reply(sample, limit_reply_size(reply))
         )
         if not self.calls.put(incoming):
             incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _reply(self, part: ReceivedSample, reply: Reply) -> bool:
+    def _reply(self, sample: ReceivedSample, reply: Reply) -> bool:
         cdr: bytes | None = None
         if self._type.is_nep or reply.kind == CallKind.REPLY:
             try:
@@ -96,9 +96,9 @@ class Ros2Server:
         self.stats.add(reply)
         if self._channel.is_closed:
             return False
-        self._wait_for_match(part)
+        self._wait_for_match(sample)
         try:
-            self._write(part.id, cdr, reply)
+            self._write(sample.id, cdr, reply)
         except (NepError, self._participant.dds.core.DDSException) as error:
             _logger.warning("can't send a reply of '%s': %s", self.spec.service, error)
             return False
@@ -110,13 +110,13 @@ class Ros2Server:
         else:  # ROS has no form for errors: its clients wait until their timeout
             self._channel.send_failure(call, reply)
 
-    def _wait_for_match(self, part: ReceivedSample) -> None:
+    def _wait_for_match(self, sample: ReceivedSample) -> None:
         # The client's reader may be discovered later than its writer.
-        if part.writer is None or "nepid" in part.writer.user_data:
+        if sample.writer is None or "nepid" in sample.writer.user_data:
             return  # disconnected, or a nep client, which waits for the match itself
         deadline = time.monotonic() + _MATCH_TIMEOUT_S
         with self._participant.changed:
-            while not self._channel.is_closed and not self._channel.can_reply_to(part.writer):
+            while not self._channel.is_closed and not self._channel.can_reply_to(sample.writer):
                 remaining_s = deadline - time.monotonic()
                 if remaining_s <= 0.0 or self._participant.is_own_thread():
                     return

@@ -104,7 +104,7 @@ class SocketClient:
         framing: Wire format.
         serve_soon: Asks the I/O thread to serve the client.
         closer: Closes the client.
-        known_services: Queries the master for the names of services within a timeout in seconds; None
+        query_services: Queries the master for the names of services within a timeout in seconds; None
             without a master.
         endpoint: Endpoint of the server without a master, or "".
     """
@@ -117,22 +117,22 @@ class SocketClient:
         serve_soon: Callable[[SocketClient], None],
         closer: Callable[[SocketClient], None],
         *,
-        known_services: Callable[[float], tuple[str, ...]] | None = None,
+        query_services: Callable[[float], tuple[str, ...]] | None = None,
         endpoint: str = "",
     ) -> None:
         self.spec = spec
         self._connect_to = connect_to
         self._connection: Connection | None = None
-        self._framing = self._usual_framing = framing
-        self._originals: set[int] = set()
+        self._framing = self._default_framing = framing
+        self._original_ids: set[int] = set()
         """Ids of servers that are programs of the original NEP."""
         self._serve_soon = serve_soon
         self._closer = closer
-        self._known_services = known_services
+        self._query_services = query_services
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
         self._calls: dict[int, _Call] = {}
-        self._unanswered: dict[int, int] = {}
+        self._unanswered_sizes: dict[int, int] = {}
         """Sizes of the calls sent over this connection by number, oldest first, including cancelled ones.
 
         Needed because replies without a number arrive in this order, and to limit the bytes sent to a server
@@ -142,8 +142,8 @@ class SocketClient:
         self.fixed_endpoint = endpoint
         """Endpoint of the server without a master, or ""."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
-        self._current: int | None = None
-        self._unlisted: int | None = None
+        self._current_id: int | None = None
+        self._unlisted_id: int | None = None
         """Id of the connected server if the master doesn't list it any more, else None.
 
         It is kept while there is no other server, because it may only be suspended.
@@ -205,7 +205,7 @@ class SocketClient:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
-            count = max(len(self._calls), len(self._unanswered))
+            count = max(len(self._calls), len(self._unanswered_sizes))
             check_call_limits(self._name, count, max(self._bytes, self._unanswered_bytes), call.size)
             self._calls[number] = call
             self._bytes += call.size
@@ -222,10 +222,10 @@ class SocketClient:
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty without a master or if it doesn't reply."""
-        if self._known_services is None:
+        if self._query_services is None:
             return ()
         try:
-            return self._known_services(timeout_s)
+            return self._query_services(timeout_s)
         except NepError:
             return ()
 
@@ -239,12 +239,12 @@ class SocketClient:
     def _send_locked(self, call: _Call) -> None:
         # Calls go only to a connected server that hasn't announced its end.
         connection = self._connection
-        if connection is None or not connection.is_open or self._current not in self._servers:
+        if connection is None or not connection.is_open or self._current_id not in self._servers:
             return
         codec = self.spec.codec.number
         connection.send(self._framing.encode_call(call.number, codec, call.timeout_s, call.data))
         call.is_sent = True
-        self._unanswered[call.number] = call.size
+        self._unanswered_sizes[call.number] = call.size
         self._unanswered_bytes += call.size
 
     # ---- in the I/O thread: updates from the session
@@ -255,35 +255,35 @@ class SocketClient:
             for remote in remotes:
                 if self._can_call_locked(remote):
                     self._servers[remote.publisher.id] = remote.publisher.endpoints[0]
-                    if remote.publisher.id == self._unlisted:
-                        self._unlisted = None
-            if self._unlisted is not None and len(self._servers) > 1:
-                self._servers.pop(self._unlisted, None)
-                self._unlisted = None
+                    if remote.publisher.id == self._unlisted_id:
+                        self._unlisted_id = None
+            if self._unlisted_id is not None and len(self._servers) > 1:
+                self._servers.pop(self._unlisted_id, None)
+                self._unlisted_id = None
             self._retry_at = 0.0
         self._serve_soon(self)
 
     def _can_call_locked(self, remote: RemotePublisher) -> bool:
         if remote.publisher.codec == ORIGINAL_CODEC:
-            self._originals.add(remote.publisher.id)
+            self._original_ids.add(remote.publisher.id)
             return bool(remote.publisher.endpoints) and self.spec.codec.name == "json"
         return bool(remote.publisher.endpoints)
 
-    def publisher_removed(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
+    def handle_publisher_removed(self, server: int, last_seq: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
         """Handle the removal of a server.
 
         Args:
             server: Id of the server.
-            final: Number of calls that the server has received. Ignored.
+            last_seq: Number of calls that the server has received. Ignored.
             is_closed: True if the server unregistered, False if its node doesn't respond and may be
                 suspended.
         """
         with self._lock:
-            if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
+            if is_closed or server != self._current_id or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
-                self._originals.discard(server)
+                self._original_ids.discard(server)
             else:
-                self._unlisted = server
+                self._unlisted_id = server
         self._serve_soon(self)
 
     def reconnect_remote(self) -> None:
@@ -296,15 +296,15 @@ class SocketClient:
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of servers. If no server is left, an existing connection is kept."""
         with self._lock:
-            self._originals = {each for each in self._originals if each == self._current}
+            self._original_ids = {each for each in self._original_ids if each == self._current_id}
             servers = {
                 each.publisher.id: each.publisher.endpoints[0]
                 for each in remotes
                 if self._can_call_locked(each)
             }
-            current, self._unlisted = self._current, None
-            if not servers and current in self._servers and self.is_connected:
-                servers, self._unlisted = {current: self._servers[current]}, current
+            current_id, self._unlisted_id = self._current_id, None
+            if not servers and current_id in self._servers and self.is_connected:
+                servers, self._unlisted_id = {current_id: self._servers[current_id]}, current_id
             self._servers = servers
             self._retry_at = 0.0
         self._serve_soon(self)
@@ -321,13 +321,13 @@ class SocketClient:
 
     def serve(self, now: float) -> PollState:
         """Process replies, the state of the connection, and expired calls. See `Pollable.serve`."""
-        return PollState(pause_reading=True, due=self._serve(now))
+        return PollState(is_reading_paused=True, due=self._serve(now))
 
     def _serve_connection(self, now: float) -> PollState:
         return PollState(due=self._serve(now))
 
     def _serve(self, now: float) -> float | None:
-        # Returns the time of the next call.
+        # Returns the time at which the client must be served again, or None.
         outcomes: _Outcomes = []
         with self._lock:
             if self._is_closed:
@@ -365,8 +365,8 @@ class SocketClient:
                     continue
                 outcome = error
             if self._framing.is_in_order:
-                number = next(iter(self._unanswered), None)
-            self._unanswered_bytes -= self._unanswered.pop(number or 0, 0)
+                number = next(iter(self._unanswered_sizes), None)
+            self._unanswered_bytes -= self._unanswered_sizes.pop(number or 0, 0)
             call = self._remove_locked(number or 0)
             if call is None:
                 self._late += 1
@@ -385,7 +385,7 @@ class SocketClient:
             self._switch_server(outcomes)  # the old connection would stay silent for long
         elif connection is not None and connection.is_open:
             self._attempts = 0
-            if self._current not in self._servers:
+            if self._current_id not in self._servers:
                 self._switch_after_replies(now, outcomes)
             else:
                 self._switch_at = math.inf
@@ -393,26 +393,26 @@ class SocketClient:
             self._connect_next(now)
 
     def _has_endpoint_changed(self) -> bool:
-        # True if an endpoint of the connection has changed.
-        endpoint = None if self._current is None else self._servers.get(self._current)
+        # True if the endpoint of the current server has changed.
+        endpoint = None if self._current_id is None else self._servers.get(self._current_id)
         return endpoint not in {None, self._connected_endpoint} and (
             not self._connected_endpoint or is_remote(self._connected_endpoint)
         )
 
     def _switch_after_replies(self, now: float, outcomes: _Outcomes) -> None:
         # The server closed or was replaced: wait for its last replies, then connect to another one.
-        is_waited_for = any(each.is_sent for each in self._calls.values())
-        if is_waited_for and self._switch_at == math.inf:
+        has_sent_calls = any(each.is_sent for each in self._calls.values())
+        if has_sent_calls and self._switch_at == math.inf:
             self._switch_at = now + _HANDOVER_TIMEOUT_S
         is_next_due = now >= self._switch_at and any(not each.is_sent for each in self._calls.values())
-        if not is_waited_for or is_next_due:
+        if not has_sent_calls or is_next_due:
             self._switch_server(outcomes)
 
     def _fail_sent_calls(self, outcomes: _Outcomes) -> None:
         # The connection has ended: all calls sent over it fail.
         self._disconnect()
         self._switch_at = math.inf
-        self._unanswered.clear()
+        self._unanswered_sizes.clear()
         self._unanswered_bytes = 0
         for call in [each for each in self._calls.values() if each.is_sent]:
             self._remove_locked(call.number)
@@ -421,7 +421,7 @@ class SocketClient:
 
     def _switch_server(self, outcomes: _Outcomes) -> None:
         self._fail_sent_calls(outcomes)
-        self._current = None
+        self._current_id = None
         self._attempts, self._retry_at = 0, 0.0
 
     def _connect_next(self, now: float) -> None:
@@ -429,12 +429,14 @@ class SocketClient:
         self._disconnect()
         servers = list(self._servers)
         if not servers:
-            self._current, self._retry_at = None, math.inf
+            self._current_id, self._retry_at = None, math.inf
             return
-        index = servers.index(self._current) + 1 if self._current in self._servers and self._attempts else 0
-        self._current = servers[index % len(servers)]
-        endpoint = self._connected_endpoint = self._servers[self._current]
-        self._framing = ORIGINAL if self._current in self._originals else self._usual_framing
+        index = 0
+        if self._current_id in self._servers and self._attempts:
+            index = servers.index(self._current_id) + 1
+        self._current_id = servers[index % len(servers)]
+        endpoint = self._connected_endpoint = self._servers[self._current_id]
+        self._framing = ORIGINAL if self._current_id in self._original_ids else self._default_framing
         self._attempts += 1
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)
@@ -461,14 +463,14 @@ class SocketClient:
             outcomes.append((call.callback, error))
 
     def _next_deadline(self) -> float:
-        due = min((each.deadline for each in self._calls.values()), default=math.inf)
+        next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
         if self.is_connected and any(not each.is_sent for each in self._calls.values()):
-            due = min(due, self._switch_at)
+            next_deadline = min(next_deadline, self._switch_at)
         if self.is_connected or not self._servers:
-            return due
+            return next_deadline
         if self._calls:
             self._retry_at = min(self._retry_at, time.monotonic() + _PENDING_RETRY_S)
-        return min(due, self._retry_at)
+        return min(next_deadline, self._retry_at)
 
     @property
     def _name(self) -> str:

@@ -51,13 +51,13 @@ class ServerConnection:
         try:
             self._monitor = monitor = shared.socket(zmq.PAIR, owner)
             self._connect(monitor)
-            sides = (_PolledSocket(self._socket, serve), _PolledSocket(monitor, serve))
+            polled_sockets = (_PolledSocket(self._socket, serve), _PolledSocket(monitor, serve))
         except BaseException:
             self.close()
             raise
-        self._polled_sockets = sides
-        for side in self._polled_sockets:
-            self._io.add(side)
+        self._polled_sockets = polled_sockets
+        for polled_socket in self._polled_sockets:
+            self._io.add(polled_socket)
 
     def _connect(self, monitor: Socket) -> None:
         self._socket.setsockopt(zmq.RECONNECT_IVL, _NO_RECONNECT_MS)
@@ -99,9 +99,9 @@ class ServerConnection:
 
     def close(self) -> None:
         """Close the sockets and discard unread replies."""
-        sides, self._polled_sockets = self._polled_sockets, ()
-        for side in sides:
-            self._io.remove(side)
+        polled_sockets, self._polled_sockets = self._polled_sockets, ()
+        for polled_socket in polled_sockets:
+            self._io.remove(polled_socket)
         self.is_open, self.has_ended = False, True
         if not self._socket.closed:
             self._socket.disable_monitor()

@@ -38,21 +38,21 @@ class ZeromqServices:
 
     Args:
         shared: ZeroMQ context of the process.
-        session: Returns the node's session with the master at an address; raises `ClosedError` if the node
-            is closed.
+        get_session: Returns the node's session with the master at an address; raises `ClosedError` if the
+            node is closed.
         node_name: Name of the node.
     """
 
     def __init__(
-        self, shared: SharedContext, session: Callable[[str], MasterSession], node_name: str
+        self, shared: SharedContext, get_session: Callable[[str], MasterSession], node_name: str
     ) -> None:
         self._shared = shared
-        self._session = session
+        self._get_session = get_session
         self._node_name = node_name
         self._lock = threading.Lock()
         self._servers: set[RouterServer | TcpServer] = set()
         self._clients: set[SocketClient] = set()
-        self._surveys: set[SurveyClient] = set()
+        self._surveyors: set[SurveyClient] = set()
         self._is_closed = False
 
     # ---- servers
@@ -61,7 +61,7 @@ class ZeromqServices:
         """Create a server. See `ServiceTransport.create_server`."""
         if isinstance(spec.configuration, Direct):
             return self._create_direct_server(spec, spec.configuration)
-        session = self._session(spec.configuration.master)
+        session = self._get_session(spec.configuration.master)
         session.wait_for_address(spec.wait_s)
         server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.stats.calls))
         with _release_on_error(server):
@@ -82,7 +82,7 @@ class ZeromqServices:
             return self._create_tcp_server(spec, direct)
         server = self._new_server(spec, _framing(direct), lambda: None)
         with _release_on_error(server):
-            server.fixed = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
+            server.fixed_endpoints = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
             self._add(server)
         return server
 
@@ -132,14 +132,14 @@ class ZeromqServices:
         """Create a client. See `ServiceTransport.create_client`."""
         if isinstance(spec.configuration, Direct):
             return self._create_direct_client(spec, spec.configuration)
-        session = self._session(spec.configuration.master)
+        session = self._get_session(spec.configuration.master)
         session.wait_for_address(spec.wait_s)
 
-        def known_services(timeout_s: float) -> tuple[str, ...]:
+        def query_services(timeout_s: float) -> tuple[str, ...]:
             services = session.query_graph(timeout_s).services
             return tuple(sorted(name for name, each in services.items() if each.servers))
 
-        client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), known_services)
+        client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), query_services)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             client.connect(session.add_subscriber(record, client, spec.wait_s).publishers)
@@ -152,29 +152,29 @@ class ZeromqServices:
         """Create a surveyor. See `ServiceTransport.create_surveyor`."""
         if isinstance(spec.configuration, Direct):
             raise NepError(_("surveys of 'zeromq' need a master; omit the configuration, or use 'nanomsg'"))
-        session = self._session(spec.configuration.master)
+        session = self._get_session(spec.configuration.master)
         session.wait_for_address(spec.wait_s)
 
-        def close(survey: SurveyClient) -> None:
+        def close(surveyor: SurveyClient) -> None:
             with self._lock:
-                self._surveys.discard(survey)
+                self._surveyors.discard(surveyor)
             session.remove_subscriber(spec.id)
-            survey.release()
+            surveyor.release()
 
         def new_client(endpoint: str) -> SocketClient:
             return self._new_client(spec, NATIVE, lambda: None, None, endpoint)
 
-        survey = SurveyClient(spec, new_client, close)
+        surveyor = SurveyClient(spec, new_client, close)
         with self._lock:
             self._check_open_locked()
-            self._surveys.add(survey)
+            self._surveyors.add(surveyor)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
-            survey.connect(session.add_subscriber(record, survey, spec.wait_s).publishers)
+            surveyor.connect(session.add_subscriber(record, surveyor, spec.wait_s).publishers)
         except BaseException:
-            survey.close()
+            surveyor.close()
             raise
-        return survey
+        return surveyor
 
     def _create_direct_client(self, spec: ClientSpec, direct: Direct) -> SocketClient:
         address = f"{direct.ip}:{direct.port}"
@@ -192,7 +192,7 @@ class ZeromqServices:
         spec: ClientSpec,
         framing: Framing,
         unregister: Callable[[], None],
-        known_services: Callable[[float], tuple[str, ...]] | None,
+        query_services: Callable[[float], tuple[str, ...]] | None,
         endpoint: str = "",
         *,
         is_tcp: bool = False,
@@ -216,7 +216,7 @@ class ZeromqServices:
             framing,
             self._shared.io.serve_soon,
             close,
-            known_services=known_services,
+            query_services=query_services,
             endpoint=endpoint,
         )
         with _release_on_error(client):
@@ -237,9 +237,9 @@ class ZeromqServices:
         """Close all servers, clients and surveyors; replies are flushed within `timeout_s` seconds."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
-            surveys, clients, servers = tuple(self._surveys), tuple(self._clients), tuple(self._servers)
-        for survey in surveys:
-            survey.close()
+            surveyors, clients, servers = tuple(self._surveyors), tuple(self._clients), tuple(self._servers)
+        for surveyor in surveyors:
+            surveyor.close()
         for client in clients:
             client.close()
         for server in servers:
@@ -250,8 +250,8 @@ class ZeromqServices:
         for server in self._servers:
             close_in_child(*server.endpoints)
             server.forked()
-        for survey in self._surveys:
-            survey.forked()
+        for surveyor in self._surveyors:
+            surveyor.forked()
         for client in self._clients:
             close_in_child(client.endpoint)
             client.forked()

@@ -47,10 +47,10 @@ class CallReader:
     Not thread-safe: guarded by the server's lock.
     """
 
-    def __init__(self, service: str, framing: Framing, tally: ServerStats) -> None:
+    def __init__(self, service: str, framing: Framing, stats: ServerStats) -> None:
         self._service = service
         self._framing = framing
-        self._stats = tally
+        self._stats = stats
         self._rejections = RejectionCounter()
 
     def read(
@@ -116,8 +116,8 @@ class RouterServer:
         self.spec = spec
         self.calls = CallQueue()
         self.stats = ServerStats()
-        self.fixed: tuple[str, ...] = ()
-        """Endpoint of a server without a master."""
+        self.fixed_endpoints: tuple[str, ...] = ()
+        """Endpoints of a server without a master."""
         self.socket = socket
         self._framing = framing
         self._serve_soon = serve_soon
@@ -125,14 +125,14 @@ class RouterServer:
         self._closer = closer
         self._lock = threading.Lock()
         self._reader = CallReader(spec.service, framing, self.stats)
-        self._unread: deque[tuple[zmq.MessageTracker, int]] = deque()
+        self._unread_replies: deque[tuple[zmq.MessageTracker, int]] = deque()
         self._is_closed = False
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # raise an error when a client has disconnected
         socket.setsockopt(zmq.MAXMSGSIZE, MAX_PAYLOAD_BYTES)
         socket.setsockopt(zmq.SNDHWM, _REPLY_HIGH_WATER_MARK)
         socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
         socket.copy_threshold = _LARGE_BYTES
-        self._bindings = Bindings(socket, may_be_local=False)
+        self._bindings = Bindings(socket, may_bind_unix_sockets=False)
         self.fd = int(socket.getsockopt(zmq.FD))
 
     # ---- for the session
@@ -140,7 +140,7 @@ class RouterServer:
     @property
     def endpoints(self) -> tuple[str, ...]:
         """All bound endpoints."""
-        return self._bindings.endpoints or self.fixed
+        return self._bindings.endpoints or self.fixed_endpoints
 
     @property
     def is_closed(self) -> bool:
@@ -157,10 +157,10 @@ class RouterServer:
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports."""
-        tally = self.stats
-        calls, problem = clamp_count(tally.calls), self._reader.recent_message()
+        stats = self.stats
+        calls, problem = clamp_count(stats.calls), self._reader.recent_message()
         return PublisherCount(
-            self.spec.id, calls, clamp_count(tally.bytes), calls, None, problem, tally.errors
+            self.spec.id, calls, clamp_count(stats.bytes), calls, None, problem, stats.errors
         )
 
     # ---- in the I/O thread
@@ -217,15 +217,16 @@ class RouterServer:
                 self.socket.send(parts[1], zmq.DONTWAIT)
             else:
                 tracker = self.socket.send(parts[1], zmq.DONTWAIT, copy=False, track=True)
-                self._unread.append((tracker, len(parts[1])))
+                self._unread_replies.append((tracker, len(parts[1])))
         except zmq.ZMQError:  # the client has disconnected, or its queue is full
             return False
         return True
 
     def _has_room(self, size: int) -> bool:
-        while self._unread and self._unread[0][0].done:
-            self._unread.popleft()
-        return not self._unread or sum(each for _tracker, each in self._unread) + size <= _MAX_UNREAD_BYTES
+        while self._unread_replies and self._unread_replies[0][0].done:
+            self._unread_replies.popleft()
+        unread_bytes = sum(each for _tracker, each in self._unread_replies)
+        return not unread_bytes or unread_bytes + size <= _MAX_UNREAD_BYTES
 
     # ---- closing
 

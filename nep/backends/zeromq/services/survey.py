@@ -75,32 +75,32 @@ class SurveyClient:
             if self.is_closed:
                 raise self._closed_error()
             clients = list(self._clients.values())
-        sent: list[OpenCall] = []
+        sent_calls: list[OpenCall] = []
         try:
             for client in clients:
                 try:
-                    sent.append(_SentCall(client, client.start_call(data, timeout_s, callback)))
+                    sent_calls.append(_SentCall(client, client.start_call(data, timeout_s, callback)))
                 except ClosedError:  # left in the meantime
                     continue
         except BaseException:
-            self.cancel_all(sent)
+            self.cancel_all(sent_calls)
             raise
-        return sent
+        return sent_calls
 
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
-        for sent in calls:
-            if isinstance(sent, _SentCall):
-                sent.client.cancel(sent.call)
+        for sent_call in calls:
+            if isinstance(sent_call, _SentCall):
+                sent_call.client.cancel(sent_call.call)
 
     def _all_clients(self) -> list[SocketClient]:
         return [*self._clients.values(), *self._removed_clients]
 
     def _close_idle_removed_clients(self) -> None:
         with self._lock:
-            ended = [each for each in self._removed_clients if not each.is_busy]
-            self._removed_clients = [each for each in self._removed_clients if each not in ended]
-        self._close_clients(ended)
+            idle_clients = [each for each in self._removed_clients if not each.is_busy]
+            self._removed_clients = [each for each in self._removed_clients if each not in idle_clients]
+        self._close_clients(idle_clients)
 
     def _close_clients(self, clients: Iterable[SocketClient]) -> None:
         for client in clients:
@@ -137,7 +137,7 @@ class SurveyClient:
     def _remove_respondent(self, respondent: int) -> None:
         client = self._clients.pop(respondent, None)
         if client is not None:
-            client.publisher_removed(0, 0, is_closed=True)
+            client.handle_publisher_removed(0, 0, is_closed=True)
             self._removed_clients.append(client)
 
     def reconnect_remote(self) -> None:
@@ -146,8 +146,8 @@ class SurveyClient:
             for client in self._clients.values():
                 client.reconnect_remote()
 
-    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
-        """Handle the removal of a respondent. See `SessionSubscriber.publisher_removed`."""
+    def handle_publisher_removed(self, publisher: int, last_seq: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
+        """Handle the removal of a respondent. See `SessionSubscriber.handle_publisher_removed`."""
         with self._lock:
             self._remove_respondent(publisher)
 

@@ -68,7 +68,7 @@ class TcpServer:
         self._changed = threading.Condition(threading.Lock())
         self._reader = CallReader(spec.service, NATIVE, self.stats)
         self._peers: set[_Peer] = set()
-        self._rejected = 0
+        self._rejected_count = 0
         self._listener = _create_listener(address, spec.service)
         self.fd = self._listener.fileno()
         host, port = self._listener.getsockname()[:2]
@@ -85,34 +85,34 @@ class TcpServer:
             if self.is_closed:
                 return PollState()
             try:
-                connected, (host, port) = self._listener.accept()
+                connection, (host, port) = self._listener.accept()
             except (BlockingIOError, InterruptedError):
                 return PollState()
             except OSError as error:  # the client has disconnected, or descriptors have run out
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
-                    return PollState(pause_reading=True, due=now + _ACCEPT_PAUSE_S)
+                    return PollState(is_reading_paused=True, due=now + _ACCEPT_PAUSE_S)
                 continue
             if len(self._peers) >= _MAX_PEERS or not has_free_descriptors(_FDS_PER_LISTENER):
-                self._reject_connection(connected)
+                self._reject_connection(connection)
                 continue
-            self._accept(connected, f"{host}:{port}")
+            self._accept(connection, f"{host}:{port}")
         return PollState(due=now)
 
-    def _reject_connection(self, connected: socket.socket) -> None:
-        connected.close()
-        self._rejected += 1
-        if is_logged(self._rejected):
+    def _reject_connection(self, connection: socket.socket) -> None:
+        connection.close()
+        self._rejected_count += 1
+        if is_logged(self._rejected_count):
             _logger.warning(
                 "rejected a client of '%s' (%d so far): too many connections",
                 self.spec.service,
-                self._rejected,
+                self._rejected_count,
             )
 
-    def _accept(self, connected: socket.socket, address: str) -> None:
-        connected.setblocking(False)
+    def _accept(self, connection: socket.socket, address: str) -> None:
+        connection.setblocking(False)
         with suppress(OSError):  # it may have ended already
-            enable_keep_alive(connected, address)
-        peer = _Peer(connected, self)
+            enable_keep_alive(connection, address)
+        peer = _Peer(connection, self)
         with self._changed:
             self._peers.add(peer)
         self._io.add(peer)
@@ -122,21 +122,22 @@ class TcpServer:
         calls: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
-                return PollState(pause_reading=True)
+                return PollState(is_reading_paused=True)
             peer.stream.flush()
             has_more = self._read(peer, calls, now)
-            is_over = peer.stream.has_ended and not has_more
-            if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
+            is_finished = peer.stream.has_ended and not has_more
+            has_pending_replies = peer.pending_replies > 0 or peer.stream.backlog_bytes > 0
+            if is_finished and (peer.stream.is_broken or not has_pending_replies):
                 # otherwise the client has only shut down its sending side and still reads replies
                 self._disconnect_locked(peer)
-            elif peer.is_last and not peer.stream.backlog:
+            elif peer.is_closing and not peer.stream.backlog_bytes:
                 # keep reading until the client closes: closing first could discard data in flight
                 peer.stream.shut_down_sending()
                 self._changed.notify_all()
         for call in calls:
             if not self.calls.put(call):
                 self._reject(call)
-        return PollState(is_over, now if has_more else None, wants_write=peer.stream.backlog > 0)
+        return PollState(is_finished, now if has_more else None, wants_write=peer.stream.backlog_bytes > 0)
 
     def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
@@ -156,7 +157,7 @@ class TcpServer:
             call = self._reader.read(parts, now, partial(self._reply, peer))
             if call is not None:
                 calls.append(call)
-                peer.waiting += 1
+                peer.pending_replies += 1
         return True
 
     def _disconnect_locked(self, peer: _Peer) -> None:
@@ -173,17 +174,17 @@ class TcpServer:
         self.stats.add(reply)
         with self._changed:
             stream = peer.stream
-            peer.waiting -= 1
+            peer.pending_replies -= 1
             if peer not in self._peers or stream.is_broken:
                 return False
-            if stream.backlog + len(reply.data) > _MAX_UNREAD_BYTES and stream.backlog:
+            if stream.backlog_bytes + len(reply.data) > _MAX_UNREAD_BYTES and stream.backlog_bytes:
                 _logger.warning(
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
             stream.send(NATIVE.encode_reply(number, reply))
-            is_served = stream.backlog > 0 or stream.has_ended
-        if is_served:
+            must_serve = stream.backlog_bytes > 0 or stream.has_ended
+        if must_serve:
             self._io.serve_soon(peer)
         return True
 
@@ -214,7 +215,7 @@ class TcpServer:
             self._listener.close()
             peers = tuple(self._peers)
             for peer in peers:
-                peer.is_last = True
+                peer.is_closing = True
         for peer in peers:
             self._io.serve_soon(peer)
         with self._changed:
@@ -236,13 +237,13 @@ class TcpServer:
 
 
 class _Peer:
-    # Connection of a client. `waiting` counts its calls without a reply; `is_last` is True once the server
-    # closes.
-    def __init__(self, connected: socket.socket, server: TcpServer) -> None:
-        self.stream = TcpStream(connected)
+    # Connection of a client. `pending_replies` counts its calls without a reply; `is_closing` is True once
+    # the server closes.
+    def __init__(self, connection: socket.socket, server: TcpServer) -> None:
+        self.stream = TcpStream(connection)
         self.fd = self.stream.fd
-        self.waiting = 0
-        self.is_last = False
+        self.pending_replies = 0
+        self.is_closing = False
         self._server = server
 
     def serve(self, now: float) -> PollState:

@@ -30,9 +30,9 @@ class TcpStream:
     Not thread-safe: guarded by the owner's lock.
     """
 
-    def __init__(self, connected: socket.socket) -> None:
-        self._socket = connected
-        self.fd = connected.fileno()
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
+        self.fd = connection.fileno()
         self.has_ended = False
         """True if no more data will be received."""
         self.is_broken = False
@@ -40,17 +40,17 @@ class TcpStream:
         self._input = bytearray()
         self._start = 0
         self._output: deque[memoryview] = deque()
-        self.backlog = 0
+        self.backlog_bytes = 0
         """Number of bytes that are not sent yet."""
         with suppress(OSError):  # it may have ended already
-            connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     # ---- receiving
 
     def read(self) -> bool:
         """Receive a limited amount of the available data; return True if there was any."""
-        was = len(self._input)
-        while not self.has_ended and len(self._input) - was < _MAX_BYTES_PER_TURN:
+        old_size = len(self._input)
+        while not self.has_ended and len(self._input) - old_size < _MAX_BYTES_PER_TURN:
             try:
                 data = self._socket.recv(_CHUNK_BYTES)
             except (BlockingIOError, InterruptedError):
@@ -61,7 +61,7 @@ class TcpStream:
             if not data:
                 self.has_ended = True
             self._input += data
-        return len(self._input) > was
+        return len(self._input) > old_size
 
     def next(self) -> list[bytes] | None:
         """Remove and return the oldest complete pair, or None if there is none.
@@ -83,12 +83,12 @@ class TcpStream:
         if available < _SIZE.size + size:
             self._check_end(available)
             return None
-        begin = self._start + _SIZE.size
-        self._start = begin + size
+        start = self._start + _SIZE.size
+        self._start = start + size
         with memoryview(self._input) as view:
             pair = [
-                bytes(view[begin : begin + HEADER_BYTES]),
-                bytes(view[begin + HEADER_BYTES : self._start]),
+                bytes(view[start : start + HEADER_BYTES]),
+                bytes(view[start + HEADER_BYTES : self._start]),
             ]
         if self._start == len(self._input):
             self._clear_input()
@@ -119,29 +119,29 @@ class TcpStream:
         prefix = _SIZE.pack(len(header) + len(payload)) + header
         pieces = [prefix + payload] if len(payload) < _SMALL_BYTES else [prefix, payload]
         self._output.extend(memoryview(each) for each in pieces)
-        self.backlog += len(prefix) + len(payload)
+        self.backlog_bytes += len(prefix) + len(payload)
         self.flush()
 
     def flush(self) -> None:
         """Send as much of the queued data as the socket accepts immediately."""
         while self._output:
             try:
-                sent = self._socket.send(self._output[0])
+                sent_bytes = self._socket.send(self._output[0])
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:  # earlier input can still be read
                 self._abort()
                 return
-            self.backlog -= sent
-            if sent == len(self._output[0]):
+            self.backlog_bytes -= sent_bytes
+            if sent_bytes == len(self._output[0]):
                 self._output.popleft()
             else:
-                self._output[0] = self._output[0][sent:]
+                self._output[0] = self._output[0][sent_bytes:]
 
     def _abort(self) -> None:
         self.is_broken = True
         self._output.clear()
-        self.backlog = 0
+        self.backlog_bytes = 0
 
     # ---- closing
 
@@ -181,7 +181,7 @@ class TcpConnection:
         self._io = io
         self._serve = serve
         self._is_dead = False
-        """True if connecting failed."""
+        """True if connecting failed or the connection was closed."""
         self.is_open = False
         # the system accepts connections for an ending program until its port is closed
         self.reconnect_delay_s = 0.1
@@ -215,21 +215,22 @@ class TcpConnection:
             self._is_dead = True
             return
         with suppress(OSError):  # not connected yet
-            other = self._socket.getpeername()
+            peer_address = self._socket.getpeername()
             # a TCP self-connection: the ephemeral source port equals an unused target port
-            self._is_dead = other == self._socket.getsockname()
+            self._is_dead = peer_address == self._socket.getsockname()
             self.is_open = not self._is_dead
 
     def serve(self, now: float) -> PollState:
         """Send queued calls and receive replies. See `Pollable.serve`."""
-        rest = self._serve(now)
-        pause_reading = self._is_dead or self._stream.has_ended
-        return PollState(pause_reading, rest.due, wants_write=not self.is_open or self._stream.backlog > 0)
+        state = self._serve(now)
+        is_reading_paused = self._is_dead or self._stream.has_ended
+        wants_write = not self.is_open or self._stream.backlog_bytes > 0
+        return PollState(is_reading_paused, state.due, wants_write=wants_write)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
         """Send a call. Data that the socket doesn't accept immediately is sent by the I/O thread."""
         self._stream.send(parts)
-        if self._stream.backlog:
+        if self._stream.backlog_bytes:
             self._io.serve_soon(self)
 
     def receive(self) -> list[bytes] | None:
@@ -256,12 +257,12 @@ class TcpConnection:
         self._stream.forked()
 
 
-def enable_keep_alive(connected: socket.socket, address: str) -> None:
+def enable_keep_alive(connection: socket.socket, address: str) -> None:
     """Set socket options that detect within a dozen seconds that the peer's computer has vanished.
 
     See `nep.backends.zeromq.sockets.enable_keep_alive`.
     """
-    connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):
         return
     for name, value in (
@@ -271,4 +272,4 @@ def enable_keep_alive(connected: socket.socket, address: str) -> None:
     ):
         option = getattr(socket, name, None)  # not every system has all options
         if option is not None:
-            connected.setsockopt(socket.IPPROTO_TCP, option, value)
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)

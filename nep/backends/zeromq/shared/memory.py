@@ -111,15 +111,15 @@ def start_sharing() -> object:
 
 def _open_node() -> _IceoryxNode | None:
     with _lock:
-        opened = None if _process.node_ref is None else _process.node_ref()
-        if opened is None and can_share():
+        iceoryx_node = None if _process.node_ref is None else _process.node_ref()
+        if iceoryx_node is None and can_share():
             try:
-                opened = _IceoryxNode()
-                _process.node_ref = weakref.ref(opened)
+                iceoryx_node = _IceoryxNode()
+                _process.node_ref = weakref.ref(iceoryx_node)
             except Exception as error:  # noqa: BLE001 - the socket works without it: this must never end a program
                 _process.is_unavailable = True
                 _logger.debug("no shared memory: %s", error)
-        return opened
+        return iceoryx_node
 
 
 def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - not typed
@@ -157,8 +157,8 @@ def _forked() -> None:
     # Called in the forked child process, which starts from scratch.
     global _lock, _fork_count
     _lock, _fork_count = threading.Lock(), _fork_count + 1
-    opened = None if _process.node_ref is None else _process.node_ref()
-    _prevent_finalization(opened, *_writers.values(), *_readers.values())
+    iceoryx_node = None if _process.node_ref is None else _process.node_ref()
+    _prevent_finalization(iceoryx_node, *_writers.values(), *_readers.values())
     _process.node_ref = None
 
 
@@ -216,7 +216,7 @@ class Loan:
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
-        self._forks = _fork_count
+        self._fork_count = _fork_count
         self._port = port  # the memory is valid while the port exists
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEADER_BYTES
@@ -236,7 +236,7 @@ class Loan:
         sample.assume_init().send()
 
     def __del__(self) -> None:
-        if self._forks != _fork_count:
+        if self._fork_count != _fork_count:
             _prevent_finalization(self._port, self._sample)
 
 
@@ -251,7 +251,7 @@ class SharedWriter:
         self._publisher = publisher
         self._slot_bytes = 0
         self._free_space = _FreeSpace()
-        self._opened: _IceoryxNode | None = None
+        self._iceoryx_node: _IceoryxNode | None = None
         self._service: Any = None
         self._port: Any = None
         self._loans: WeakValueDictionary[int, Loan] = WeakValueDictionary()
@@ -264,22 +264,22 @@ class SharedWriter:
         """
         if size <= self._slot_bytes:
             return self._port is not None
-        opened = _open_node() if size <= _MAX_PAYLOAD_BYTES else None
-        if opened is None:
+        iceoryx_node = _open_node() if size <= _MAX_PAYLOAD_BYTES else None
+        if iceoryx_node is None:
             return False
         slot_bytes = max(_MIN_SLOT_BYTES, 1 << (size - 1).bit_length())
-        slots = max(_MIN_SLOTS, min(_MAX_SLOTS, _TOTAL_SLOT_BYTES // slot_bytes))
+        slot_count = max(_MIN_SLOTS, min(_MAX_SLOTS, _TOTAL_SLOT_BYTES // slot_bytes))
         self.close()
-        self._opened = opened
+        self._iceoryx_node = iceoryx_node
         self.generation += 1
         self._slot_bytes = slot_bytes
         try:
-            service = opened.service(self._publisher, self.generation).create()
+            service = iceoryx_node.service(self._publisher, self.generation).create()
             self._port = (
                 service.publisher_builder()
                 .initial_max_slice_len(slot_bytes + _HEADER_BYTES)
-                .allocation_strategy(opened.library.AllocationStrategy.Static)
-                .override_sample_preallocation(slots)
+                .allocation_strategy(iceoryx_node.library.AllocationStrategy.Static)
+                .override_sample_preallocation(slot_count)
                 .max_loaned_samples(_MAX_LOANS)
                 .create()
             )
@@ -346,28 +346,28 @@ class SharedWriter:
 
     def reclaim_slots(self) -> None:
         """Reclaim the slots of readers whose processes were killed."""
-        if self._opened is not None and self._port is not None:
-            self._opened.node.try_cleanup_dead_nodes()
+        if self._iceoryx_node is not None and self._port is not None:
+            self._iceoryx_node.node.try_cleanup_dead_nodes()
             self._port.update_connections()
 
     def close(self) -> None:
         """Release the memory. Payloads that readers still use remain valid."""
-        self._port = self._service = self._opened = None
+        self._port = self._service = self._iceoryx_node = None
         self._slot_bytes = 0
         self._slots = _SlotViews()
 
 
 class _HeldSample:
-    # Keeps a payload in its slot until its last view is released.
-    def __init__(self, sample: Any, returned: deque[None]) -> None:  # noqa: ANN401
-        self._sample, self._returned = sample, returned
-        self._forks = _fork_count
+    # Keeps a payload in its slot until its last view is released, which is recorded in `releases`.
+    def __init__(self, sample: Any, releases: deque[None]) -> None:  # noqa: ANN401
+        self._sample, self._releases = sample, releases
+        self._fork_count = _fork_count
 
     def __del__(self) -> None:
-        if self._forks != _fork_count:
+        if self._fork_count != _fork_count:
             _prevent_finalization(self._sample)
         self._sample = None
-        self._returned.append(None)
+        self._releases.append(None)
 
 
 class SharedReader:
@@ -383,16 +383,16 @@ class SharedReader:
         Raises:
             LookupError: The memory can't be opened by this program.
         """
-        self._opened = _open_node()
-        if self._opened is None:
+        self._iceoryx_node = _open_node()
+        if self._iceoryx_node is None:
             raise LookupError
         self.generation = generation
         self._held_slots = 0
-        self._returned: deque[None] = deque()
+        self._releases: deque[None] = deque()
         self._next_sample: tuple[int, int, Any] | None = None
         self._slots = _SlotViews()
         try:
-            self._service = self._opened.service(publisher, generation).open()
+            self._service = self._iceoryx_node.service(publisher, generation).open()
             self._port = self._service.subscriber_builder().buffer_size(_MAX_SLOTS).create()
         except Exception as error:
             raise LookupError from error
@@ -433,13 +433,13 @@ class SharedReader:
                 self._slots.view(address, size + _HEADER_BYTES)[_HEADER_BYTES : _HEADER_BYTES + size]
             )
         array = (ctypes.c_uint8 * size).from_address(address + _HEADER_BYTES)
-        while self._returned:
-            self._returned.popleft()
+        while self._releases:
+            self._releases.popleft()
             self._held_slots -= 1
         if self._held_slots >= _MAX_HELD_SLOTS:
             return memoryview(bytes(array))
         self._held_slots += 1
-        array.held = _HeldSample(sample, self._returned)  # type: ignore[attr-defined]
+        array.held = _HeldSample(sample, self._releases)  # type: ignore[attr-defined]
         return memoryview(array).cast("B").toreadonly()
 
 

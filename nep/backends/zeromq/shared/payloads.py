@@ -32,19 +32,19 @@ class SharedPayloads:
         self.readers: set[int] = set()
         """Ids of the subscribers that have opened the current memory."""
         self._offer = offer
-        self._offered: dict[int, tuple[int, float]] = {}
+        self._offers: dict[int, tuple[int, float]] = {}
         self._writer = SharedWriter(publisher)
         self._reclaimed_at = float("-inf")
 
-    def confirm(self, shares: OfferAcceptance) -> None:
+    def confirm(self, acceptance: OfferAcceptance) -> None:
         """Handle a subscriber's confirmation that it has opened the offered memory."""
-        if shares.generation == self._writer.generation:
-            self.readers.add(shares.subscriber)
+        if acceptance.generation == self._writer.generation:
+            self.readers.add(acceptance.subscriber)
 
     def discard(self, subscriber: int) -> None:
         """Remove a subscriber that has disconnected or has sent another hello."""
         self.readers.discard(subscriber)
-        self._offered.pop(subscriber, None)
+        self._offers.pop(subscriber, None)
 
     def write(self, data: bytes | memoryview, subscribers: Mapping[int, int], now: float) -> bytes | None:
         """Write a payload to shared memory; return the part of the message that refers to the payload.
@@ -60,8 +60,8 @@ class SharedPayloads:
         size = data.nbytes if isinstance(data, memoryview) else len(data)
         if not subscribers or not self._prepare_readers(size, subscribers, now):
             return None
-        lent = self._writer.find_loan(data) if isinstance(data, memoryview) else None
-        number = self._writer.copy(data, size) if lent is None else self._writer.send(lent)
+        loan = self._writer.find_loan(data) if isinstance(data, memoryview) else None
+        number = self._writer.copy(data, size) if loan is None else self._writer.send(loan)
         if number is None:
             if now >= self._reclaimed_at + _RECLAIM_INTERVAL_S:
                 self._reclaimed_at = now
@@ -75,16 +75,17 @@ class SharedPayloads:
         is_prepared = self._writer.prepare(size)
         if generation != self._writer.generation:
             self.readers.clear()
-            self._offered.clear()
+            self._offers.clear()
         return is_prepared
 
     def _prepare_readers(self, size: int, subscribers: Mapping[int, int], now: float) -> bool:
         if not self._prepare_slots(size):
             return False
         for subscriber in subscribers if len(self.readers) < len(subscribers) else ():
-            times, offered_at = self._offered.get(subscriber, (0, float("-inf")))
-            if subscriber not in self.readers and times < _MAX_OFFERS and now >= offered_at + _OFFER_RETRY_S:
-                self._offered[subscriber] = (times + 1, now)
+            offer_count, offered_at = self._offers.get(subscriber, (0, float("-inf")))
+            is_due = offer_count < _MAX_OFFERS and now >= offered_at + _OFFER_RETRY_S
+            if subscriber not in self.readers and is_due:
+                self._offers[subscriber] = (offer_count + 1, now)
                 self._offer(subscriber, self._writer.generation)
         return bool(self.readers)
 
@@ -110,12 +111,12 @@ class SharedSources:
 
     Args:
         subscriber: Id of the subscriber.
-        answer: Sends the confirmation of an offer.
+        send_acceptance: Sends the confirmation of an offer.
     """
 
-    def __init__(self, subscriber: int, answer: Callable[[OfferAcceptance], None]) -> None:
+    def __init__(self, subscriber: int, send_acceptance: Callable[[OfferAcceptance], None]) -> None:
         self._subscriber = subscriber
-        self._send_acceptance = answer
+        self._send_acceptance = send_acceptance
         self._readers: dict[int, SharedReader] = {}
 
     def open(self, publisher: int, generation: int) -> None:

@@ -11,7 +11,7 @@ from nep.programs.conformance.verdict import broken_rule_error, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
 
-_SECTION = "how-a-publisher-ends"
+_SECTION = "closing-a-publisher"
 
 
 def _is_connected(publisher: ScriptedPublisher) -> bool:
@@ -35,7 +35,7 @@ def _bye(bench: Bench) -> None:
     topic, pub, subscriber = connect_publisher(bench)
     bench.call("publish", pub=pub, value={"a": 1}, count=5)
     number = bench.adapter.send_request("close_publisher", pub=pub)
-    bench.discard_opened()
+    bench.discard_close_requests()
     bench.require(lambda: bool(subscriber.byes), "bye")
     header = subscriber.byes[0].header
     expect("bye.seq", header.seq, 5)
@@ -51,8 +51,8 @@ def _bye(bench: Bench) -> None:
 def _bye_repeats(bench: Bench) -> None:
     _topic, pub, subscriber = connect_publisher(bench)
     number = bench.adapter.send_request("close_publisher", pub=pub)
-    bench.discard_opened()
-    bench.require(lambda: len(subscriber.byes) >= 3, "bye again")
+    bench.discard_close_requests()
+    bench.require(lambda: len(subscriber.byes) >= 3, "repeated bye")
     bench.wait_for_reply(number, "close_publisher")
 
 

@@ -12,7 +12,7 @@ from nep.programs.conformance.rules.messages import connect_subscriber, messages
 from nep.programs.conformance.verdict import expect, time_limit
 from nep.protocol.requests import AddPublisher
 
-_SECTION = "who-connects"
+_SECTION = "connections"
 _MAX_CLOSE_S = 3.0
 
 
@@ -133,12 +133,15 @@ def _unusable_endpoint(bench: Bench) -> None:
 def _subscriber_lost(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    killed, other = connect_subscriber(bench, topic, 3), connect_subscriber(bench, topic, 3)
+    killed_subscriber, other_subscriber = (
+        connect_subscriber(bench, topic, 3),
+        connect_subscriber(bench, topic, 3),
+    )
     bench.call("publish", pub=pub, value={"a": 1}, count=10)
-    killed.socket.close(0)
+    killed_subscriber.socket.close(0)
     bench.call("publish", pub=pub, value={"a": 1}, count=10)
-    bench.require(lambda: len(messages_of(other)) == 20, "message")
-    other.socket.close(0)
+    bench.require(lambda: len(messages_of(other_subscriber)) == 20, "message")
+    other_subscriber.socket.close(0)
     bench.wait(0.1)
     with time_limit(_MAX_CLOSE_S):
         bench.close_pub(pub)

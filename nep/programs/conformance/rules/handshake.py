@@ -27,7 +27,7 @@ def _filters(publisher: ScriptedPublisher) -> list[bytes]:
 @rule(
     "hello-after-topic",
     lazy("A subscriber subscribes to its topic, with the trailing zero byte, and then to its hello."),
-    "who-connects",
+    "connections",
 )
 def _hello_after_topic(bench: Bench) -> None:
     topic = bench.new_topic()
@@ -50,7 +50,7 @@ def _hello_after_topic(bench: Bench) -> None:
         "A hello contains the subscriber's id as 16 lowercase hexadecimal digits, and the level "
         "that it supports."
     ),
-    "who-connects",
+    "connections",
 )
 def _hello_form(bench: Bench) -> None:
     topic = bench.new_topic()
@@ -59,9 +59,9 @@ def _hello_form(bench: Bench) -> None:
     expected = hello_part(
         int(bench.latest_record("subscriber", topic)["id"]),
         topic,
-        one_part=level == 1,
+        reads_one_part=level == 1,
         acknowledges_echoes=level == 2,
-        batches=level == 3,
+        reads_batches=level == 3,
     )
     expect("hello", next(iter(publisher.hellos)), expected)
 
@@ -86,13 +86,13 @@ def _echo(bench: Bench) -> None:
 @rule(
     "foreign-hello",
     lazy("A publisher ignores hellos for another topic: they were meant for the port's previous owner."),
-    "who-connects",
+    "connections",
 )
 def _hello_for_other_topic(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     subscriber = connect_subscriber(bench, topic, 3)
-    other = hello_part(subscriber.record.id, f"{topic}/other", batches=True)
+    other = hello_part(subscriber.record.id, f"{topic}/other", reads_batches=True)
     subscriber.socket.subscribe(other)
     subscriber.socket.subscribe(hello_part(7, topic))
     bench.require(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
@@ -155,7 +155,7 @@ def _missing_hello_is_reported(bench: Bench) -> None:
 )
 def _new_sub_waits(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher = bench.create_publisher(topic, echoes=False)
+    publisher = bench.create_publisher(topic, should_echo=False)
     number = bench.adapter.send_request("subscriber", topic=topic, type="json")
     bench.require(lambda: bool(publisher.hellos), "hello")
     bench.wait(0.15)
@@ -174,7 +174,7 @@ def _new_sub_waits(bench: Bench) -> None:
 )
 def _new_sub_bounded(bench: Bench) -> None:
     topic = bench.new_topic()
-    bench.create_publisher(topic, echoes=False)
+    bench.create_publisher(topic, should_echo=False)
     with time_limit(_MAX_WAIT_S):
         bench.new_sub(topic)
 
@@ -208,12 +208,12 @@ def _latched(bench: Bench) -> None:
     bench.call("publish", pub=pub, value={"n": 1})
     bench.call("publish", pub=pub, value={"n": 2})
     subscriber = connect_subscriber(bench, topic, 3)
-    before = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
-    latched = before[0]
-    if latched.payload is None:
+    notices = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
+    first_notice = notices[0]
+    if first_notice.payload is None:
         raise broken_rule_error(_("the publisher sent no message before the echo"))
-    expect("latched.seq", latched.header.seq, 2)
-    expect("latched.flags", latched.header.flags, LATCHED)
+    expect("latched.seq", first_notice.header.seq, 2)
+    expect("latched.flags", first_notice.header.flags, LATCHED)
 
 
 @rule(

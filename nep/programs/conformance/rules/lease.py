@@ -13,7 +13,7 @@ from nep.programs.conformance.rules.messages import connect_publisher, messages_
 from nep.programs.conformance.scripted_master import RecordedRequest
 from nep.programs.conformance.verdict import broken_rule_error, expect
 
-_SECTION = "leases-and-a-master-that-starts-again"
+_SECTION = "leases-and-master-restarts"
 
 
 def _ids(request: RecordedRequest, kind: str) -> set[Any]:
@@ -80,16 +80,16 @@ def _statistics(bench: Bench) -> None:
 @rule("next-s", lazy("A node doesn't renew its lease before the time in 'next_s'."), _SECTION)
 def _next_s(bench: Bench) -> None:
     bench.new_sub(bench.new_topic())
-    wanted_s = 2.5 * bench.scale
+    next_s = 2.5 * bench.scale
     bench.master.reply_filter = lambda _request, reply: (
-        {**reply, "what": {**reply["what"], "next_s": wanted_s}} if reply["is"] == "renewed" else reply
+        {**reply, "what": {**reply["what"], "next_s": next_s}} if reply["is"] == "renewed" else reply
     )
     first = bench.wait_for_renewal(len(bench.master.received))
     second = bench.wait_for_renewal(bench.master.received.index(first) + 1, 10.0)
-    if second.at - first.at < 0.8 * wanted_s:
+    if second.at - first.at < 0.8 * next_s:
         raise broken_rule_error(
             _("the node renewed its lease after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
-                wanted=wanted_s, seconds=second.at - first.at
+                wanted=next_s, seconds=second.at - first.at
             )
         )
     bench.master.reply_filter = lambda _request, reply: reply

@@ -45,7 +45,7 @@ def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
 )
 def _lost_gap(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher = bench.create_publisher(topic, echoes=False)
+    publisher = bench.create_publisher(topic, should_echo=False)
     publisher.seq = 100
     sub = bench.new_sub(topic)
     publisher.send(b"1")
@@ -129,30 +129,31 @@ def _lost_seq_jump(bench: Bench) -> None:
 @rule(
     "lost-new",
     lazy("Losses count from seq 1 only for publishers whose 'publisher+' has 'is_new'."),
-    "how-a-publisher-ends",
+    "closing-a-publisher",
     "losses",
 )
 def _lost_from_new_publisher(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
-    new, rejoined = (
-        bench.create_publisher(topic, echoes=False),
+    new_publisher, rejoined_publisher = (
+        bench.create_publisher(topic, should_echo=False),
         bench.create_publisher(topic, is_listed=False),
     )
-    bench.require(lambda: bool(new.hellos), "hello")
-    new.send(b"1", seq=5)
+    bench.require(lambda: bool(new_publisher.hellos), "hello")
+    new_publisher.send(b"1", seq=5)
     _expect_counts(bench, sub, 1, 4)
-    rejoined.seq = 100
-    bench.master.repeat_pushes(bench.node_id, rejoined.record, rejoined.node)  # without is_new
-    bench.require(lambda: bool(rejoined.hellos), "hello")
-    rejoined.send(b"1", seq=101)
+    rejoined_publisher.seq = 100
+    # The pushes lack `is_new`.
+    bench.master.repeat_pushes(bench.node_id, rejoined_publisher.record, rejoined_publisher.node)
+    bench.require(lambda: bool(rejoined_publisher.hellos), "hello")
+    rejoined_publisher.send(b"1", seq=101)
     _expect_counts(bench, sub, 2, 4)
 
 
 @rule(
     "lost-unreachable",
     lazy("Messages of a new publisher also count as lost while the subscriber can't connect to it."),
-    "how-a-publisher-ends",
+    "closing-a-publisher",
     "losses",
 )
 def _lost_unreachable(bench: Bench) -> None:

@@ -16,10 +16,10 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedSubscriber
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.verdict import broken_rule_error, expect, printable
-from nep.protocol.batch import read_parts
+from nep.protocol.batch import parse_parts
 from nep.protocol.wire import BATCH, ParsedMessage, topic_part, unpack_header_at
 
-_BURST = 200
+_BURST_LENGTH = 200
 _MAX_STAMP_ERROR_NS = 60_000_000_000
 _SAMPLES: Mapping[str, tuple[dict[str, object], bytes]] = {
     "json": ({"value": {"text": "größe", "n": 2**53 - 1}}, b""),
@@ -89,13 +89,13 @@ def _three_parts(bench: Bench) -> None:
     topic, pub, other = connect_publisher(bench)
     subscriber = _connect_plain_subscriber(bench, topic, pub)
     count = len(subscriber.received)
-    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
-    bench.require(lambda: len(subscriber.received) >= count + _BURST, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST_LENGTH)
+    bench.require(lambda: len(subscriber.received) >= count + _BURST_LENGTH, "message")
     for parts in subscriber.raw_messages:
         expect("parts", len(parts), 3)
         expect("topic", parts[0], topic_part(topic))
     messages_of(subscriber)
-    bench.require(lambda: len(messages_of(other)) >= count + _BURST, "message")
+    bench.require(lambda: len(messages_of(other)) >= count + _BURST_LENGTH, "message")
 
 
 @rule(
@@ -106,8 +106,8 @@ def _three_parts(bench: Bench) -> None:
 def _batches_to_readers(bench: Bench) -> None:
     topic, pub, subscriber = connect_publisher(bench, 1)
     connect_subscriber(bench, topic, 3)
-    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
-    bench.require(lambda: bool(subscriber.raw_messages) and _last_seq(subscriber) >= _BURST, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST_LENGTH)
+    bench.require(lambda: bool(subscriber.raw_messages) and _last_seq(subscriber) >= _BURST_LENGTH, "message")
     for parts in subscriber.raw_messages:
         if len(parts) == 1 and unpack_header_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
             raise broken_rule_error(_("the publisher sent a batch to a subscriber whose hello has level 1"))
@@ -125,13 +125,13 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
 def _message_forms(bench: Bench) -> None:
     for level in (0, 1, 2, 3):
         _topic, pub, subscriber = connect_publisher(bench, level)
-        bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
-        bench.require(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
+        bench.call("publish", pub=pub, value={"a": 1}, count=_BURST_LENGTH)
+        bench.require(lambda: len(messages_of(subscriber)) >= _BURST_LENGTH, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
-        if seqs != list(range(1, _BURST + 1)):
+        if seqs != list(range(1, _BURST_LENGTH + 1)):
             raise broken_rule_error(_("the seqs are {seen}").format(seen=printable(seqs)))
         numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
-        if numbers != list(range(1, _BURST + 1)):
+        if numbers != list(range(1, _BURST_LENGTH + 1)):
             raise broken_rule_error(_("the messages aren't in order: {seen}").format(seen=printable(numbers)))
 
 
@@ -154,7 +154,7 @@ def _header(bench: Bench) -> None:
 
 @rule(
     "payload",
-    lazy("Payloads are encoded by the codec: JSON and text as UTF-8, bytes unchanged, msgpack."),
+    lazy("The codec encodes payloads: JSON and text as UTF-8, msgpack as msgpack, bytes unchanged."),
     "messages",
 )
 def _payload(bench: Bench) -> None:
@@ -162,7 +162,7 @@ def _payload(bench: Bench) -> None:
         _topic, pub, subscriber = connect_publisher(bench, 0, msg_type)
         bench.call("publish", pub=pub, **members)
         bench.require(lambda: bool(subscriber.raw_messages), "message")  # noqa: B023 - called immediately
-        data = bytes(read_parts(subscriber.raw_messages[0])[0].payload)
+        data = bytes(parse_parts(subscriber.raw_messages[0])[0].payload)
         try:
             if msg_type == "json":
                 expect("payload", json.loads(data.decode()), members["value"])

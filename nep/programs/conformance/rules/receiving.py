@@ -105,14 +105,14 @@ def _other_topics(bench: Bench) -> None:
 @rule(
     "read",
     lazy("A subscriber answers every echo except the first by subscribing to a read filter and removing it."),
-    "what-is-under-way",
+    "bytes-in-flight",
     "hello2",
 )
 def _read_acknowledgement(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.create_subscribed_publisher(topic)
-    before = [parse_acknowledgement(each.prefix) for each in publisher.filters]
-    if any(each is not None for each in before):
+    early_acknowledgements = [parse_acknowledgement(each.prefix) for each in publisher.filters]
+    if any(each is not None for each in early_acknowledgements):
         raise broken_rule_error(_("the subscriber answered the first echo"))
     publisher.send(b'{"a":1}')
     publisher.send(b'{"a":1}')
@@ -130,7 +130,7 @@ def _read_acknowledgement(bench: Bench) -> None:
     expect("read.seq", acknowledgement and acknowledgement.seq, 2)
     bench.require(
         lambda: any(not each.is_added and parse_acknowledgement(each.prefix) for each in publisher.filters),
-        "read taken back",
+        "removal of the read filter",
     )
 
 

@@ -69,7 +69,7 @@ def _node_record(bench: Bench) -> None:
 @rule(
     "node-key",
     lazy("Ids are SHA-256 hashes of the node's key and a number."),
-    "who-speaks-for-a-node",
+    "node-identity",
     "keys",
 )
 def _node_key(bench: Bench) -> None:
@@ -113,7 +113,7 @@ def _publisher_record(bench: Bench) -> None:
 @rule(
     "publisher-port",
     lazy("A publisher doesn't use the ports of the original NEP."),
-    "who-connects",
+    "connections",
 )
 def _publisher_port(bench: Bench) -> None:
     topic = bench.new_topic()

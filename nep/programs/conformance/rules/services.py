@@ -22,7 +22,7 @@ from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, err
 from nep.protocol.wire import topic_part
 
 _SECTION = "services.md#calls-and-answers"
-_JSON, _CALL_TIMEOUT_S = 1, 5.0
+_JSON_CODEC, _CALL_TIMEOUT_S = 1, 5.0
 
 
 @contextmanager
@@ -42,8 +42,8 @@ def _wait_for_replies(
 
     def has_all() -> bool:
         while socket.poll(0):
-            read = NATIVE.read_reply(socket.recv_multipart())
-            replies[read.number] = read.reply
+            numbered_reply = NATIVE.read_reply(socket.recv_multipart())
+            replies[numbered_reply.number] = numbered_reply.reply
         return call_numbers <= replies.keys()
 
     bench.require(has_all, "answer")
@@ -52,8 +52,8 @@ def _wait_for_replies(
 
 @rule(
     "service-record",
-    lazy("A server is registered as a publisher of 'nep.service:NAME', type and codec 'service'."),
-    "services.md#who-meets",
+    lazy("A server is registered as a publisher of 'nep.service:NAME' with the type and codec 'service'."),
+    "services.md#registration",
     "services",
 )
 def _service_record(bench: Bench) -> None:
@@ -76,10 +76,10 @@ def _service_reply(bench: Bench) -> None:
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for number in (7, 2**64 - 1):
-            socket.send_multipart(NATIVE.encode_call(number, _JSON, _CALL_TIMEOUT_S, b'{"a":1}'))
+            socket.send_multipart(NATIVE.encode_call(number, _JSON_CODEC, _CALL_TIMEOUT_S, b'{"a":1}'))
         for reply in _wait_for_replies(bench, socket, {7, 2**64 - 1}).values():
             expect("kind", int(reply.kind), int(CallKind.REPLY))
-            expect("codec", reply.codec, _JSON)
+            expect("codec", reply.codec, _JSON_CODEC)
             expect("payload", json.loads(bytes(reply.data)), {"a": 1})
 
 
@@ -92,7 +92,7 @@ def _service_reply(bench: Bench) -> None:
 def _service_malformed(bench: Bench) -> None:
     name = bench.new_topic()
     bench.call("serve", service=name)
-    (header, payload) = NATIVE.encode_call(1, _JSON, _CALL_TIMEOUT_S, b"{}")
+    (header, payload) = NATIVE.encode_call(1, _JSON_CODEC, _CALL_TIMEOUT_S, b"{}")
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.latest_record("publisher", topic_of(name))["endpoints"][0])
         for parts in (
@@ -102,8 +102,8 @@ def _service_malformed(bench: Bench) -> None:
             [header, payload, b""],
         ):
             socket.send_multipart(parts)
-        socket.send_multipart(NATIVE.encode_call(2, _JSON, _CALL_TIMEOUT_S, b'{"a":'))
-        socket.send_multipart(NATIVE.encode_call(3, _JSON, _CALL_TIMEOUT_S, b"[]"))
+        socket.send_multipart(NATIVE.encode_call(2, _JSON_CODEC, _CALL_TIMEOUT_S, b'{"a":'))
+        socket.send_multipart(NATIVE.encode_call(3, _JSON_CODEC, _CALL_TIMEOUT_S, b"[]"))
         replies = _wait_for_replies(bench, socket, {2, 3})
         expect("answers", sorted(each or 0 for each in replies), [2, 3])
         expect("kind", int(replies[2].kind), int(CallKind.REJECTED))
@@ -138,7 +138,7 @@ def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: 
     if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_TIMEOUT_S:
         raise broken_rule_error(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
     data = reply.data if reply.kind != CallKind.REPLY else call.data
-    sent_reply = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON)
+    sent_reply = Reply(reply.kind, data, call.codec if reply.kind == CallKind.REPLY else _JSON_CODEC)
     socket.send_multipart([sender, *NATIVE.encode_reply(call.number, sent_reply)])
     return bench.wait_for_reply(number, "call").get("value")
 

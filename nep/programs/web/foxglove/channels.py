@@ -75,7 +75,7 @@ class _Subscription:
     channel: _Channel
     subscriber: Subscriber
     feed: Feed
-    reader: asyncio.Task[None]
+    read_task: asyncio.Task[None]
 
 
 class Channels:
@@ -83,15 +83,18 @@ class Channels:
 
     Args:
         context: Shared objects of the connection.
-        channels: Encoder of messages.
+        channel_format: Encoder of messages.
         send: Sends a JSON message with the given fields to the client.
     """
 
     def __init__(
-        self, context: PageContext, channels: ChannelFormat, send: Callable[[Mapping[str, object]], None]
+        self,
+        context: PageContext,
+        channel_format: ChannelFormat,
+        send: Callable[[Mapping[str, object]], None],
     ) -> None:
         self._context = context
-        self._format = channels
+        self._format = channel_format
         self._send = send
         self._channels: dict[str, _Channel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
@@ -125,11 +128,13 @@ class Channels:
             if types_by_topic.get(topic) != channel.msg_type:
                 del self._channels[topic]
                 await self._unadvertise(channel)
-        new = [(topic, msg_type) for topic, msg_type in types_by_topic.items() if topic not in self._channels]
-        for begin in range(0, len(new), _MAX_CHANNELS_PER_MESSAGE):
+        new_topics = [
+            (topic, msg_type) for topic, msg_type in types_by_topic.items() if topic not in self._channels
+        ]
+        for begin in range(0, len(new_topics), _MAX_CHANNELS_PER_MESSAGE):
             self._advertise(
                 (topic, msg_type, self._format.expected_channel(topic, _readable_type(msg_type)))
-                for topic, msg_type in new[begin : begin + _MAX_CHANNELS_PER_MESSAGE]
+                for topic, msg_type in new_topics[begin : begin + _MAX_CHANNELS_PER_MESSAGE]
             )
             await yield_to_loop()
 
@@ -183,8 +188,8 @@ class Channels:
         )
         feed = Feed(topic, msg_type)
         feed.subscribe(Subscribe(id_, topic), as_pixels=False)
-        reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
-        self._subscriptions[id_] = _Subscription(id_, channel, subscriber, feed, reader)
+        read_task = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
+        self._subscriptions[id_] = _Subscription(id_, channel, subscriber, feed, read_task)
 
     async def unsubscribe(self, id_: int) -> None:
         """End a subscription.
@@ -194,7 +199,7 @@ class Channels:
         subscription = self._subscriptions.pop(id_, None)
         if subscription is None:
             return
-        subscription.reader.cancel()
+        subscription.read_task.cancel()
         self._context.queue.remove(subscription.feed)
         await self._context.run_in_thread(subscription.subscriber.close)
 
@@ -222,7 +227,7 @@ class Channels:
         The client's node closes the subscribers.
         """
         for subscription in self._subscriptions.values():
-            subscription.reader.cancel()
+            subscription.read_task.cancel()
             subscription.feed.clear()
 
 

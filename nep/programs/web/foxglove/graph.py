@@ -36,12 +36,12 @@ class GraphUpdates:
         self._are_connections_enabled = False
         self._connections = _NO_CONNECTIONS
 
-    def set_connections_enabled(self, *, is_wanted: bool) -> None:
+    def set_connections_enabled(self, *, is_enabled: bool) -> None:
         """Enable or disable updates about publishers, subscribers and servers.
 
         After being enabled, the first update contains all of them.
         """
-        self._are_connections_enabled = is_wanted
+        self._are_connections_enabled = is_enabled
         self._connections = _NO_CONNECTIONS
 
     def service_name(self, id_: int) -> str:
@@ -59,16 +59,18 @@ class GraphUpdates:
         return [*messages, *_changes(previous, self._connections)]
 
     def _update_services(self, view: GraphView) -> list[dict[str, object]]:
-        served = (each for each in view.services.values() if each.servers and is_visible(each.name))
-        offered = [(each.name, ros_type_of(each.msg_type)) for each in served][:_MAX_SERVICES]
+        services_in_graph = (
+            each for each in view.services.values() if each.servers and is_visible(each.name)
+        )
+        offered = [(each.name, ros_type_of(each.msg_type)) for each in services_in_graph][:_MAX_SERVICES]
         messages: list[dict[str, object]] = []
         removed = self._service_ids.keys() - set(offered)
         if removed:
             ids = [self._service_ids.pop(each) for each in removed]
             messages.append({"op": "unadvertiseServices", "serviceIds": ids})
-        new = [each for each in offered if each not in self._service_ids]
-        if new:
-            services = [self._new_service(*each) for each in new]
+        new_services = [each for each in offered if each not in self._service_ids]
+        if new_services:
+            services = [self._new_service(*each) for each in new_services]
             messages.append({"op": "advertiseServices", "services": services})
         return messages
 
@@ -98,20 +100,20 @@ def _connections(view: GraphView) -> _Connections:
     )
 
 
-def _changes(previous: _Connections, now: _Connections) -> list[dict[str, object]]:
-    if previous == now:
+def _changes(previous: _Connections, current: _Connections) -> list[dict[str, object]]:
+    if previous == current:
         return []
     return [
         {
             "op": "connectionGraphUpdate",
-            "publishedTopics": _changed_names(previous.published, now.published, "publisherIds"),
-            "subscribedTopics": _changed_names(previous.subscribed, now.subscribed, "subscriberIds"),
-            "advertisedServices": _changed_names(previous.services, now.services, "providerIds"),
-            "removedTopics": sorted(previous.published.keys() - now.published.keys()),
-            "removedServices": sorted(previous.services.keys() - now.services.keys()),
+            "publishedTopics": _changed_names(previous.published, current.published, "publisherIds"),
+            "subscribedTopics": _changed_names(previous.subscribed, current.subscribed, "subscriberIds"),
+            "advertisedServices": _changed_names(previous.services, current.services, "providerIds"),
+            "removedTopics": sorted(previous.published.keys() - current.published.keys()),
+            "removedServices": sorted(previous.services.keys() - current.services.keys()),
         }
     ]
 
 
-def _changed_names(previous: _Names, now: _Names, field: str) -> list[dict[str, object]]:
-    return [{"name": name, field: list(ids)} for name, ids in now.items() if previous.get(name) != ids]
+def _changed_names(previous: _Names, current: _Names, field: str) -> list[dict[str, object]]:
+    return [{"name": name, field: list(ids)} for name, ids in current.items() if previous.get(name) != ids]

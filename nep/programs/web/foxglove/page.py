@@ -71,7 +71,7 @@ class FoxglovePage(PageConnection):
         counts: Counters of the server.
         channels: Encoder of messages.
         guard: Motion guard that decides on which topics the client may publish.
-        on_robot_refused: Called with the name of a robot that the client may not move, and the reason.
+        on_robot_rejected: Called with the name of a robot that the client may not move, and the reason.
     """
 
     protocol = "foxglove"
@@ -85,7 +85,7 @@ class FoxglovePage(PageConnection):
         *,
         channels: ChannelFormat,
         guard: MotionGuard,
-        on_robot_refused: Callable[[str, str], object],
+        on_robot_rejected: Callable[[str, str], object],
     ) -> None:
         super().__init__(connection, name, new_node, counts)
         context = PageContext(
@@ -94,7 +94,7 @@ class FoxglovePage(PageConnection):
             self._thread,
             guard,
             counts,
-            on_robot_refused=on_robot_refused,
+            on_robot_rejected=on_robot_rejected,
             send_status=self._send_status,
         )
         self._context = context
@@ -104,8 +104,8 @@ class FoxglovePage(PageConnection):
         self._advertised: dict[int, op.Advertise] = {}
         """Advertised topics of the client by channel id."""
         self._updates = GraphUpdates()
-        self._rejected = 0
-        self._is_gone = asyncio.Event()
+        self._rejected_count = 0
+        self._disconnected = asyncio.Event()
 
     @property
     def _topic_list(self) -> tuple[PageTopic, ...]:
@@ -132,7 +132,7 @@ class FoxglovePage(PageConnection):
         except ws_exceptions.ConnectionClosed:
             return
         finally:
-            self._is_gone.set()
+            self._disconnected.set()
             for task in tasks:
                 task.cancel()
             self._channels.cancel()
@@ -150,9 +150,9 @@ class FoxglovePage(PageConnection):
 
     def _reject(self, error: NepError) -> None:
         self._counts.rejected += 1
-        self._rejected += 1
-        if is_logged(self._rejected):
-            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
+        self._rejected_count += 1
+        if is_logged(self._rejected_count):
+            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected_count)
         self._send_status(error.level if isinstance(error, op.OperationError) else "error", str(error))
 
     async def _encode_frames(self, queued: QueuedMessage) -> list[Frame]:
@@ -162,7 +162,7 @@ class FoxglovePage(PageConnection):
 
     async def _watch_graph(self) -> None:
         """Advertise and unadvertise topics and services as the graph changes."""
-        while not self._is_gone.is_set():
+        while not self._disconnected.is_set():
             try:
                 view = await self._context.run_in_thread(self._node.graph, _GRAPH_TIMEOUT_S)
                 await self._channels.update(
@@ -179,7 +179,7 @@ class FoxglovePage(PageConnection):
             except Exception:
                 _logger.exception("the channels of the page '%s' could not be updated", self.name)
             with suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._is_gone.wait(), _REFRESH_S)
+                await asyncio.wait_for(self._disconnected.wait(), _REFRESH_S)
 
     # ---- requests of the client
 
@@ -203,17 +203,17 @@ class FoxglovePage(PageConnection):
     async def _execute(self, fields: Mapping[str, object]) -> None:
         name = str(fields.get("op"))
         if name in {"subscribeConnectionGraph", "unsubscribeConnectionGraph"}:
-            self._updates.set_connections_enabled(is_wanted=name == "subscribeConnectionGraph")
+            self._updates.set_connections_enabled(is_enabled=name == "subscribeConnectionGraph")
             return
-        for operation, member, carry_out in (
+        for operation, field, execute in (
             ("subscribe", "subscriptions", self._subscribe),
             ("unsubscribe", "subscriptionIds", self._unsubscribe),
             ("advertise", "channels", self._advertise),
             ("unadvertise", "channelIds", self._unadvertise),
         ):
             if name == operation:
-                for item in wire.as_list(fields.get(member)):
-                    await carry_out(item)
+                for item in wire.as_list(fields.get(field)):
+                    await execute(item)
                 return
         raise NepError(_("the operation '{op}' isn't supported here").format(op=quotable(name)))
 
@@ -252,26 +252,26 @@ class FoxglovePage(PageConnection):
             await self._topics.advertise(operation)
 
     async def _unadvertise(self, id_: object) -> None:
-        advertised = self._advertised.pop(id_, None) if isinstance(id_, int) else None
-        if advertised is None:
+        advertisement = self._advertised.pop(id_, None) if isinstance(id_, int) else None
+        if advertisement is None:
             raise NepError(_("unknown channel id {id}").format(id=quotable(id_)))
-        if self._topics.is_advertised(advertised.topic):
-            await self._topics.unadvertise(op.Unadvertise(advertised.id, advertised.topic))
+        if self._topics.is_advertised(advertisement.topic):
+            await self._topics.unadvertise(op.Unadvertise(advertisement.id, advertisement.topic))
 
     async def _publish(self, message: wire.ClientMessage) -> None:
-        advertised = self._advertised.get(message.channel_id)
-        if advertised is None:
+        advertisement = self._advertised.get(message.channel_id)
+        if advertisement is None:
             raise NepError(_("unknown channel id {id}").format(id=message.channel_id))
         msg = op.parse_json(message.data)
-        if not self._topics.is_advertised(advertised.topic):
-            await self._topics.advertise(advertised)
-        await self._topics.publish(op.Publish(advertised.id, advertised.topic, msg, len(message.data)))
+        if not self._topics.is_advertised(advertisement.topic):
+            await self._topics.advertise(advertisement)
+        await self._topics.publish(op.Publish(advertisement.id, advertisement.topic, msg, len(message.data)))
 
     # ---- services
 
     def _call(self, request: wire.ServiceRequest) -> None:
-        ids = f"{request.service_id}:{request.call_id}"
-        operation = op.CallService(ids, self._updates.service_name(request.service_id), {})
+        operation_id = f"{request.service_id}:{request.call_id}"
+        operation = op.CallService(operation_id, self._updates.service_name(request.service_id), {})
         try:
             if not operation.service:
                 raise NepError(_("unknown service id {id}").format(id=request.service_id))

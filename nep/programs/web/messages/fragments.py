@@ -13,7 +13,7 @@ class FragmentBuffer:
     def __init__(self) -> None:
         self._parts: dict[OperationId, dict[int, str]] = {}
         self._totals: dict[OperationId, int] = {}
-        self._size = 0
+        self._character_count = 0
 
     def __len__(self) -> int:
         return len(self._parts)
@@ -37,13 +37,13 @@ class FragmentBuffer:
                 _("the fragments of '{id}' differ in 'total'; all were discarded").format(id=part.id), part.id
             )
         parts = self._parts.setdefault(part.id, {})
-        self._size += len(part.data) - len(parts.get(part.number, ""))
+        self._character_count += len(part.data) - len(parts.get(part.number, ""))
         parts[part.number] = part.data
         while len(self._parts) > MAX_FRAGMENTED_OPERATIONS or (
-            self._size > MAX_MESSAGE_BYTES and len(self._parts) > 1
+            self._character_count > MAX_MESSAGE_BYTES and len(self._parts) > 1
         ):
             self._discard(next(each for each in self._parts if each != part.id))
-        if self._size > MAX_MESSAGE_BYTES:
+        if self._character_count > MAX_MESSAGE_BYTES:
             self._discard(part.id)
             raise OperationError(
                 _("the fragments of '{id}' have more than {most} characters; all were discarded").format(
@@ -53,13 +53,13 @@ class FragmentBuffer:
             )
         if len(parts) < part.total:
             return None
-        joined = "".join(parts[number] for number in range(part.total))
+        text = "".join(parts[number] for number in range(part.total))
         self._discard(part.id)
-        return joined
+        return text
 
     def _discard(self, id_: OperationId) -> None:
         self._totals.pop(id_, None)
-        self._size -= sum(map(len, self._parts.pop(id_, {}).values()))
+        self._character_count -= sum(map(len, self._parts.pop(id_, {}).values()))
 
 
 def split_text(text: str, size: int) -> list[str]:

@@ -319,7 +319,7 @@ class _Fields:
         if value is None and default is not None:
             return default
         if not isinstance(value, str):
-            raise self.invalid_field(name, _("a text"))
+            raise self.invalid_field(name, _("a string"))
         if len(value) > max_length:
             raise self.error(
                 _("'{name}' has {count} characters; at most {most} are allowed").format(
@@ -457,12 +457,12 @@ def _parse_subscribe(fields: _Fields) -> Operation:
 
 
 def _parse_call_service(fields: _Fields) -> Operation:
-    service, mark, id_in_name = fields.topic("service").partition("#")
+    service, separator, id_in_name = fields.topic("service").partition("#")
     args = fields.get("args")
     timeout = fields.get("timeout")
     is_time = isinstance(timeout, int | float) and not isinstance(timeout, bool) and timeout > 0
     return CallService(
-        id_in_name if mark and fields.id is None else fields.id,
+        id_in_name if separator and fields.id is None else fields.id,
         service,
         {} if args in (None, []) else args,
         min(float(cast("float", timeout)), MAX_CALL_TIMEOUT_S) if is_time else CALL_TIMEOUT_S,

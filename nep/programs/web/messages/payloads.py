@@ -87,8 +87,8 @@ def is_compatible(ros_type: str, msg_type: str) -> bool:
     """
     if msg_type in _UNKNOWN_TYPES or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
         return True
-    requested = bare_type(ros_type)
-    return requested == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
+    requested_type = bare_type(ros_type)
+    return requested_type == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
 
 
 def codec_or_type(msg_type: str) -> str:
@@ -141,8 +141,10 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     definition = definition_of(bare_type(ros_type_of(message.msg_type)))
     if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
         return definition.encode(_with_ros1_times(message.payload))
-    text = bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
-    return type_mapping.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(text)))
+    json_data = (
+        bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
+    )
+    return type_mapping.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(json_data)))
 
 
 def _image_bytes(message: Message, ros_type: str) -> bytes:
@@ -189,7 +191,7 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
     if codec == "string":
         text = _as_map(msg, ros_type).get("data", "")
         if not isinstance(text, str):
-            raise _field_error("data", text, _("a text"))
+            raise _field_error("data", text, _("a string"))
         return text
     if codec == "bytes":
         return _to_bytes(_as_map(msg, ros_type).get("data", ""), "data")

@@ -42,8 +42,8 @@ def decode_png(data: str) -> bytes:
     """
     try:
         file = parse_header(base64.b64decode(data, validate=True))
-        is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)
-        if not is_right or file.width * file.height * 3 > MAX_MESSAGE_BYTES:
+        is_rgb8 = file.kind == "png" and (file.channels, file.bits) == (3, 8)
+        if not is_rgb8 or file.width * file.height * 3 > MAX_MESSAGE_BYTES:
             raise OperationError(
                 _("a 'png' must have 8-bit RGB pixels and at most {most} bytes").format(
                     most=MAX_MESSAGE_BYTES

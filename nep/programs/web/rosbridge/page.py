@@ -45,7 +45,7 @@ class RosbridgePage(PageConnection):
         new_node: Creates the node.
         guard: Motion guard that decides on which topics the page may publish.
         counts: Counters of the server.
-        on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
+        on_robot_rejected: Called with the name of a robot that the page may not move, and the reason.
     """
 
     protocol = "rosbridge"
@@ -57,17 +57,17 @@ class RosbridgePage(PageConnection):
         new_node: Callable[[str], Node],
         guard: MotionGuard,
         counts: WebCounts,
-        on_robot_refused: Callable[[str, str], object],
+        on_robot_rejected: Callable[[str, str], object],
     ) -> None:
         super().__init__(connection, name, new_node, counts)
         self._context = PageContext(
-            self._node, self._queue, self._thread, guard, counts, on_robot_refused=on_robot_refused
+            self._node, self._queue, self._thread, guard, counts, on_robot_rejected=on_robot_rejected
         )
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
-        self._rejected = 0
-        self._carriers: dict[type, Callable[[Any], Awaitable[None] | None]] = {
+        self._rejected_count = 0
+        self._handlers: dict[type, Callable[[Any], Awaitable[None] | None]] = {
             op.Publish: self._topics.publish,
             op.Advertise: self._topics.advertise,
             op.Unadvertise: self._topics.unadvertise,
@@ -137,11 +137,11 @@ class RosbridgePage(PageConnection):
             if inner is None:
                 return
             operation = inner
-        carry_out = self._carriers.get(type(operation))
-        if carry_out is None:
+        handler = self._handlers.get(type(operation))
+        if handler is None:
             raise op.OperationError(_("an operation has too many levels of nested fragments"), operation.id)
         try:
-            awaitable = carry_out(operation)
+            awaitable = handler(operation)
             if awaitable is not None:
                 await awaitable
         except op.OperationError:
@@ -152,11 +152,11 @@ class RosbridgePage(PageConnection):
     def _unwrap(self, part: op.Fragment | op.Png) -> op.Operation | None:
         """Return the operation in fragments or in a PNG once all parts have arrived, else None."""
         try:
-            joined = self._fragments.add(part)
-            if joined is None:
+            text = self._fragments.add(part)
+            if text is None:
                 return None
-            text = decode_png(joined) if isinstance(part, op.Png) else joined.encode("utf-8", "replace")
-            return op.parse(text)
+            data = decode_png(text) if isinstance(part, op.Png) else text.encode("utf-8", "replace")
+            return op.parse(data)
         except op.OperationError as error:
             error.id = part.id if error.id is None else error.id
             raise
@@ -165,27 +165,27 @@ class RosbridgePage(PageConnection):
         self._context.level = operation.level
 
     def _log_status(self, operation: op.PageStatus) -> None:
-        write = {"error": self._node.log.error, "warning": self._node.log.warning}
-        write.get(operation.level, self._node.log.info)("%s", op.log_text(operation.msg))
+        log_by_level = {"error": self._node.log.error, "warning": self._node.log.warning}
+        log_by_level.get(operation.level, self._node.log.info)("%s", op.log_text(operation.msg))
 
     def _reject(self, error: NepError) -> None:
         # Logged at increasing intervals: a page can send any number of invalid operations.
         self._counts.rejected += 1
-        self._rejected += 1
-        if is_logged(self._rejected):
-            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
+        self._rejected_count += 1
+        if is_logged(self._rejected_count):
+            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected_count)
         operation_error = error if isinstance(error, op.OperationError) else op.OperationError(str(error))
         self._context.send_status(operation_error.level, str(operation_error), operation_error.id)
 
 
-async def authenticate(connection: ServerConnection, check: AuthVerifier) -> bool:
+async def authenticate(connection: ServerConnection, verifier: AuthVerifier) -> bool:
     """Return True if the client's first message is a valid ``auth`` operation.
 
     Returns False if the message does not arrive within the time limit, or the connection is closed.
     """
     try:
         data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)
-        return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.verify(auth)
+        return isinstance(auth := op.parse(bytes(data)), op.Auth) and verifier.verify(auth)
     except (op.OperationError, asyncio.TimeoutError, ws_exceptions.ConnectionClosed):
         return False
 

@@ -51,23 +51,23 @@ class PageServices:
         self._send_response = respond or self._respond
         self._loop = asyncio.get_running_loop()
         self._clients: dict[str, Client] = {}
-        self._calls: set[asyncio.Task[None]] = set()
+        self._call_tasks: set[asyncio.Task[None]] = set()
         self._servers: dict[str, Server] = {}
-        self._pending: dict[OperationId, tuple[str, Future[object]]] = {}
-        self._numbers = itertools.count(1)
+        self._pending_calls: dict[OperationId, tuple[str, Future[object]]] = {}
+        self._call_numbers = itertools.count(1)
 
     # ---- calling
 
     def call(self, operation: CallService) -> None:
         """Start a call to a service without waiting; the reply is sent to the page later."""
-        if len(self._calls) >= MAX_CALLS:
+        if len(self._call_tasks) >= MAX_CALLS:
             raise OperationError(
                 _("this page already has {count} calls in flight, the maximum").format(count=MAX_CALLS),
                 operation.id,
             )
         task = asyncio.create_task(self._call(operation))
-        self._calls.add(task)
-        task.add_done_callback(self._calls.discard)
+        self._call_tasks.add(task)
+        task.add_done_callback(self._call_tasks.discard)
 
     async def _call(self, operation: CallService) -> None:
         try:
@@ -100,8 +100,8 @@ class PageServices:
         }
         if operation.id is not None:
             response["id"] = operation.id
-        form = EncodingOptions(operation.compression, operation.fragment_size)
-        self._context.queue.put(operation_frames(response, form))
+        options = EncodingOptions(operation.compression, operation.fragment_size)
+        self._context.queue.put(operation_frames(response, options))
 
     # ---- serving
 
@@ -137,17 +137,17 @@ class PageServices:
         return future
 
     def _send_call(self, service: str, request: object, future: Future[object]) -> None:
-        if len(self._pending) >= MAX_CALLS:
+        if len(self._pending_calls) >= MAX_CALLS:
             future.set_exception(ServiceFailedError(_("the page has too many pending calls")))
             return
-        id_ = f"call:{next(self._numbers)}"
+        id_ = f"call:{next(self._call_numbers)}"
         call = {"op": "call_service", "id": id_, "service": service, "args": request}
         try:
             frames = operation_frames(call, EncodingOptions())
         except NepError as error:
             future.set_exception(error)
             return
-        self._pending[id_] = service, future
+        self._pending_calls[id_] = service, future
         self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
@@ -155,13 +155,13 @@ class PageServices:
 
         Raises `OperationError` if no such call is pending.
         """
-        service, future = self._pending.get(operation.id, ("", None))
+        service, future = self._pending_calls.get(operation.id, ("", None))
         if future is None or service != operation.service:
             raise OperationError(
                 _("no pending call of '{service}' has this id").format(service=quotable(operation.service)),
                 operation.id,
             )
-        del self._pending[operation.id]
+        del self._pending_calls[operation.id]
         if operation.is_success:
             future.set_result(operation.values)
         else:
@@ -186,14 +186,14 @@ class PageServices:
 
         The page's node closes servers and clients.
         """
-        for task in self._calls:
+        for task in self._call_tasks:
             task.cancel()
         self._fail_pending()
 
     def _fail_pending(self, service: str = "") -> None:
-        for id_, (name, future) in list(self._pending.items()):
+        for id_, (name, future) in list(self._pending_calls.items()):
             if service in {"", name}:
-                del self._pending[id_]
+                del self._pending_calls[id_]
                 future.set_exception(
                     ServiceFailedError(_("the page that provides the service has disconnected"))
                 )

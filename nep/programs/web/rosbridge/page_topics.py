@@ -46,7 +46,7 @@ class _Publication:
 class _Subscription:
     subscriber: Subscriber
     feed: Feed
-    reader: asyncio.Task[None]
+    read_task: asyncio.Task[None]
 
 
 class PageTopics:
@@ -95,8 +95,8 @@ class PageTopics:
                 operation.id,
             )
         publisher = await self._context.run_in_thread(self._open_publisher, operation)
-        opened = self._publications[operation.topic] = _Publication(publisher, operation.ros_type)
-        return opened
+        publication = self._publications[operation.topic] = _Publication(publisher, operation.ros_type)
+        return publication
 
     def _open_publisher(self, operation: Advertise) -> Publisher:
         """Open the publisher of a topic. Called in the page's thread."""
@@ -114,8 +114,8 @@ class PageTopics:
         info = node.graph(_GRAPH_TIMEOUT_S).topics.get(topic)
         if info is None or info.msg_type == "*":
             return ""
-        members = {each.node_id for each in info.publishers} | {each.node_id for each in info.subscribers}
-        return "" if members <= {node.id} else info.msg_type
+        node_ids = {each.node_id for each in info.publishers} | {each.node_id for each in info.subscribers}
+        return "" if node_ids <= {node.id} else info.msg_type
 
     def _check_motion(self, topic: str, msg_type: str, id_: OperationId) -> None:
         reason = self._context.motion_denial_reason(topic, msg_type)
@@ -143,8 +143,8 @@ class PageTopics:
                 ),
                 operation.id,
             )
-        opened = Advertise(operation.id, operation.topic, ros_type_of(msg_type), is_latched=False)
-        return await self._open_publication(opened)
+        advertisement = Advertise(operation.id, operation.topic, ros_type_of(msg_type), is_latched=False)
+        return await self._open_publication(advertisement)
 
     async def unadvertise(self, operation: Unadvertise) -> None:
         """Remove one advertisement of a topic, or all of them if there is no id.
@@ -201,8 +201,8 @@ class PageTopics:
         subscriber = await self._context.run_in_thread(self._open_subscriber, operation)
         feed = Feed(operation.topic, subscriber.msg_type)
         feed.subscribe(operation, as_pixels=as_pixels)
-        reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
-        self._subscriptions[operation.topic] = _Subscription(subscriber, feed, reader)
+        read_task = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
+        self._subscriptions[operation.topic] = _Subscription(subscriber, feed, read_task)
 
     def _open_subscriber(self, operation: Subscribe) -> Subscriber:
         """Open the subscriber of a topic. Called in the page's thread."""
@@ -225,7 +225,7 @@ class PageTopics:
         )
 
     async def _close_subscription(self, subscription: _Subscription) -> None:
-        subscription.reader.cancel()
+        subscription.read_task.cancel()
         self._context.queue.remove(subscription.feed)
         await self._context.run_in_thread(subscription.subscriber.close)
 
@@ -235,7 +235,7 @@ class PageTopics:
         The page's node closes publishers and subscribers.
         """
         for subscription in self._subscriptions.values():
-            subscription.reader.cancel()
+            subscription.read_task.cancel()
             subscription.feed.clear()
 
 
@@ -254,22 +254,22 @@ async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) ->
 
 def subscribed_topic(feed: Feed) -> PageTopic:
     """Return a snapshot of a feed's rate limit, rates and counts. Thread-safe."""
-    rate, bytes_per_s = feed.sent.rates()
+    rate_hz, bytes_per_s = feed.send_rate.rates()
     return PageTopic(
         feed.topic,
         False,
         feed.max_rate_hz,
-        rate,
+        rate_hz,
         bytes_per_s,
-        feed.sent.total,
+        feed.send_rate.total,
         feed.total_dropped_count,
     )
 
 
 def _published_topic(item: tuple[str, _Publication]) -> PageTopic:
     topic, publication = item
-    rate, bytes_per_s = publication.receive_rate.rates()
-    return PageTopic(topic, True, None, rate, bytes_per_s, publication.receive_rate.total)
+    rate_hz, bytes_per_s = publication.receive_rate.rates()
+    return PageTopic(topic, True, None, rate_hz, bytes_per_s, publication.receive_rate.total)
 
 
 def _type_conflict(topic: str, ros_type: str, current_type: str, id_: OperationId) -> OperationError:
@@ -290,5 +290,5 @@ def _with_header(msg: object, ros_type: str) -> object:
     if not isinstance(header, Mapping) or "stamp" in header:
         return msg
     sec, nanosec = divmod(time.time_ns(), _NS_PER_S)
-    stamped = {"frame_id": "", **header, "stamp": {"sec": sec, "nanosec": nanosec}}
-    return {**msg, "header": stamped}
+    stamped_header = {"frame_id": "", **header, "stamp": {"sec": sec, "nanosec": nanosec}}
+    return {**msg, "header": stamped_header}

@@ -50,15 +50,16 @@ class RosApi:
     Services return the fields of their reply, and raise `NepError` for invalid arguments.
     """
 
-    def __init__(self, node: Node, motion_refusal: Callable[[str, str], str]) -> None:
+    def __init__(self, node: Node, motion_denial_reason: Callable[[str, str], str]) -> None:
         """Initialize the handler.
 
         Args:
             node: Node of the page.
-            motion_refusal: Returns the reason why the page may not publish (topic, message type), or "".
+            motion_denial_reason: Returns the reason why the page may not publish (topic, message type), or
+                "".
         """
         self._node = node
-        self._motion_denial_reason = motion_refusal
+        self._motion_denial_reason = motion_denial_reason
 
     def execute(self, service: str, args: object) -> Mapping[str, object]:
         """Execute a service of rosapi and return the fields of its reply.
@@ -189,8 +190,8 @@ class RosApi:
         """Return a type definition without fields, because services of NEP have no schema."""
         type_name = _text(args, "type")
         empty: list[str] = []
-        kinds = ("fieldnames", "fieldtypes", "fieldarraylen", "examples", "constnames", "constvalues")
-        return {"typedefs": [{"type": type_name, **dict.fromkeys(kinds, empty)}]}
+        field_names = ("fieldnames", "fieldtypes", "fieldarraylen", "examples", "constnames", "constvalues")
+        return {"typedefs": [{"type": type_name, **dict.fromkeys(field_names, empty)}]}
 
     # ---- nodes
 
@@ -219,15 +220,15 @@ class RosApi:
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of all parameters as ``NODE:PARAMETER``.
 
-        Nodes that don't reply within the time limit are omitted, as are all beyond the first 50 nodes
-        or 5 s.
+        Nodes that don't reply within the time limit are omitted. At most 50 nodes are queried, for at most
+        5 s in total.
         """
-        able = [
+        nodes = [
             node for node in self._view.nodes.values() if parameters_topic(node.id) in self._view.services
         ]
         names: list[str] = []
         deadline = time.monotonic() + _NAMES_TIMEOUT_S
-        for node in able[:_MAX_NODES_QUERIED]:
+        for node in nodes[:_MAX_NODES_QUERIED]:
             if time.monotonic() > deadline:
                 break
             try:
@@ -236,7 +237,7 @@ class RosApi:
                         f"{node.name}:{bounded_str(parameter.get('name'))}" for parameter in remote.list()
                     ]
             except NepError:
-                continue  # the node left meanwhile, or hangs
+                continue  # the node has left or does not respond
         return {"names": names}
 
     def get_param(self, args: Mapping[str, object]) -> Mapping[str, object]:

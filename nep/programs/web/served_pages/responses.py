@@ -133,8 +133,8 @@ def _origin(request: PageRequest, access: Access) -> str | None:
 def _text_response(
     status: HTTPStatus, message: str, headers: Mapping[str, str] | None = None
 ) -> PageResponse:
-    kind = {"Content-Type": _TEXT_TYPE, "Content-Security-Policy": "default-src 'none'"}
-    return PageResponse(status, {**_HEADERS, **kind, **(headers or {})}, f"{message}\n".encode())
+    content_headers = {"Content-Type": _TEXT_TYPE, "Content-Security-Policy": "default-src 'none'"}
+    return PageResponse(status, {**_HEADERS, **content_headers, **(headers or {})}, f"{message}\n".encode())
 
 
 def _page_response(status: HTTPStatus, text: str, policy: str) -> PageResponse:
@@ -160,12 +160,12 @@ def _fill_template(name: str, texts: Mapping[str, str]) -> str:
     The placeholder "data" is replaced by JSON for the page's script; other texts are escaped.
     """
 
-    def value(hole: re.Match[str]) -> str:
-        if hole[1] == "data":
+    def replacement(match: re.Match[str]) -> str:
+        if match[1] == "data":
             return _script_json(texts)
-        return html.escape(texts[hole[1]])
+        return html.escape(texts[match[1]])
 
-    return _PLACEHOLDER.sub(value, _read_template(name))
+    return _PLACEHOLDER.sub(replacement, _read_template(name))
 
 
 def _script_json(value: object) -> str:
@@ -173,7 +173,7 @@ def _script_json(value: object) -> str:
     return json.dumps(value).replace("<", "\\u003c")
 
 
-# ---- words
+# ---- texts
 
 
 def _rejected_page_texts() -> dict[str, str]:
@@ -199,7 +199,7 @@ def _test_page_texts() -> dict[str, str]:
         "hello": _("hello"),
         "publish": _("Publish"),
         "connect": _("Connect"),
-        "starter": _("Starter page for your own page"),
+        "starter": _("Template for your own page"),
         "connecting": _("Connecting…"),
         "connected": _("Connected to {address}"),
         "disconnected": _("Disconnected by the server."),

@@ -152,7 +152,7 @@ class SimulatedStudio:
         fleet, runs = self.session.fleet, self.session.runs
         fleet._heartbeat = cast("Any", SimulatedHeartbeat(clock, "studio"))
         fleet._invocations._on_idle = fleet._heartbeat.stop
-        runs._make_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
+        runs._create_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
         self.session.stopper = stopper = RobotStopper(cast("Any", self.node), clock.now)
         stopper._changed = clock.condition()
         source.post(MasterFound("127.0.0.1:9"))

@@ -133,7 +133,7 @@ def test_lost_messages_are_a_gap_in_the_curve(panel) -> None:
     assert not [x for x in columns if 0.36 * wide < x < 0.64 * wide]
     assert [x for x in columns if x < 0.3 * wide]
     assert [x for x in columns if x > 0.7 * wide]
-    assert "400 messages lost: gaps" in panel.about.text()
+    assert "400 messages lost (gaps in the curve)" in panel.caption.text()
 
 
 def test_million_points_are_reduced_to_two_per_pixel(panel) -> None:
@@ -228,8 +228,8 @@ def test_footer_reports_undecodable_messages_and_discarded_points(panel) -> None
     panel.session.series.dispatch({"/odom": Batch([bad])})
     send(panel, "/odom", [(30, {"speed": 1})])
     look(panel)
-    assert "1 message can't be decoded" in panel.about.text()
-    assert "600 points discarded: the clock was set back" in panel.about.text()
+    assert "1 message can't be decoded" in panel.caption.text()
+    assert "600 points discarded: the clock was set back" in panel.caption.text()
 
 
 # -- time --------------------------------------------------------------------------------------------------
@@ -242,7 +242,7 @@ def test_plot_scrolls_with_new_data_and_keeps_receiving_it_while_paused(panel) -
     assert panel.canvas.end_s == pytest.approx(69.95)
     assert panel.canvas.end_s - panel.canvas.begin_s == 60
     QTest.keyClick(panel.canvas, Qt.Key.Key_Space)
-    assert panel.paused.text == "paused; data is still recorded"
+    assert panel.paused_chip.text == "paused; still collecting data"
     assert panel.freeze.text() == "Resume"
     send(panel, "/odom", sine(70, 90))
     look(panel)
@@ -251,7 +251,7 @@ def test_plot_scrolls_with_new_data_and_keeps_receiving_it_while_paused(panel) -
     press(panel.freeze)
     look(panel)
     assert panel.canvas.end_s == pytest.approx(89.95)
-    assert panel.paused.text == ""
+    assert panel.paused_chip.text == ""
 
 
 def wheel(panel: PlotPanel, steps: int, modifiers=Qt.KeyboardModifier.NoModifier) -> None:
@@ -350,7 +350,7 @@ def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     assert cell(panel, "/odom.speed", "max") == value_text(float(inside.max()))
     assert cell(panel, "/odom.speed", "mean") == value_text(float(inside.mean()))
     assert cell(panel, "/odom.mode", "difference") == "6 changes"
-    assert panel.about.text() == "Min, max and mean between A and B"
+    assert panel.caption.text() == "Min, max and mean between A and B"
     QTest.keyClick(panel.canvas, Qt.Key.Key_M)
     assert panel.canvas.cursors == {}
 
@@ -374,7 +374,7 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     actions["Right axis"].trigger()
     actions["Pink"].trigger()
     look(panel)
-    assert panel.shown[1].right
+    assert panel.shown[1].is_on_right_axis
     assert panel.shown[1].style.colour == 3
     assert panel.canvas.ranges["right"].high > 1000
     assert not panel.canvas.plot.getAxis("left").style["showValues"]
@@ -384,7 +384,8 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     words, undo = window.toast_buttons[-1]
     assert (window.toasts[-1], words) == ("Removed /odom.turn", "Undo")
     undo()
-    assert [(each.name, each.right, each.style.colour) for each in panel.shown][1] == ("/odom.turn", True, 3)
+    second = panel.shown[1]
+    assert (second.name, second.is_on_right_axis, second.style.colour) == ("/odom.turn", True, 3)
 
 
 def test_plot_shortcuts_work_while_the_table_has_focus(panel) -> None:
@@ -431,13 +432,13 @@ def test_fields_are_suggested_with_values_and_accepted_by_enter(adding, window) 
     QTest.keyClicks(panel.add, "pos")
     offered = {
         line.entry.text: line.entry.note
-        for line in panel.add.matches.list.lines.lines
+        for line in panel.add.matches.list.line_model.lines
         if hasattr(line, "entry")
     }
     assert offered["/odom.pose.x"] == "1.500"
     QTest.keyClick(panel.add, Qt.Key.Key_Down)
     QTest.keyClick(panel.add, Qt.Key.Key_Return, Qt.KeyboardModifier.ShiftModifier)
-    assert [(each.name, each.right) for each in panel.shown] == [("/odom.pose.y", True)]
+    assert [(each.name, each.is_on_right_axis) for each in panel.shown] == [("/odom.pose.y", True)]
     assert panel.add.text() == ""
     assert window.session.series.topics == ("/odom",)
     assert window.session.watched == ["/odom"], "nothing else is looked at any more"
@@ -518,7 +519,7 @@ def test_second_curve_is_plotted_against_the_first_in_xy_mode(panel) -> None:
     angles = np.linspace(0, 6, 300).tolist()
     send(panel, "/odom", [(a * 5, {"x": float(np.cos(a)), "y": float(np.sin(a))}) for a in angles])
     look(panel)
-    panel.across.click()
+    panel.xy_toggle.click()
     panel.cursors.click()
     panel._set_cursor("A", 0.0)
     panel._set_cursor("B", 30.0)
@@ -526,10 +527,10 @@ def test_second_curve_is_plotted_against_the_first_in_xy_mode(panel) -> None:
     assert panel.drawings.currentWidget() is panel.xy
     one, other = panel.xy.position_of(0, 0), panel.xy.position_of(1, 1)
     assert abs(other.x() - one.x()) == pytest.approx(abs(other.y() - one.y()), rel=1e-6), "equal scales"
-    assert "A to B" in panel.about.text()
+    assert "A to B" in panel.caption.text()
     (path,) = panel.xy._paths
     assert len(path[2]) == 300
-    panel.across.click()
+    panel.xy_toggle.click()
     assert panel.drawings.currentWidget() is panel.canvas
 
 
@@ -540,7 +541,7 @@ def test_largest_and_smallest_numbers_are_drawn_in_xy_mode(panel, values) -> Non
     show(panel, "/odom.x", "/odom.y")
     rows = [(t / 10, {"x": value, "y": value}) for t, value in enumerate(values * 20)]
     send(panel, "/odom", rows)
-    panel.across.click()
+    panel.xy_toggle.click()
     panel.cursors.click()
     panel._set_cursor("A", 0.0)
     panel._set_cursor("B", 1.0)
@@ -563,7 +564,7 @@ def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, windo
     qtbot.addWidget(other)
     assert isinstance(other, PlotPanel)
     other.restore_state(kept)
-    assert [(each.name, each.right, each.is_hidden) for each in other.shown] == [
+    assert [(each.name, each.is_on_right_axis, each.is_hidden) for each in other.shown] == [
         ("/odom.speed", True, True),
         ("/odom.speed - /cmd.linear", True, False),
     ]

@@ -51,8 +51,8 @@ class AngleDial(QWidget):
         super().__init__()
         self._theme, self._minimum, self._maximum, self._step = theme, minimum, maximum, step
         self._default = default if default is not None else value
-        self._value, self._upright = value, upright
-        self._grip: float | None = None
+        self._value, self._is_upright = value, upright
+        self._drag_angle: float | None = None
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
@@ -77,14 +77,14 @@ class AngleDial(QWidget):
 
     def direction(self, angle_deg: float) -> QPointF:
         """Return the direction of an angle as a unit vector in screen coordinates."""
-        turned = math.radians(angle_deg)
-        if self._upright:
-            return QPointF(-math.cos(turned), math.sin(turned))
-        return QPointF(-math.sin(turned), -math.cos(turned))
+        angle_rad = math.radians(angle_deg)
+        if self._is_upright:
+            return QPointF(-math.cos(angle_rad), math.sin(angle_rad))
+        return QPointF(-math.sin(angle_rad), -math.cos(angle_rad))
 
     def _angle_at(self, point: QPointF) -> float:
         offset = point - QPointF(self.rect().center())
-        if self._upright:
+        if self._is_upright:
             return math.degrees(math.atan2(offset.y(), -offset.x()))
         return math.degrees(math.atan2(-offset.x(), -offset.y()))
 
@@ -100,25 +100,25 @@ class AngleDial(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._grip = self._value
+            self._drag_angle = self._value
             self._drag_to(self._angle_at(event.position()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._grip is not None:
+        if self._drag_angle is not None:
             self._drag_to(self._angle_at(event.position()))
 
-    def _drag_to(self, pointed: float) -> None:
+    def _drag_to(self, angle: float) -> None:
         # Of the equivalent angles, takes the one nearest to the last, so that full turns accumulate.
-        last = self._grip if self._grip is not None else self._value
-        self._grip = pointed + 360.0 * round((last - pointed) / 360.0)
-        self._grip = min(max(self._grip, self._minimum - 90.0), self._maximum + 90.0)
-        self._change_value(self._grip)
+        last = self._drag_angle if self._drag_angle is not None else self._value
+        self._drag_angle = angle + 360.0 * round((last - angle) / 360.0)
+        self._drag_angle = min(max(self._drag_angle, self._minimum - 90.0), self._maximum + 90.0)
+        self._change_value(self._drag_angle)
 
     def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
-        self._grip = None
+        self._drag_angle = None
 
     def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
-        self._grip = None
+        self._drag_angle = None
         self._change_value(self._default)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -131,10 +131,10 @@ class AngleDial(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         left, right = Qt.Key.Key_Left, Qt.Key.Key_Right
         by = {
-            (right if self._upright else left): self._step,
-            (left if self._upright else right): -self._step,
-            Qt.Key.Key_Up: -self._step if self._upright else self._step,
-            Qt.Key.Key_Down: self._step if self._upright else -self._step,
+            (right if self._is_upright else left): self._step,
+            (left if self._is_upright else right): -self._step,
+            Qt.Key.Key_Up: -self._step if self._is_upright else self._step,
+            Qt.Key.Key_Down: self._step if self._is_upright else -self._step,
             Qt.Key.Key_PageUp: PAGE_STEPS * self._step,
             Qt.Key.Key_PageDown: -PAGE_STEPS * self._step,
             Qt.Key.Key_Home: self._minimum - self._value,
@@ -154,7 +154,7 @@ class AngleDial(QWidget):
         middle = QRectF(self.rect()).center()
         disc = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
         painter.setPen(QPen(theme.colour("controlBorder"), 1))
-        painter.setBrush(theme.colour("sunken" if theme.dark else "panel"))
+        painter.setBrush(theme.colour("sunken" if theme.is_dark else "panel"))
         painter.drawEllipse(disc)
         self._paint_sector(painter, disc)
         painter.setPen(QPen(theme.colour("borderStrong"), 1, Qt.PenStyle.DashLine))
@@ -183,6 +183,6 @@ class AngleDial(QWidget):
             painter.drawEllipse(inner)
             return
         # Qt: 1/16 degree, counterclockwise from three o'clock
-        start, sense = (180.0, 1.0) if self._upright else (90.0, 1.0)
-        sweep = math.copysign(angle, self._value) * sense
+        start = 180.0 if self._is_upright else 90.0
+        sweep = math.copysign(angle, self._value)
         painter.drawPie(inner, round(start * 16), round(sweep * 16))

@@ -91,7 +91,7 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
     FieldContextMenu(theme, field)
     field.setAccessibleName(parameter.title)
     field.setMinimumHeight(ROW_HEIGHT - 2)
-    if not parameter.required and parameter.default is None:
+    if not parameter.is_required and parameter.default is None:
         field.setPlaceholderText(_("Optional"))
     return field
 

@@ -68,7 +68,7 @@ def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) 
             segments,
             lambda: _value_for_key(values, segments.value),
             lambda value: segments.set_value(str(value)),
-            lambda tell: connect(segments.changed, tell),
+            lambda callback: connect(segments.changed, callback),
         )
     else:
         combo = ComboBox(theme, pairs, name=parameter.title)
@@ -76,7 +76,7 @@ def _choice_control(theme: Theme, parameter: Parameter, options: Sequence[str]) 
             combo,
             lambda: _value_for_key(values, combo.value),
             lambda value: combo.set_value(str(value)),
-            lambda tell: connect(combo.currentIndexChanged, tell),
+            lambda callback: connect(combo.currentIndexChanged, callback),
         )
     if parameter.default is not None:
         control.show_value(parameter.default)
@@ -96,5 +96,5 @@ def _switch_control(theme: Theme, parameter: Parameter) -> Control:
         switch,
         switch.isChecked,
         lambda value: switch.setChecked(value is True),
-        lambda tell: connect(switch.toggled, tell),
+        lambda callback: connect(switch.toggled, callback),
     )

@@ -213,14 +213,14 @@ class ColourChoice(QWidget):
         self.field.setAccessibleName(_("{value}, hex code such as #33aaff").format(value=parameter.title))
         self.field.setPlaceholderText("#33aaff")
         self.field.setFixedWidth(round(theme.scaled(96)))
-        self.sentence = ""
+        self.error_text = ""
         self._error_label = label("", "small", role="error", wrap=True)
         self._lay_out()
         self.other.toggled.connect(self._set_expanded)
         self.swatches.changed.connect(self._swatch_selected)
         self.strip.changed.connect(self._hue_picked)
-        self.field.textEdited.connect(lambda _text: self._hex_edited(final=False))
-        self.field.editingFinished.connect(lambda: self._hex_edited(final=True))
+        self.field.textEdited.connect(lambda _text: self._hex_edited(is_final=False))
+        self.field.editingFinished.connect(lambda: self._hex_edited(is_final=True))
 
     def _lay_out(self) -> None:
         first = Flow(gap=6)
@@ -242,7 +242,7 @@ class ColourChoice(QWidget):
 
     def value(self) -> str:
         """Return the colour as ``#rrggbb``, or the typed text if it is invalid."""
-        return self.field.text() if self.sentence else self.swatches.value
+        return self.field.text() if self.error_text else self.swatches.value
 
     def set_value(self, value: object) -> None:
         """Show a colour without emitting `changed`; invalid values are ignored."""
@@ -271,19 +271,21 @@ class ColourChoice(QWidget):
         self._show_error("")
         self.changed.emit()
 
-    def _hex_edited(self, *, final: bool) -> None:
+    def _hex_edited(self, *, is_final: bool) -> None:
         match = _HEX_PATTERN.fullmatch(self.field.text().strip())
         if match is not None:
             self.swatches.set_value(f"#{match[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))
-        self._show_error("" if match is not None else _("Enter a colour such as #33aaff."), quiet=not final)
+        self._show_error(
+            "" if match is not None else _("Enter a colour such as #33aaff."), is_quiet=not is_final
+        )
         self.changed.emit()
-        if final:
+        if is_final:
             self.finished.emit()
 
-    def _show_error(self, message: str, *, quiet: bool = False) -> None:
-        self.sentence = message
-        is_visible = bool(message) and not quiet
+    def _show_error(self, message: str, *, is_quiet: bool = False) -> None:
+        self.error_text = message
+        is_visible = bool(message) and not is_quiet
         self._error_label.setText(message if is_visible else "")
         self._error_label.setVisible(is_visible)
         self.field.setProperty("wrong", "true" if is_visible else "false")
@@ -298,7 +300,7 @@ def colour_control(theme: Theme, parameter: Parameter) -> Control:
         choice,
         choice.value,
         choice.set_value,
-        lambda tell: connect(choice.changed, tell),
-        finished=lambda tell: connect(choice.finished, tell),
-        error_text=lambda: choice.sentence,
+        lambda callback: connect(choice.changed, callback),
+        finished=lambda callback: connect(choice.finished, callback),
+        error_text=lambda: choice.error_text,
     )

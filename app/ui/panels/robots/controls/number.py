@@ -26,7 +26,7 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
     """Create the input control for a number, integer or angle."""
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
-        return _open_number_control(theme, parameter)
+        return _unbounded_number_control(theme, parameter)
     slider = SliderWithUnit(
         theme,
         low,
@@ -55,7 +55,7 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
         lambda: _slider_value(slider, parameter),
         show,
         changed,
-        finished=lambda tell: connect(slider.field.editingFinished, tell),
+        finished=lambda callback: connect(slider.field.editingFinished, callback),
         error_text=lambda: slider.field.problem,
     )
 
@@ -125,15 +125,15 @@ def _make_dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidge
     row.setAccessibleName(name)
     inner = Flow(row)
     inner.addWidget(dial)
-    inner.add_elastic(slider, greedy=True)
+    inner.add_elastic(slider, is_greedy=True)
     return row
 
 
-class OpenNumberEdit(NumberEdit):
+class UnboundedNumberEdit(NumberEdit):
     """Number field for a parameter that lacks a minimum or maximum; it may be empty.
 
     Arrow keys change the number by one step, Page Up and Page Down by ten steps. The
-    result is limited to the existing limit.
+    result is clamped to the limit that exists.
     """
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:
@@ -151,12 +151,12 @@ class OpenNumberEdit(NumberEdit):
             Qt.Key.Key_PageUp: PAGE_STEPS,
             Qt.Key.Key_PageDown: -PAGE_STEPS,
         }.get(Qt.Key(event.key()))
-        now = parse_typed(self.text() or "0", as_int=False)
-        if steps is None or not has_no_modifiers(event) or not isinstance(now, (int, float)):
+        current = parse_typed(self.text() or "0", as_int=False)
+        if steps is None or not has_no_modifiers(event) or not isinstance(current, (int, float)):
             super().keyPressEvent(event)
             return
         low, high = self._parameter.minimum, self._parameter.maximum
-        target = now + steps * self._by
+        target = current + steps * self._by
         target = max(target, low) if low is not None else target
         self.show_number(min(target, high) if high is not None else target)
         self.textEdited.emit(self.text())
@@ -168,14 +168,14 @@ class OpenNumberEdit(NumberEdit):
             self._set_problem("")
 
 
-def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
-    field = OpenNumberEdit(theme, parameter)
+def _unbounded_number_control(theme: Theme, parameter: Parameter) -> Control:
+    field = UnboundedNumberEdit(theme, parameter)
     field.setMinimumWidth(VALUE_WIDTH)
     field.setMaximumWidth(2 * VALUE_WIDTH)
     error_label = label("", "small", role="error", wrap=True)
     error_label.hide()
     field.problem_changed.connect(error_label.setText)
-    field.problem_changed.connect(lambda said: error_label.setVisible(bool(said)))
+    field.problem_changed.connect(lambda message: error_label.setVisible(bool(message)))
     column = QWidget()
     column.setAccessibleName(parameter.title)
     inner = QVBoxLayout(column)
@@ -196,8 +196,8 @@ def _open_number_control(theme: Theme, parameter: Parameter) -> Control:
         column,
         lambda: parse_typed(field.text(), as_int=parameter.kind == "integer"),
         show,
-        lambda tell: connect(field.textChanged, tell),
-        finished=lambda tell: connect(field.editingFinished, tell),
+        lambda callback: connect(field.textChanged, callback),
+        finished=lambda callback: connect(field.editingFinished, callback),
         error_text=lambda: field.problem,
     )
 

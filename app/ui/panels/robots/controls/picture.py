@@ -127,7 +127,7 @@ class PictureChoice(QWidget):
         self._last_picture: object = None
         self._file: Path | None = None
         self._image: QImage | None = None
-        self.sentence = ""
+        self.error_text = ""
         self.setAccessibleName(parameter.title)
         self.setAcceptDrops(True)
         self.thumbnail = Thumbnail(theme)
@@ -150,7 +150,7 @@ class PictureChoice(QWidget):
     def _lay_out(self) -> None:
         row = Flow()
         row.addWidget(self.thumbnail)
-        row.add_elastic(self.field, greedy=True)
+        row.add_elastic(self.field, is_greedy=True)
         row.addWidget(self.choose)
         row.addWidget(self.camera)
         column = QVBoxLayout(self)
@@ -281,7 +281,7 @@ class PictureChoice(QWidget):
         self._show_error("")
 
     def _show_error(self, message: str) -> None:
-        self.sentence = message
+        self.error_text = message
         self._error_label.setText(message)
         self._error_label.setVisible(bool(message))
 
@@ -303,7 +303,7 @@ def picture_control(theme: Theme, parameter: Parameter, pictures: ImageSource) -
         choice,
         choice.value,
         show,
-        lambda tell: connect(choice.changed, tell),
-        error_text=lambda: choice.sentence,
+        lambda callback: connect(choice.changed, callback),
+        error_text=lambda: choice.error_text,
         close=choice.close_stream,
     )

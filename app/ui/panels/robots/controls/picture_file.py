@@ -19,7 +19,7 @@ from nep.errors import DecodeError
 from nep.i18n import _
 from nep.messages.image_files import MAX_BYTES, ImageFile, parse_header
 
-MAX_SIDE_PX, QUALITY = 1280, 85
+MAX_SIDE_PX, JPEG_QUALITY = 1280, 85
 MAX_FILE_BYTES = 40_000_000
 
 
@@ -88,6 +88,6 @@ def encode_image(image: QImage, *, omit_prefix: bool = False) -> str:
     encoded = QByteArray()
     buffer = QBuffer(encoded)
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    image.convertToFormat(QImage.Format.Format_RGB32).save(buffer, "JPG", QUALITY)  # type: ignore[call-overload]
+    image.convertToFormat(QImage.Format.Format_RGB32).save(buffer, "JPG", JPEG_QUALITY)  # type: ignore[call-overload]
     text = base64.b64encode(encoded.data()).decode("ascii")
     return text if omit_prefix else f"data:image/jpeg;base64,{text}"

@@ -29,8 +29,8 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
         field,
         lambda: _text_or_none(parameter, field.text()),
         lambda given: field.setText(_field_text(given)),
-        lambda tell: connect(field.textChanged, tell),
-        finished=lambda tell: connect(field.editingFinished, tell),
+        lambda callback: connect(field.textChanged, callback),
+        finished=lambda callback: connect(field.editingFinished, callback),
     )
     control.show_value(parameter.default)
     return control
@@ -42,8 +42,8 @@ def _multiline_control(theme: Theme, parameter: Parameter) -> Control:
         field,
         lambda: _text_or_none(parameter, field.text()),
         lambda given: field.set_text(_field_text(given)),
-        lambda tell: connect(field.changed, tell),
-        finished=lambda tell: connect(field.finished, tell),
+        lambda callback: connect(field.changed, callback),
+        finished=lambda callback: connect(field.finished, callback),
     )
     control.show_value(parameter.default)
     return control
@@ -55,7 +55,7 @@ def _list_control(theme: Theme, parameter: Parameter) -> Control:
 
     def value() -> object:
         text = field.text().strip()
-        if not text and not parameter.required and (parameter.nullable or parameter.kind == "object"):
+        if not text and not parameter.is_required and (parameter.is_nullable or parameter.kind == "object"):
             return None
         return parse_value(parameter, text)
 
@@ -63,8 +63,8 @@ def _list_control(theme: Theme, parameter: Parameter) -> Control:
         field,
         value,
         lambda given: field.setText(_field_text(given)),
-        lambda tell: connect(field.textChanged, tell),
-        finished=lambda tell: connect(field.editingFinished, tell),
+        lambda callback: connect(field.textChanged, callback),
+        finished=lambda callback: connect(field.editingFinished, callback),
     )
     control.show_value(parameter.default)
     return control
@@ -72,7 +72,7 @@ def _list_control(theme: Theme, parameter: Parameter) -> Control:
 
 def _text_or_none(parameter: Parameter, text: str) -> str | None:
     # Empty text omits an optional parameter; validation reports a missing required one.
-    return text if text or parameter.required else None
+    return text if text or parameter.is_required else None
 
 
 def _placeholder(parameter: Parameter) -> str:

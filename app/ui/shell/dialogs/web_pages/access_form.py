@@ -99,13 +99,13 @@ class AccessForm(QWidget):
         self.reveal = IconButton(theme, "eye", _("Show the token"), checkable=True, size=26)
         self.token = CopyField(theme, _("Token"), _("Copy the token"), self.reveal)
         self.new_token = Button(theme, _("New"), "refresh-cw")
-        self.open_to = AddressChoice(theme)
+        self.address_choice = AddressChoice(theme)
         self.reach_icon = RoleIcon(theme, "lock", side=14, is_at_top=True)
         self.reach = label("", "small", wrap=True)
         self.works_with = label("", "small", role="textTertiary", wrap=True)
         self.qr = QrCode(theme)
-        self.qr_words = label("", "small", role="textSecondary", wrap=True)
-        self.qr_words.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        self.qr_caption = label("", "small", role="textSecondary", wrap=True)
+        self.qr_caption.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
         self.address.copy_requested.connect(self.copy_address_requested)
         self.token.copy_requested.connect(self.copy_token_requested)
         self.new_token.clicked.connect(self.new_token_requested)
@@ -135,12 +135,12 @@ class AccessForm(QWidget):
             grid.addWidget(label(text, "body", role="textSecondary", wrap=True), row, 0)
         grid.addWidget(self.address, 0, 1)
         grid.addLayout(token, 1, 1)
-        grid.addWidget(self.open_to, 2, 1)
+        grid.addWidget(self.address_choice, 2, 1)
         grid.addLayout(reach_column, 3, 1)
         code = QVBoxLayout()
         code.setSpacing(6)
         code.addWidget(self.qr, 0, Qt.AlignmentFlag.AlignHCenter)
-        code.addWidget(self.qr_words)
+        code.addWidget(self.qr_caption)
         code.addStretch(1)
         grid.addLayout(code, 0, 2, 4, 1)
         self._theme.changed.connect(self._update_widths)
@@ -148,7 +148,7 @@ class AccessForm(QWidget):
 
     def _update_widths(self) -> None:
         self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
-        self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
+        self.qr_caption.setFixedWidth(round(self._theme.scaled(SIDE)))
 
     def show_state(self, *, is_foxglove: bool) -> None:
         """Update the address of the server, its token, and the description of who can reach it.
@@ -161,8 +161,8 @@ class AccessForm(QWidget):
         self._show_token()
         self.new_token.setEnabled(bool(web.token))
         self.reveal.setEnabled(bool(web.token))
-        if self.open_to.value != web.host:
-            self.open_to.set_value(web.host)
+        if self.address_choice.value != web.host:
+            self.address_choice.set_value(web.host)
         self._show_reach(is_foxglove=is_foxglove)
         self._show_qr_code(is_foxglove=is_foxglove)
 
@@ -202,4 +202,4 @@ class AccessForm(QWidget):
             self.qr.show_message(_("The code appears here once web pages can connect."))
         else:
             self.qr.show_code(web.page_url, web.host_and_port)
-        self.qr_words.setText(_("Scan with the tablet") if self.qr.text else "")
+        self.qr_caption.setText(_("Scan with the tablet") if self.qr.text else "")

@@ -44,8 +44,8 @@ class CopyField(QWidget):
 
     copy_requested = Signal()
 
-    def __init__(self, theme: Theme, name: str, copy_words: str, *buttons: IconButton) -> None:
-        # `copy_words` is the name of the copy button; `buttons` are placed before it.
+    def __init__(self, theme: Theme, name: str, copy_name: str, *buttons: IconButton) -> None:
+        # `copy_name` is the name of the copy button; `buttons` are placed before it.
         super().__init__()
         self._theme = theme
         self.line = _ReadOnlyLine()
@@ -54,7 +54,7 @@ class CopyField(QWidget):
         self.line.setProperty("bare", "true")
         self.line.setProperty("ownFocus", True)
         FieldContextMenu(theme, self.line)
-        self.copy = IconButton(theme, "copy", copy_words, size=_BUTTON)
+        self.copy = IconButton(theme, "copy", copy_name, size=_BUTTON)
         self.copy.clicked.connect(self.copy_requested)
         self.line.copy_requested.connect(self.copy_requested)
         self.line.focus_changed.connect(self.update)
@@ -99,7 +99,7 @@ class CopyField(QWidget):
         theme, painter = self._theme, QPainter(self)
         has_focus = self.line.hasFocus()
         edge, width = theme.colour("accent" if has_focus else "controlBorder"), 2.0 if has_focus else 1.0
-        fill = theme.colour("sunken" if theme.dark else "panel")
+        fill = theme.colour("sunken" if theme.is_dark else "panel")
         paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, edge, width)
         painter.end()
 

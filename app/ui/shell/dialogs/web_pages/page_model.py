@@ -114,15 +114,15 @@ class PageTreeModel(QAbstractItemModel):
         for index in reversed(range(len(self._rows))):
             if self._rows[index].id not in pages_by_id:
                 self._remove_page(index)
-        new = [listed_page for listed_page in pages if listed_page.page.id not in self._by_id]
+        new_pages = [listed_page for listed_page in pages if listed_page.page.id not in self._by_id]
         for listed_page in pages:
             row = self._by_id.get(listed_page.page.id)
             if row is not None and row.listed_page != listed_page:
                 row.listed_page = listed_page
                 self._emit_changed(self.createIndex(row.number, 0, 0), self.createIndex(row.number, 0, 0))
                 self._show_topics(row, listed_page.page.topics)
-        if new:
-            self._append_pages(new)
+        if new_pages:
+            self._append_pages(new_pages)
 
     def _append_pages(self, pages: Sequence[ListedPage]) -> None:
         first = len(self._rows)
@@ -142,36 +142,38 @@ class PageTreeModel(QAbstractItemModel):
         self.endRemoveRows()
 
     def _show_topics(self, row: PageRow, topics: Sequence[PageTopic]) -> None:
-        before = row.topics
-        if [_key(topic) for topic in before] == [_key(topic) for topic in topics]:
-            changed = [index for index, topic in enumerate(topics) if topic != before[index]]
+        old_topics = row.topics
+        if [_key(topic) for topic in old_topics] == [_key(topic) for topic in topics]:
+            changed_rows = [index for index, topic in enumerate(topics) if topic != old_topics[index]]
             row.topics = [*topics]
-            if changed:
-                self._emit_topics_changed(row, changed[0], changed[-1])
+            if changed_rows:
+                self._emit_topics_changed(row, changed_rows[0], changed_rows[-1])
             return
         parent = self.createIndex(row.number, 0, 0)
         keys = {_key(topic) for topic in topics}
-        for index in reversed(range(len(before))):
-            if _key(before[index]) not in keys:
+        for index in reversed(range(len(old_topics))):
+            if _key(old_topics[index]) not in keys:
                 self.beginRemoveRows(parent, index, index)
-                del before[index]
+                del old_topics[index]
                 self.endRemoveRows()
         for index, topic in enumerate(topics):
-            if index >= len(before) or _key(before[index]) != _key(topic):
+            if index >= len(old_topics) or _key(old_topics[index]) != _key(topic):
                 self.beginInsertRows(parent, index, index)
-                before.insert(index, topic)
+                old_topics.insert(index, topic)
                 self.endInsertRows()
-        if len(before) > len(topics):  # the remaining topics are in another order
-            self.beginRemoveRows(parent, len(topics), len(before) - 1)
-            del before[len(topics) :]
+        if len(old_topics) > len(topics):  # the remaining topics are in another order
+            self.beginRemoveRows(parent, len(topics), len(old_topics) - 1)
+            del old_topics[len(topics) :]
             self.endRemoveRows()
         row.topics = [*topics]
         self._emit_topics_changed(row, 0, len(topics) - 1)
 
     def _emit_topics_changed(self, row: PageRow, first: int, last: int) -> None:
         if first <= last:
-            id_ = row.id + 1
-            self._emit_changed(self.createIndex(first, 0, id_), self.createIndex(last, 0, id_))
+            internal_id = row.id + 1
+            self._emit_changed(
+                self.createIndex(first, 0, internal_id), self.createIndex(last, 0, internal_id)
+            )
 
     def _emit_changed(self, first: QModelIndex, last: QModelIndex) -> None:
         self.dataChanged.emit(first, last, [Qt.ItemDataRole.DisplayRole])

@@ -122,13 +122,13 @@ class PageTree(QTreeView):
     def __init__(self, theme: Theme, model: PageTreeModel) -> None:
         super().__init__()
         self.theme, self._pages = theme, model
-        self._keyboard = False
+        self._is_keyboard_navigation = False
         self._widths = dict(_WIDTHS)
-        self._hovered = QPersistentModelIndex()
+        self._hovered_index = QPersistentModelIndex()
         self._is_button_hovered = False
         self.setModel(model)
-        self._heights = _RowHeightDelegate(theme, self)
-        self.setItemDelegate(self._heights)
+        self._height_delegate = _RowHeightDelegate(theme, self)
+        self.setItemDelegate(self._height_delegate)
         self.setHeader(_PageHeader(theme, self))
         self.setAccessibleName(_("Connected pages"))
         self.setProperty("raised", "true")
@@ -169,7 +169,7 @@ class PageTree(QTreeView):
             self.copy_requested.emit(listed_page.page.origin or listed_page.page.address)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        self._keyboard = True
+        self._is_keyboard_navigation = True
         if event.key() == Qt.Key.Key_Delete:
             self.disconnect_current()
         elif event.matches(QKeySequence.StandardKey.Copy):
@@ -182,13 +182,13 @@ class PageTree(QTreeView):
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        self._keyboard = event.reason() != Qt.FocusReason.MouseFocusReason
+        self._is_keyboard_navigation = event.reason() != Qt.FocusReason.MouseFocusReason
         super().focusInEvent(event)
-        if self._keyboard and not self.currentIndex().isValid():
+        if self._is_keyboard_navigation and not self.currentIndex().isValid():
             self.setCurrentIndex(self._pages.index(0, 0))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._keyboard = False
+        self._is_keyboard_navigation = False
         index = self.indexAt(event.position().toPoint())
         if event.button() != Qt.MouseButton.LeftButton or not index.isValid():
             super().mousePressEvent(event)
@@ -249,8 +249,8 @@ class PageTree(QTreeView):
 
     def _hover(self, position: QPoint) -> None:
         index, is_over_button = QPersistentModelIndex(self.indexAt(position)), self._is_on_button(position)
-        if (index, is_over_button) != (self._hovered, self._is_button_hovered):
-            self._hovered, self._is_button_hovered = index, is_over_button
+        if (index, is_over_button) != (self._hovered_index, self._is_button_hovered):
+            self._hovered_index, self._is_button_hovered = index, is_over_button
             self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if is_over_button else "")
             self.viewport().update()
 
@@ -263,9 +263,9 @@ class PageTree(QTreeView):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         text = _("Copy the topic's name") if self._pages.topic(index) is not None else _("Copy the address")
         menu.addAction(text, self.copy_current)
-        leave = menu.addAction(_("Disconnect"), self.disconnect_current)
+        disconnect_action = menu.addAction(_("Disconnect"), self.disconnect_current)
         listed_page = self.current_page()
-        leave.setEnabled(listed_page is not None and listed_page.gone_s is None)
+        disconnect_action.setEnabled(listed_page is not None and listed_page.gone_s is None)
         menu.popup(self.viewport().mapToGlobal(position))
 
     def _measure(self) -> None:
@@ -273,7 +273,7 @@ class PageTree(QTreeView):
         for column, width in _WIDTHS.items():
             title_width = paint.width_of(font, titles.get(column, "")) + 2 * _PADDING + 1
             self._widths[column] = max(round(self.theme.scaled(width)), round(title_width))
-        self._heights.measure(self.theme)
+        self._height_delegate.measure(self.theme)
 
     def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
         return
@@ -290,7 +290,7 @@ class PageTree(QTreeView):
         if is_current:
             painter.fillRect(rect, theme.colour("selected"))
             painter.fillRect(QRectF(0, rect.top(), 2, rect.height()), theme.colour("accent"))
-        elif self._hovered == index and self._hovered.isValid():
+        elif self._hovered_index == index and self._hovered_index.isValid():
             painter.fillRect(rect, theme.colour("hover"))
         if topic is None:
             if row.number:
@@ -300,7 +300,7 @@ class PageTree(QTreeView):
             self._paint_topic(
                 painter, rect, row.topics[index.row()], is_gone=row.listed_page.gone_s is not None
             )
-        if is_current and self._keyboard and self.hasFocus():
+        if is_current and self._is_keyboard_navigation and self.hasFocus():
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(QPen(theme.colour("focus"), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -323,11 +323,11 @@ class PageTree(QTreeView):
         left = right - self._widths[column]
         return QRectF(left + _PADDING, rect.top(), right - left - 2 * _PADDING, rect.height())
 
-    def _font(self, kind: str, *, bold: bool = False, struck: bool = False) -> QFont:
+    def _font(self, kind: str, *, is_bold: bool = False, is_struck_out: bool = False) -> QFont:
         font = self.theme.font(kind)
-        if bold:
+        if is_bold:
             font.setWeight(QFont.Weight.DemiBold)
-        font.setStrikeOut(struck)
+        font.setStrikeOut(is_struck_out)
         return font
 
     def _paint_page(self, painter: QPainter, rect: QRectF, listed_page: ListedPage, index: Index) -> None:
@@ -351,7 +351,7 @@ class PageTree(QTreeView):
         room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
         room.setRight(end)
         paint.text_line(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
-        name, font = page_name(listed_page.page), self._font("body", bold=True, struck=is_gone)
+        name, font = page_name(listed_page.page), self._font("body", is_bold=True, is_struck_out=is_gone)
         text_area = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
         paint.text_line(
             painter, text_area, name, font, theme.colour(_DISCONNECTED_ROLE if is_gone else "text")
@@ -363,14 +363,15 @@ class PageTree(QTreeView):
                 painter, text_area, location_text(listed_page.page), self._font("body"), theme.colour(role)
             )
         if not is_gone:
-            is_over = self._is_button_hovered and self._hovered == index
+            is_button_hovered = self._is_button_hovered and self._hovered_index == index
             side = theme.scaled(_ICON)
             icon_area = QRectF(button.right() - side, rect.center().y() - side / 2, side, side)
-            if is_over:
+            if is_button_hovered:
                 paint.box(
                     painter, icon_area.adjusted(-4, -4, 4, 4), theme.radius("key"), theme.colour("pressed")
                 )
-            paint_icon(painter, icon_area, "x", theme.colour("text" if is_over else "textSecondary"))
+            icon_role = "text" if is_button_hovered else "textSecondary"
+            paint_icon(painter, icon_area, "x", theme.colour(icon_role))
 
     def _paint_topic(self, painter: QPainter, rect: QRectF, topic: PageTopic, *, is_gone: bool) -> None:
         theme = self.theme
@@ -379,12 +380,11 @@ class PageTree(QTreeView):
         icon = "arrow-up-from-line" if topic.is_published else "arrow-down-to-line"
         left = self._paint_icon(painter, left, rect, icon, _DISCONNECTED_ROLE if is_gone else "textSecondary")
         body, small = self._font("body"), self._font("small")
-        verbs = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
+        verb_width = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
         quiet = theme.colour(_DISCONNECTED_ROLE if is_gone else "textSecondary")
-        paint.text_line(
-            painter, QRectF(left, rect.top(), verbs + 2, rect.height()), direction_text(topic), body, quiet
-        )
-        left += verbs + 10
+        verb_rect = QRectF(left, rect.top(), verb_width + 2, rect.height())
+        paint.text_line(painter, verb_rect, direction_text(topic), body, quiet)
+        left += verb_width + 10
         limit = limit_text(topic)
         limit_width = paint.width_of(small, limit) + 2 if limit else 0.0
         end = self.cell_rect("rate", rect).left() - 2 * _PADDING
@@ -392,8 +392,9 @@ class PageTree(QTreeView):
             painter, QRectF(end - limit_width, rect.top(), limit_width, rect.height()), limit, small,
             theme.colour(_DISCONNECTED_ROLE if is_gone else "textTertiary"), paint.RIGHT,
         )  # fmt: skip
-        name = QRectF(left, rect.top(), max(20.0, end - limit_width - left - _GAP), rect.height())
-        paint.text_line(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
+        name_rect = QRectF(left, rect.top(), max(20.0, end - limit_width - left - _GAP), rect.height())
+        name_font = self._font("code", is_struck_out=is_gone)
+        paint.text_line(painter, name_rect, topic.topic, name_font, theme.colour(role))
         if is_gone:
             return
         texts: dict[PageColumn, str] = {
@@ -408,9 +409,10 @@ class PageTree(QTreeView):
 
     def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
         theme, text = self.theme, dropped_text(topic)
-        is_bad = topic.dropped_count > 0
-        paint.text_line(painter, cell, text, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
-        if is_bad:
+        has_dropped = topic.dropped_count > 0
+        colour = theme.colour("warn" if has_dropped else "text")
+        paint.text_line(painter, cell, text, font, colour, paint.RIGHT)
+        if has_dropped:
             side = theme.scaled(13)
             left = cell.right() - paint.width_of(font, text) - side - 5
             icon_area = QRectF(left, cell.center().y() - side / 2, side, side)

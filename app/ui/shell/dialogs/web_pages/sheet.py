@@ -41,7 +41,7 @@ from nep.i18n import _, ngettext
 
 WIDTH = 640
 REFRESH_MS = 300
-_SIDE, _TABLE_SIDE, _SCROLL_BAR, _EDGE, _BELOW_BARS = 19, 12, 10, 6, 46
+_SIDE_MARGIN, _TABLE_MARGIN, _SCROLL_BAR_WIDTH, _EDGE_MARGIN, _TOP_PX = 19, 12, 10, 6, 46
 _MIN_TABLE_HEIGHT = 120
 
 
@@ -51,7 +51,7 @@ class WebPagesSheet(Overlay):
     Changes are applied immediately.
     """
 
-    top = _BELOW_BARS
+    top = _TOP_PX
     is_docked_right = True
 
     def __init__(
@@ -66,13 +66,13 @@ class WebPagesSheet(Overlay):
         # `robots` returns the names of connected robots; `open_url` opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
         self._web, self._show_toast, self._open_url = web, show_toast, open_url
-        self._dismissed: set[tuple[str, ...]] = set()
+        self._dismissed_keys: set[tuple[str, ...]] = set()
         self._tab_order: list[QWidget] = []
         self.access = AccessForm(theme, web)
         self.permissions = PermissionForm(theme, web, robots)
-        self._make_header()
-        self._make_table()
-        self._make_footer()
+        self._create_header()
+        self._create_table()
+        self._create_footer()
         self._lay_out()
         self._connect()
         self._timer = QTimer(self)
@@ -80,16 +80,16 @@ class WebPagesSheet(Overlay):
         self._timer.timeout.connect(self.refresh)
         self.closed.connect(self._timer.stop)
 
-    def _make_header(self) -> None:
+    def _create_header(self) -> None:
         theme = self.theme
         self.count = Chip(theme)
         options = [("rosbridge", "rosbridge", None), ("foxglove", "Foxglove", None)]
-        self.tabs = Segments(theme, options, "rosbridge", check=True, name=_("Protocol"), dots=True)
+        self.tabs = Segments(theme, options, "rosbridge", check=True, name=_("Protocol"), has_dots=True)
         self.switch = Switch(theme, "")
         self.state = label("", "body", role="textTertiary", wrap=True)
         self.other_port = Button(theme, "", size="small")
 
-    def _make_table(self) -> None:
+    def _create_table(self) -> None:
         self.heading = label(_("Connected pages"), "title")
         self.totals = label("", "body", role="textTertiary")
         self.model = PageTreeModel(self)
@@ -100,7 +100,7 @@ class WebPagesSheet(Overlay):
         self.empty.setMinimumHeight(_MIN_TABLE_HEIGHT // 2)
         self.notice = NoticeStrip(self.theme)
 
-    def _make_footer(self) -> None:
+    def _create_footer(self) -> None:
         theme = self.theme
         self.command = ElidedLabel("code", "text", min_width=round(theme.scaled(90)))
         self.command.mode = Qt.TextElideMode.ElideRight
@@ -126,7 +126,7 @@ class WebPagesSheet(Overlay):
         self._area.viewport().setAutoFillBackground(False)
         self._area.setWidget(self._content)
         notice = QHBoxLayout()
-        notice.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
+        notice.setContentsMargins(_TABLE_MARGIN, 0, _TABLE_MARGIN, 0)
         notice.addWidget(self.notice)
         outer_column = QVBoxLayout(self)
         outer_column.setContentsMargins(1, 10, 1, 8)
@@ -143,8 +143,8 @@ class WebPagesSheet(Overlay):
         row.addWidget(RoleIcon(self.theme, "globe", side=20))
         row.addWidget(label(_("Web pages and tablets"), "heading", wrap=True))
         row.addWidget(self.count)
-        header = self.make_header(title)
-        header.setContentsMargins(_SIDE, 0, 10, 0)
+        header = self.create_header(title)
+        header.setContentsMargins(_SIDE_MARGIN, 0, 10, 0)
         return header
 
     def _form(self) -> QVBoxLayout:
@@ -155,7 +155,7 @@ class WebPagesSheet(Overlay):
         switches.push()
         switches.addWidget(self.tabs)
         form = QVBoxLayout()
-        form.setContentsMargins(_SIDE, 0, _SIDE, 0)
+        form.setContentsMargins(_SIDE_MARGIN, 0, _SIDE_MARGIN, 0)
         form.setSpacing(10)
         form.addLayout(switches)
         form.addWidget(self.access)
@@ -164,24 +164,24 @@ class WebPagesSheet(Overlay):
 
     def _table_part(self) -> QVBoxLayout:
         heading = QHBoxLayout()
-        heading.setContentsMargins(_SIDE - _TABLE_SIDE, 0, _SIDE - _TABLE_SIDE, 0)
+        heading.setContentsMargins(_SIDE_MARGIN - _TABLE_MARGIN, 0, _SIDE_MARGIN - _TABLE_MARGIN, 0)
         heading.setSpacing(8)
         heading.addWidget(self.heading)
         heading.addWidget(self.totals, 1)
         part = QVBoxLayout()
-        part.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
+        part.setContentsMargins(_TABLE_MARGIN, 0, _TABLE_MARGIN, 0)
         part.setSpacing(4)
         part.addLayout(heading)
         part.addWidget(self.table, 1)
         part.addWidget(self.empty, 1)
-        self.empty.setContentsMargins(_SIDE - _TABLE_SIDE, 4, 0, 0)
+        self.empty.setContentsMargins(_SIDE_MARGIN - _TABLE_MARGIN, 4, 0, 0)
         return part
 
     def _footer_row(self) -> Flow:
         footer = Flow(gap=8)
-        footer.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
+        footer.setContentsMargins(_SIDE_MARGIN, 0, _SIDE_MARGIN - 7, 0)
         footer.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
-        footer.add_elastic(self.command, greedy=True)
+        footer.add_elastic(self.command, is_greedy=True)
         footer.addWidget(self.copy_command)
         footer.addWidget(self.copy_page)
         footer.addWidget(self.test_page)
@@ -197,7 +197,7 @@ class WebPagesSheet(Overlay):
         access.copy_address_requested.connect(self._copy_address)
         access.copy_token_requested.connect(lambda: self._copy(self._web.token, _("Copied the token")))
         access.new_token_requested.connect(self._replace_token)
-        access.open_to.selected.connect(lambda host: self._apply(partial(self._web.listen_on, host)))
+        access.address_choice.selected.connect(lambda host: self._apply(partial(self._web.listen_on, host)))
         self.permissions.robots.changed.connect(self.refresh)
         self.permissions.origins.editing_finished.connect(self.refresh)
         table.disconnect_requested.connect(self._disconnect)
@@ -214,19 +214,19 @@ class WebPagesSheet(Overlay):
         return self.switch
 
     def preferred_size(self, room: QSize) -> QSize:
-        min_width = self._content.minimumSizeHint().width() + _SCROLL_BAR
+        min_width = self._content.minimumSizeHint().width() + _SCROLL_BAR_WIDTH
         return QSize(min(room.width(), max(round(self.theme.scaled(WIDTH)), min_width)), room.height())
 
     def _geometry_at(self, top: int) -> QRect:
         window = self.covered_window()
-        bottom = window.height() - _EDGE
+        bottom = window.height() - _EDGE_MARGIN
         for bar in window.findChildren(QWidget, "statusBar"):
             if bar.isVisible():
-                bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE)
+                bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE_MARGIN)
         for stop in stop_buttons_in(window):  # Stop buttons at the right end of a bar would overlap the sheet
             top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + STOP_GAP)
-        size = self.preferred_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
-        return QRect(QPoint(window.width() - size.width() - _EDGE, top), size)
+        size = self.preferred_size(QSize(window.width() - 2 * _EDGE_MARGIN, max(1, bottom - top)))
+        return QRect(QPoint(window.width() - size.width() - _EDGE_MARGIN, top), size)
 
     def place(self) -> None:
         super().place()
@@ -237,7 +237,7 @@ class WebPagesSheet(Overlay):
 
     def open(self) -> None:
         """Open the sheet and update it until it is closed."""
-        self.access.open_to.set_addresses(self._web.addresses(), self._web.host)
+        self.access.address_choice.set_addresses(self._web.addresses(), self._web.host)
         if self._selected_protocol not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
         self.refresh()
@@ -257,7 +257,7 @@ class WebPagesSheet(Overlay):
         self.access.show_state(is_foxglove=is_foxglove)
         self.permissions.show_state()
         self._show_pages()
-        self.notice.show_notices(notices(web, self._dismissed))
+        self.notice.show_notices(notices(web, self._dismissed_keys))
         self.command.setText(terminal_command(web))
         self.copy_page.set_label(_("Copy the link") if is_foxglove else _("Copy a starter page"))
         paint.show_when(self.test_page, not is_foxglove)
@@ -273,8 +273,8 @@ class WebPagesSheet(Overlay):
         self.switch.setChecked(self._selected_protocol in web.protocols)
         for protocol in ("rosbridge", "foxglove"):
             self.tabs.set_dot(protocol, protocol in web.protocols and web.state == "on")
-        quiet = "" if is_foxglove else _("Always off when Studio starts")
-        status_text = web.sentence or (_("Starting…") if web.state == "starting" else quiet)
+        idle_text = "" if is_foxglove else _("Always off when Studio starts")
+        status_text = web.sentence or (_("Starting…") if web.state == "starting" else idle_text)
         set_role(self.state, "error" if web.sentence else "textTertiary")
         if status_text != self.state.text():
             self.state.setText(status_text)
@@ -290,10 +290,10 @@ class WebPagesSheet(Overlay):
         self.model.show_pages([sorted_topics(each) for each in pages])
         text = ngettext("{count} connected", "{count} connected", count).format(count=group_digits(count))
         self.count.set(text if count else "", "ok")
-        sums = _("{count}, {bandwidth} in total").format(
+        totals = _("{count}, {bandwidth} in total").format(
             count=group_digits(count), bandwidth=bandwidth_text(web.bytes_per_s)
         )
-        self.totals.setText(sums if count else "")
+        self.totals.setText(totals if count else "")
         paint.show_when(self.table, bool(pages))
         paint.show_when(self.empty, not pages)
         if web.state == "on":
@@ -311,8 +311,8 @@ class WebPagesSheet(Overlay):
         access, origins = self.access, self.permissions.origins
         parts = (
             self.switch, self.other_port, self.tabs, access.address, access.token, access.new_token,
-            access.open_to, *origins.tokens, origins.edit, self.permissions.robots, self.table, self.notice,
-            self.copy_command, self.copy_page, self.test_page,
+            access.address_choice, *origins.tokens, origins.edit, self.permissions.robots, self.table,
+            self.notice, self.copy_command, self.copy_page, self.test_page,
         )  # fmt: skip
         stops = [stop for part in parts for stop in tab_stops_of(part)]
         if stops != self._tab_order:
@@ -339,7 +339,7 @@ class WebPagesSheet(Overlay):
             self._copy(self._web.template_page(), message)
 
     def _replace_token(self) -> None:
-        web, before = self._web, self._web.token
+        web, old_token = self._web, self._web.token
         count = web.generate_token()
         self.refresh()
         message = ngettext(
@@ -348,7 +348,7 @@ class WebPagesSheet(Overlay):
 
         def undo() -> None:
             if web.token and web.host:
-                self._apply(partial(web.set_token, before))
+                self._apply(partial(web.set_token, old_token))
 
         self._show_toast(
             message.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo
@@ -382,5 +382,5 @@ class WebPagesSheet(Overlay):
 
     def _dismiss(self) -> None:
         if self.notice.notice is not None:
-            self._dismissed.add(self.notice.notice.key)
+            self._dismissed_keys.add(self.notice.notice.key)
             self.refresh()
