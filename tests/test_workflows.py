@@ -317,7 +317,7 @@ def test_package_is_installed_self_tested_and_removed(
 
 
 @pytest.mark.parametrize("runner", STAND_INS, indirect=True)
-def test_failed_self_test_fails_the_trial(runner: tuple[Path, str]) -> None:
+def test_failed_self_test_fails_the_package_test(runner: tuple[Path, str]) -> None:
     place, system = runner
     (place / "studio").write_text("#!/usr/bin/env bash\nexit 1\n", encoding="utf-8")
     assert tried(place, system).startswith("Self-test of the installed package")
@@ -326,7 +326,7 @@ def test_failed_self_test_fails_the_trial(runner: tuple[Path, str]) -> None:
 @pytest.mark.parametrize(
     ("runner", "name"), [("windows", "remove"), ("linux", "bin/apt-get")], indirect=["runner"]
 )
-def test_files_left_by_the_uninstaller_fail_the_trial(runner: tuple[Path, str], name: str) -> None:
+def test_files_left_by_the_uninstaller_fail_the_package_test(runner: tuple[Path, str], name: str) -> None:
     place, system = runner
     script = (place / name).read_text(encoding="utf-8")
     (place / name).write_text(re.sub(r"rm (-R )?", "true ", script), encoding="utf-8")

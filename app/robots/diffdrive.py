@@ -139,7 +139,7 @@ class DiffDrive:
         )
         return {"moved": round(moved_m, 3)}
 
-    @drives("turn %angle °", "rotate-ccw", "turns %angle °", unit="deg")
+    @drives("turn %angle °", "rotate-ccw", "turns %angle°", unit="deg")
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
         """Turn on the spot; positive angles turn left."""
         self._turn_on_spot(call, angle, lambda turned: {"to_go": _remaining(abs(angle), turned)})

@@ -141,7 +141,7 @@ class VirtualPepper(SimulatedRobot):
     @drives(
         "turn %direction by %angle °",
         "rotate-ccw",
-        "turns %direction by %angle °",
+        "turns %direction by %angle°",
         unit="deg",
         rize="turn",
         from_rize=_rize_turn,

@@ -328,13 +328,13 @@ def startup_problem(environ: Mapping[str, str], platform: str, user_id: int) -> 
         return ""
     if not any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
         return _(
-            "no screen found (DISPLAY and WAYLAND_DISPLAY aren't set). Start Studio on a desktop, or "
+            "no screen found (DISPLAY and WAYLAND_DISPLAY aren't set); start Studio on a desktop, or "
             "run a behaviour without a window: nep-studio run FILE"
         )
     if user_id == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
         return _(
-            "The block editor's browser can't run as root with its sandbox. Start Studio as another "
-            "user or, if there is no other way, set QTWEBENGINE_DISABLE_SANDBOX=1"
+            "the block editor's browser can't run as root with its sandbox; start Studio as another user "
+            "or, if there is no other way, set QTWEBENGINE_DISABLE_SANDBOX=1"
         )
     return ""
 
@@ -361,13 +361,13 @@ def run(options: Options) -> int:
         return 2
     console_handler = qt_log.install_handlers()
     qt_log.quiet_chromium(os.environ)
-    trial = sandbox.start_trial(os.environ, sys.platform)
+    sandbox_test = sandbox.start_test(os.environ, sys.platform)
     portal.use_portal(os.environ, sys.platform)
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
     with StudioRun() as this_run:
         return _run_window(
-            application, options, console_handler, this_run, (instance_socket, start_lock), trial
+            application, options, console_handler, this_run, (instance_socket, start_lock), sandbox_test
         )
 
 
@@ -377,7 +377,7 @@ def _run_window(
     console_handler: qt_log.ConsoleHandler,
     this_run: StudioRun,
     socket_and_lock: tuple[str, FileLock],
-    trial: sandbox.SandboxTrial | None,
+    sandbox_test: sandbox.SandboxTest | None,
 ) -> int:
     # Returns the exit code.
     session = Session()
@@ -413,7 +413,7 @@ def _run_window(
         application.set_file_opener(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
         driver = SelfDrive(window, options.self_drive)
-    sandbox.configure_sandbox(os.environ, trial)  # requires the event loop, which creates the page
+    sandbox.configure_sandbox(os.environ, sandbox_test)  # requires the event loop, which creates the page
     code = application.exec()
     speaker.close()
     if driver is not None and not driver.has_succeeded:

@@ -48,7 +48,7 @@ ADVICE = {
 MAX_TONES = 4
 RATE_HZ, FADE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_TIMEOUT_S = 0.5
-TRIAL_TIMEOUT_S = 20.0
+TEST_TIMEOUT_S = 20.0
 """Timeout in s of the test process. An engine that takes longer would block this process too."""
 Request: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
@@ -78,11 +78,11 @@ def try_voice() -> int:
     """
     with Path(os.devnull).open("w", encoding="utf-8") as null_file:
         # ends the process even if its parent is gone
-        faulthandler.dump_traceback_later(TRIAL_TIMEOUT_S, exit=True, file=null_file)
-        return _run_voice_trial()
+        faulthandler.dump_traceback_later(TEST_TIMEOUT_S, exit=True, file=null_file)
+        return _run_voice_test()
 
 
-def _run_voice_trial() -> int:
+def _run_voice_test() -> int:
     if sys.platform == "win32":
         # Ends the process on a crash without showing a dialog or debugger.
         kernel = ctypes.windll.kernel32
@@ -97,8 +97,8 @@ def _run_voice_trial() -> int:
     return 0
 
 
-def passes_trial(command: Sequence[str] = ()) -> bool:
-    """Return True if a test process could create a speech engine; blocks for up to `TRIAL_TIMEOUT_S`.
+def passes_voice_test(command: Sequence[str] = ()) -> bool:
+    """Return True if a test process could create a speech engine; blocks for up to `TEST_TIMEOUT_S`.
 
     A faulty engine then crashes the test process instead of Studio.
 
@@ -111,7 +111,7 @@ def passes_trial(command: Sequence[str] = ()) -> bool:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=TRIAL_TIMEOUT_S,
+            timeout=TEST_TIMEOUT_S,
             creationflags=NO_CONSOLE,
             check=False,
         )
@@ -205,7 +205,7 @@ class QtEngine:
     def _get_voice(self) -> QTextToSpeech | None:
         if not self._has_tried_voice:
             self._has_tried_voice = True
-            if has_voice_engine() and passes_trial():
+            if has_voice_engine() and passes_voice_test():
                 from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy)
 
                 try:

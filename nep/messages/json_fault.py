@@ -177,14 +177,14 @@ def _missing_comma_fault(text: str, position: int, end: int) -> JsonFault:
 def _unclosed_bracket_fault(text: str, end: int) -> JsonFault:
     open_brackets: list[str] = []
     for match in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
-        character = match[0]
-        if character in _CLOSING_BRACKETS:
-            open_brackets.append(character)
-        elif character in {"}", "]"} and open_brackets:
+        token = match[0]  # a string or a bracket
+        if token in _CLOSING_BRACKETS:
+            open_brackets.append(token)
+        elif token in {"}", "]"} and open_brackets:
             open_brackets.pop()
     if not open_brackets:
         return _fault_at(text, end, _("a value is missing at the end"))
-    missing = "".join(_CLOSING_BRACKETS[character] for character in reversed(open_brackets))
+    missing = "".join(_CLOSING_BRACKETS[bracket] for bracket in reversed(open_brackets))
     fix = JsonFix(end, end, missing) if text[end - 1] not in ",:" else None
     shown_brackets = shortened(missing, _MAX_WORD_LENGTH)
     return _fault_at(

@@ -39,7 +39,7 @@ _REPLACEMENTS: Mapping[str, str] = {
 
 
 def original_hint(name: str) -> str:
-    """Return a hint at the replacement of a name that only the original module has; "" for any other name."""
+    """Return a hint that names the replacement of a name of the original module; "" for any other name."""
     replacement = _REPLACEMENTS.get(name)
     if replacement is None:
         return ""

@@ -65,7 +65,7 @@ class Terminal(io.TextIOBase):
         return self._stream is not None and self._stream.isatty()
 
     def write(self, text: str) -> int:
-        """Queue text; drop it if the queue is full or the stream has failed."""
+        """Queue text; drop it if the queue is full, the stream has failed or `close` was called."""
         with self._condition:
             if self._has_failed or self._is_closing or not text:
                 return len(text)

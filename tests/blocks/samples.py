@@ -50,7 +50,7 @@ ACTIONS: dict[str, object] = {
             "Movement",
             "rotate-ccw",
             "%robot turn %direction by %angle °",
-            "%robot turns %direction by %angle °",
+            "%robot turns %direction by %angle°",
         ),
         ["direction", "angle"],
         direction={"title": "direction", "type": "string", "enum": ["left", "right"], "default": "left"},

@@ -151,7 +151,7 @@ def test_robot_action_is_described_as_sentence():
     turn, say = pepper.action("turn"), pepper.action("say")
     assert turn is not None
     assert say is not None
-    assert activity_text(pepper, turn, {"direction": "right"}) == "Pepper turns right by 90 °"
+    assert activity_text(pepper, turn, {"direction": "right"}) == "Pepper turns right by 90°"
     assert activity_text(pepper, say, {"text": "Hi"}) == "Pepper says “Hi”"
 
 

@@ -87,7 +87,9 @@ def test_dealer_reports_a_lost_connection_and_reconnects(context, stack: ExitSta
     assert dealer.ask("refused") in {"refused ", "disconnected"}
 
 
-def test_sub_sends_its_filters_in_byte_order_on_every_connection(context, stack: ExitStack) -> None:
+def test_sub_socket_sends_sorted_filters_and_later_changes_and_receives_matching_messages(
+    context, stack: ExitStack
+) -> None:
     sub = started(stack, "sub")
     filters = [LAST, *(b"topic %d\0" % number for number in range(10)), TOPIC]
     for each in filters:

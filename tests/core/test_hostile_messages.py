@@ -8,6 +8,7 @@ from itertools import zip_longest
 import pytest
 
 import nep
+from app.core.console import ConsoleRecord
 from app.core.session import Session
 from app.errors import DescriptionError
 from app.robots.description.description import parse_announcement, thing_description
@@ -72,7 +73,7 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
                     publisher.publish_bytes(payload)
             if number % 20 == 0:
                 session.tick()
-                assert session.console.records is not None
+                assert all(isinstance(record, ConsoleRecord) for record in session.console.records)
         node.log.error("an honest record")
         tick_until(session, lambda: any(each.text == "an honest record" for each in session.console.records))
         tick_until(session, lambda: session.fleet.link("Lamp").publisher)

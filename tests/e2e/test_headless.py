@@ -30,7 +30,7 @@ def run(file: Path, *arguments: str) -> Program:
 
 def test_ctrl_c_stops_the_program_and_the_robot(pepper: Program, tmp_path: Path) -> None:
     with run(write(tmp_path / "Turning.nepb", started(forever(turn(300)))), "--robot-wait", "30") as program:
-        program.says("Pepper turns left by 300 °", 40)
+        program.says("Pepper turns left by 300°", 40)
         program.interrupt()
         assert program.wait(10) == 130, program.lines
         program.says("Pepper stopped (")

@@ -90,7 +90,7 @@ def test_blocks_dragged_with_the_mouse_run_on_the_robot(studio: Studio, address:
         (turning,) = until(lambda: [i for i in studio.outlined("running") if i != hat], "its block glows")
         web = studio.find(kind="QWebEngineView")
         until(lambda: amber(studio.picture(web)) > amber(quiet) + 200, "the glow can be seen on the screen")
-        studio.says("Pepper turns left by 360 °")
+        studio.says("Pepper turns left by 360°")
         until(lambda: (pose.listen()[1] or {}).get("theta", 0) != 0, "the robot turns")
         studio.click("Stop", kind="StopButton")
         studio.says("Pepper stopped (")

@@ -12,7 +12,7 @@ from itertools import pairwise
 import pytest
 
 from app.core.robots.voices import Notes
-from app.ui.speaker import QtEngine, QtSpeaker, no_voice_message, passes_trial, samples, voice_text
+from app.ui.speaker import QtEngine, QtSpeaker, no_voice_message, passes_voice_test, samples, voice_text
 
 
 class FakeEngine:
@@ -146,20 +146,20 @@ def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
 
 def test_voice_engine_that_crashes_in_its_test_process_is_not_created(qtbot, monkeypatch, caplog) -> None:
     crash = [sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"]
-    assert not passes_trial(crash)
+    assert not passes_voice_test(crash)
     assert "the test process exited with" in caplog.text
-    assert not passes_trial([sys.executable + " is not there"])
-    assert passes_trial([sys.executable, "-c", ""])
+    assert not passes_voice_test([sys.executable + " is not there"])
+    assert passes_voice_test([sys.executable, "-c", ""])
     monkeypatch.setattr("app.ui.speaker.has_voice_engine", lambda: True)
     monkeypatch.setattr("app.ui.speaker.module_command", lambda module: crash)
     assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice_message("en")
 
 
 def test_hanging_test_process_of_the_voice_engine_is_terminated(monkeypatch) -> None:
-    monkeypatch.setattr("app.ui.speaker.TRIAL_TIMEOUT_S", 0.2)
-    assert not passes_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
-    hangs = "import threading; from app.ui import speaker; speaker.TRIAL_TIMEOUT_S = 0.2; "
-    hangs += "speaker._make_voice = lambda: threading.Event().wait(); speaker.try_voice()"
+    monkeypatch.setattr("app.ui.speaker.TEST_TIMEOUT_S", 0.2)
+    assert not passes_voice_test([sys.executable, "-c", "import threading; threading.Event().wait()"])
+    hangs = "import threading; from app.ui import speaker; speaker.TEST_TIMEOUT_S = 0.2; "
+    hangs += "speaker._run_voice_test = lambda: threading.Event().wait(); speaker.try_voice()"
     assert subprocess.run([sys.executable, "-c", hangs], check=False).returncode == 1
 
 

@@ -260,9 +260,9 @@ class TopicField(Field):
         if not topic:
             raise FieldError(_("needs the name of a topic"))
         if any(character.isspace() or character == "{" or not character.isprintable() for character in topic):
-            raise FieldError(_("needs a topic without spaces, control characters and curly brackets"))
+            raise FieldError(_("needs a topic name without spaces, control characters or “{”"))
         if len(topic.encode("utf-8", "replace")) > _MAX_TOPIC_BYTES:
-            raise FieldError(_("needs a shorter topic"))
+            raise FieldError(_("needs a shorter topic name"))
         return topic
 
 

@@ -83,7 +83,8 @@ EXAMPLES: Mapping[str, str] = {
     "sensing_now": "For example: if “hour now” is below 12, say “Good morning”.",
     "sensing_seconds_since": "For example: if seconds since 14:30 is above 0, say “The lesson is over”.",
     "lists_part": "For example: items 1 to 3 of “names” are the first three.",
-    "lists_is_empty": "For example: repeat until “tasks” is empty: say take out first item of “tasks”.",
+    "lists_is_empty": "For example: repeat until “tasks” is empty: say the value of "
+    "“take out first item of tasks”.",
     "lists_total": "For example: say average of “marks”.",
     "lists_copy": "For example: set “names” to copy of “names” from small to large.",
     "lists_clear": "For example: when started, remove all items of “answers”.",
@@ -102,7 +103,8 @@ EXAMPLES: Mapping[str, str] = {
     "lists_insert": "For example: insert “first of all” as first item of “tasks”.",
     "lists_set": "For example: set item number 2 of “marks” to 6.",
     "lists_remove": "For example: remove first item of “tasks” when it is done.",
-    "lists_take": "For example: say take out a random item of “jokes”, so that no joke is repeated.",
+    "lists_take": "For example: to tell each joke only once, say the value of "
+    "“take out a random item of jokes”.",
     "lists_each": "For example: for each item “name” in “names”: say “name”.",
     "functions_define": "For example: to greet with “name”: say join “Hello ” and “name”.",
     "functions_define_result": "For example: to double with “number”: return number × 2.",  # noqa: RUF001

@@ -74,7 +74,7 @@ class StudioRun:
         return self._marker.exists()
 
     def start(self) -> None:
-        """Create the marker file. A failure is logged."""
+        """Create and lock the marker file, and enable faulthandler. A failure is logged."""
         self._began_s = self._clock()
         try:
             self._write(is_exit_requested=False)

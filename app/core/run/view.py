@@ -145,7 +145,7 @@ def view_of(
             behaviour, and Run applies to the current tab.
         is_slow: True if blocks run with a delay.
     """
-    view = replace(_view(run, connected, starting_robots, now), is_slow=is_slow)
+    view = replace(_view_of_state(run, connected, starting_robots, now), is_slow=is_slow)
     if run.tried_label:
         return _tried_view(view, run)
     is_named = is_elsewhere and run.name and (run.state != "ready" or _ended_without_robots(run))
@@ -201,7 +201,9 @@ def _named_view(view: RunView, run: RunState, now: float) -> RunView:
     return view
 
 
-def _view(run: RunState, connected: Sequence[str], starting_robots: Sequence[str], now: float) -> RunView:
+def _view_of_state(
+    run: RunState, connected: Sequence[str], starting_robots: Sequence[str], now: float
+) -> RunView:
     is_early = (
         run.state == "stopping"
         and not run.is_stop_repeated

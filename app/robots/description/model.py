@@ -32,7 +32,7 @@ class Action:
 
     Attributes:
         text: Text of the block, with ``%robot`` once, words, and ``%parameter`` for each parameter.
-        says: Sentence about the running action with the same placeholders, such as ``%robot turns %angle °``.
+        says: Sentence about the running action with the same placeholders, such as ``%robot turns %angle°``.
         risk: "moves" if parts of the robot move, "locomotes" if the robot drives; None for neither.
         uses: Names of the resources that the action occupies.
         on_busy: "queue", "replace" or "reject" when a resource is in use.

@@ -27,7 +27,7 @@ class BlocklyBridge(QObject):
 
     command_sent = Signal(str, str)  # to the page: a command and its JSON
     page_ready = Signal()
-    edited = Signal(str, int, str)  # a tab's key, generation of the program loaded there, workspace as JSON
+    edited = Signal(str, int, str)  # a tab's key, generation of its workspace, workspace as JSON
     undo_changed = Signal(bool, bool)
     block_selected = Signal(str)
     workspace_flushed = Signal(int, str)  # token of a flush, workspace as JSON

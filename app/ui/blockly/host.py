@@ -143,7 +143,7 @@ class BlocklyHost(QWidget):
         return self._web
 
     def set_theme(self, tokens: Mapping[str, object], is_dark: bool) -> None:
-        """Set the colours and sizes of the page; program and undo stack are preserved.
+        """Set the colours and sizes of the page; blocks and undo stack are preserved.
 
         Args:
             tokens: Design tokens: the parsed token file, or `Theme.blockly_tokens()`.

@@ -43,18 +43,18 @@ class Tabs:
     def __getitem__(self, key: str) -> Tab | None:
         return self._tabs.get(key)
 
-    def show(self, key: str, program: WorkspaceJson) -> str | None:
+    def show(self, key: str, workspace: WorkspaceJson) -> str | None:
         """Show a tab, which is created if necessary.
 
         Args:
             key: Key of the behaviour.
-            program: Workspace for a new tab; not used for an existing one.
+            workspace: Workspace for a new tab; not used for an existing one.
 
         Returns:
             The key of the placeholder if it was removed, else None.
         """
         previous = self.shown_tab
-        self.shown_tab = self._tabs.get(key) or self._create_tab(key, program)
+        self.shown_tab = self._tabs.get(key) or self._create_tab(key, workspace)
         if previous.key or previous is self.shown_tab:
             return None
         del self._tabs[""]
@@ -67,19 +67,19 @@ class Tabs:
             self.shown_tab = self._create_tab("", WorkspaceJson.from_blocks(EMPTY_WORKSPACE))
         return tab is not None
 
-    def replace(self, program: WorkspaceJson) -> None:
-        """Replace the program of the shown tab; `tab_for_edit` rejects later edits of the old program."""
+    def replace(self, workspace: WorkspaceJson) -> None:
+        """Replace the workspace of the shown tab; `tab_for_edit` rejects later edits of the old workspace."""
         self._generations += 1
         self.shown_tab.generation = self._generations
-        self.shown_tab.workspace = program
+        self.shown_tab.workspace = workspace
         self.shown_tab.states.clear()
 
     def tab_for_edit(self, key: str, generation: int) -> Tab | None:
-        """Return the tab to which an edit belongs; None if the tab was closed or its program was replaced.
+        """Return the tab to which an edit belongs; None if the tab was closed or its workspace was replaced.
 
         Args:
             key: Key of the behaviour.
-            generation: Value of `Tab.generation` when the edited program was loaded.
+            generation: Value of `Tab.generation` when the edited workspace was loaded.
         """
         tab = self._tabs.get(key)
         return tab if tab is not None and tab.generation == generation else None
@@ -89,7 +89,7 @@ class Tabs:
         for tab in self._tabs.values():
             tab.is_loaded = False
 
-    def _create_tab(self, key: str, program: WorkspaceJson) -> Tab:
+    def _create_tab(self, key: str, workspace: WorkspaceJson) -> Tab:
         self._generations += 1
-        self._tabs[key] = Tab(key, program, self._generations)
+        self._tabs[key] = Tab(key, workspace, self._generations)
         return self._tabs[key]

@@ -1,7 +1,7 @@
 """Block editor widget.
 
-The view always stores the latest programs. The page is loaded on the first show; if its process dies, the
-view sends the complete state to a new page.
+The view always stores the latest blocks of each tab. The page is loaded on the first show; if its process
+dies, the view sends the complete state to a new page.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class BlocklyView(BlocklyHost):
     is one empty behaviour, with the key "".
     """
 
-    changed = Signal(str, object)  # key of a tab and its newest program (WorkspaceJson), 150 ms after an edit
+    changed = Signal(str, object)  # key of a tab and its newest blocks (WorkspaceJson), 150 ms after an edit
     history_changed = Signal(bool, bool)  # can undo, can redo; in the shown tab
     block_selected = Signal(str)  # id of the selected block; "" if none is selected
     canvas_button_pressed = Signal(
@@ -104,7 +104,7 @@ class BlocklyView(BlocklyHost):
             lambda text: self.visible_sensors_changed.emit(parse_string_pairs(text))
         )
 
-    # -- program ----------------------------------------------------------------------------------
+    # -- blocks -----------------------------------------------------------------------------------
 
     @property
     def workspace(self) -> Mapping[str, object]:
@@ -115,7 +115,7 @@ class BlocklyView(BlocklyHost):
         return self._tabs.shown_tab.workspace.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
-        """Return the latest program of a tab, or None if there is no such tab."""
+        """Return the latest workspace of a tab, or None if there is no such tab."""
         tab = self._tabs[key]
         return tab.workspace.blocks if tab is not None else None
 
@@ -124,7 +124,7 @@ class BlocklyView(BlocklyHost):
 
         Args:
             key: Key of the behaviour.
-            workspace: Program for a new tab; not used for an existing one.
+            workspace: Workspace for a new tab; not used for an existing one.
         """
         evicted = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
         self._send_tab()
@@ -140,21 +140,21 @@ class BlocklyView(BlocklyHost):
             self._send_command("close", key)
 
     def load(self, workspace: Mapping[str, object]) -> None:
-        """Replace the program of the shown tab by another document.
+        """Replace the blocks of the shown tab with those of another document.
 
-        Clears the undo stack and discards pending edits of the old program.
+        Clears the undo stack and discards pending edits of the old blocks.
         """
         self._tabs.replace(WorkspaceJson.from_blocks(workspace))
         self._tabs.shown_tab.is_loaded = False
         self._send_tab()
 
     def apply_edit(self, workspace: Mapping[str, object]) -> None:
-        """Change the program of the shown tab as one undoable edit; `changed` is not emitted."""
+        """Replace the blocks of the shown tab as one undoable edit; `changed` is not emitted."""
         self._tabs.shown_tab.workspace = WorkspaceJson.from_blocks(workspace)
         self._send_command("change", workspace)
 
     def flush(self, callback: Callable[[WorkspaceJson], None]) -> None:
-        """Fetch pending edits of the shown tab, then call `callback` with the latest program.
+        """Fetch pending edits of the shown tab, then call `callback` with the latest workspace.
 
         `callback` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
         edits: they were flushed when another tab was shown.
@@ -234,7 +234,7 @@ class BlocklyView(BlocklyHost):
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
         """Set the block definitions (see `editor_definitions`). Equal definitions are ignored.
 
-        The program, its undo stack and the open category are preserved. The change is deferred while a block
+        The blocks, their undo stack and the open category are preserved. The change is deferred while a block
         is dragged.
         """
         if definitions == self._definitions:
@@ -264,7 +264,7 @@ class BlocklyView(BlocklyHost):
         """Show a value at a block until the next click.
 
         Args:
-            id: Id of a block of the program or in the flyout.
+            id: Id of a block on the canvas or in the flyout.
             text: Value as text.
         """
         self._send_command("value", [id, text])
@@ -274,7 +274,7 @@ class BlocklyView(BlocklyHost):
         self._set_state("absent", list(ids))
 
     def set_live_values(self, values: Mapping[str, str], stale_keys: Collection[str] = ()) -> None:
-        """Set the displayed values of sensor blocks. This is not an edit of the program.
+        """Set the displayed values of sensor blocks. This is not an edit of the behaviour.
 
         Args:
             values: Formatted values by block id or by ``<robot>/<property>[/<field>]``.
@@ -412,11 +412,11 @@ class BlocklyView(BlocklyHost):
         self._send_command("zoom", -1)
 
     def zoom_to_fit(self) -> None:
-        """Show the whole program."""
+        """Zoom and scroll so that all blocks are visible."""
         self._send_command("fit", None)
 
     def open_find(self) -> None:
-        """Open the find bar for blocks in the shown program."""
+        """Open the find bar for blocks of the shown tab."""
         self._request_field("find")
 
     def open_search(self) -> None:
@@ -466,7 +466,7 @@ class BlocklyView(BlocklyHost):
         self.watched_variables_changed.emit(())
 
     def _send_tab(self) -> None:
-        # Sends the program if the page doesn't have it, and the state of its blocks.
+        # Sends the blocks if the page doesn't have them, and their states.
         if not self._is_page_ready:
             return
         tab = self._tabs.shown_tab

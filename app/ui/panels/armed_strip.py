@@ -78,7 +78,7 @@ class ArmedStrip(QWidget):
 
     @property
     def acting(self) -> SessionActing:
-        """Sending state of the session."""
+        """Manual publishing and service calls of the session."""
         return self._context.session.acting
 
     def refresh(self) -> None:

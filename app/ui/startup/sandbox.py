@@ -28,7 +28,7 @@ TIMEOUT_S = 2.0
 _log = logging.getLogger("studio.editor")
 
 
-class SandboxTrial:
+class SandboxTest:
     """Child process that tests whether this program may create namespaces as Chromium does."""
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class SandboxTrial:
         return os.waitpid(self._process_id, 0)[1] == 0
 
 
-def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
+def start_test(environ: Mapping[str, str], platform: str) -> SandboxTest | None:
     """Start a test of the sandbox if the platform and the environment require one.
 
     Args:
@@ -76,17 +76,17 @@ def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
         or "sandbox" in environ.get(FLAGS_VARIABLE, "")
     ):
         return None
-    return SandboxTrial()
+    return SandboxTest()
 
 
-def configure_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
+def configure_sandbox(environ: MutableMapping[str, str], sandbox_test: SandboxTest | None) -> None:
     """Disable Chromium's namespaces if the test failed; call this before the web engine starts.
 
     Args:
         environ: Environment variables, modified in place.
-        trial: Test that was started, or None.
+        sandbox_test: Test that was started, or None.
     """
-    if trial is not None and not trial.is_allowed():
+    if sandbox_test is not None and not sandbox_test.is_allowed():
         _log.info(
             "user namespaces are not permitted: the block editor's browser uses the system call filter only"
         )

@@ -303,11 +303,11 @@ class ZenohClient(ClientCalls[_Call]):
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
         elif call.token_deadline <= now:
-            reason = _(
+            template = _(
                 "the server of '{service}' is connected but didn't reply; it may be unable to decode the "
                 "call, or a router's access control denies '{key}'"
             )
-            self._finish(call, NepError(reason.format(service=self.spec.service, key=call.key)))
+            self._finish(call, NepError(template.format(service=self.spec.service, key=call.key)))
 
     def _finish(self, call: _Call, outcome: Outcome) -> bool:
         # Returns False if the call is no longer in flight.

@@ -155,9 +155,9 @@ class _Reader:
     def configuration(self, table: Mapping[str, Any], stem: str) -> BridgeConfiguration:
         self._check_keys(table, _KEYS, "")
         name = self._text(table, "name", "", default=_default_name(stem))
-        name = self._checked(lambda: checked_name(name), "name", "")
+        name = self._run_check(lambda: checked_name(name), "name", "")
         a, b = (self._side(table, each) for each in SIDES)
-        self._checked(lambda: check_different_networks(a, b), "b", "")
+        self._run_check(lambda: check_different_networks(a, b), "b", "")
         topics = table.get("topics")
         if not isinstance(topics, list) or not topics or not all(isinstance(each, dict) for each in topics):
             self._fail("topics", "", _('no topics are listed; write [[topics]] and a = "/a/topic" below it'))
@@ -183,7 +183,7 @@ class _Reader:
         backend = self._text(section, "backend", side)
         if not backend:
             self._fail("backend", side, _('the back end is missing; write backend = "zeromq"'))
-        self._checked(lambda: find_backend(backend), "backend", side)
+        self._run_check(lambda: find_backend(backend), "backend", side)
         master, network = (self._text(section, key, side) for key in ("master", "network"))
         if len(network) > _MAX_NETWORK_LENGTH:
             self._fail(
@@ -191,7 +191,7 @@ class _Reader:
                 side,
                 _("use at most {most} characters").format(most=_MAX_NETWORK_LENGTH),
             )
-        return self._checked(lambda: side_configuration(backend, master, network), "master", side)
+        return self._run_check(lambda: side_configuration(backend, master, network), "master", side)
 
     def _topic(
         self, section: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
@@ -202,9 +202,9 @@ class _Reader:
         if not a_name:
             self._fail("a", "topics", _('the topic name is missing; write a = "/a/topic"'), number)
         key = "b" if section.get("b") else "a"
-        self._checked(lambda: check_topic_names(a_name, b_name), key, "topics", number)
+        self._run_check(lambda: check_topic_names(a_name, b_name), key, "topics", number)
         direction = self._text(section, "direction", "topics", number, default="both")
-        parsed_direction = self._checked(lambda: parse_direction(direction), "direction", "topics", number)
+        parsed_direction = self._run_check(lambda: parse_direction(direction), "direction", "topics", number)
         ends = [
             TopicEnd(
                 name,
@@ -219,7 +219,7 @@ class _Reader:
         key = f"{side}_type" if f"{side}_type" in section else "type"
         name = self._text(section, key, "topics", number)
         if key in section:
-            self._checked(lambda: checked_type(key, name), key, "topics", number)
+            self._run_check(lambda: checked_type(key, name), key, "topics", number)
         return name
 
     def _qos(self, section: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
@@ -295,7 +295,9 @@ class _Reader:
             self._fail(key, table_name, _("must be a string in quotes"), number)
         return value
 
-    def _checked(self, check: Callable[[], _CHECKED], key: str, table_name: str, number: int = 0) -> _CHECKED:
+    def _run_check(
+        self, check: Callable[[], _CHECKED], key: str, table_name: str, number: int = 0
+    ) -> _CHECKED:
         try:
             return check()
         except (NepError, ValueError) as error:

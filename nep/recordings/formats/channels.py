@@ -93,7 +93,7 @@ class Encoding(NamedTuple):
 
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
-_DATA_FIELD = {"picture": 2, "raw": 6, "text": 1, "wrapped": 1}
+_DATA_FIELD_NUMBERS = {"picture": 2, "raw": 6, "text": 1, "wrapped": 1}
 _VIEWABLE_LAYOUTS = frozenset({
     "bgr8", "bgra8", "rgb8", "rgba8", "mono8", "mono16", "8UC1", "8UC3", "16UC1", "32FC1",
 })  # fmt: skip
@@ -131,13 +131,13 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
             seq=seq,
             stamp_ns=stamp,
         )
-    if extra and form not in _DATA_FIELD:
+    if extra and form not in _DATA_FIELD_NUMBERS:
         form = "wrapped"
-    if form in _DATA_FIELD:
+    if form in _DATA_FIELD_NUMBERS:
         if extra:
             packed = _pack_extra(extra)
             prefix += bytes_field_head(EXTRA_FIELD, len(packed)) + packed
-        prefix += bytes_field_head(_DATA_FIELD[form], message.size_bytes)
+        prefix += bytes_field_head(_DATA_FIELD_NUMBERS[form], message.size_bytes)
     sequence = 0 if seq is None else seq & _MAX_U32
     publish_ns = log_ns if stamp is None else max(0, min(stamp, _MAX_U64))
     return Encoding(form, prefix, sequence, publish_ns, is_decodable, is_self_contained)
@@ -228,10 +228,10 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
         schema = (kind.msg_type, "jsonschema", schema_of(kind.msg_type))
     elif form == "msgpack":  # any value; `mcap doctor` reports an error for a channel without schema
         schema = (kind.msg_type, "jsonschema", b"{}")
-    elif form in _DATA_FIELD:
+    elif form in _DATA_FIELD_NUMBERS:
         name = _SCHEMAS.get(form, "nep.Bytes")
         schema = (name, "protobuf", descriptor_set(name))
-    message_encoding = "protobuf" if form in _DATA_FIELD else form
+    message_encoding = "protobuf" if form in _DATA_FIELD_NUMBERS else form
     return ChannelDefinition(kind.topic, message_encoding, *schema, tuple(metadata))
 
 
@@ -295,7 +295,7 @@ class ChannelDecoder:
         self._publisher = _parse_id(metadata.get("nep.publisher", ""))
         schema = definition.schema_name
         self._is_wrapped = definition.message_encoding == "protobuf" and (
-            self._form in _DATA_FIELD or schema in {"foxglove.CompressedImage", "foxglove.RawImage"}
+            self._form in _DATA_FIELD_NUMBERS or schema in {"foxglove.CompressedImage", "foxglove.RawImage"}
         )
         self._data_field = 6 if schema == "foxglove.RawImage" else 2 if schema.endswith("Image") else 1
         self.codec = metadata.get("nep.codec", "") or self._guess_codec()

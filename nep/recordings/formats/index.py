@@ -299,7 +299,7 @@ class _SummaryReader:
         self._message_count = 0
         self._seen_offsets: set[int] = set()
         self._opcodes: set[int] = set()
-        self._is_index_required: Mapping[int, bool] = {}
+        self._required_index_opcodes: frozenset[int] = frozenset()
 
     def read(self, footer: bytes) -> FileIndex | None:
         # None if the summary is missing, damaged or incomplete.
@@ -339,10 +339,13 @@ class _SummaryReader:
         elif opcode == Opcode.STATISTICS and location.length <= _MAX_METADATA_BYTES:
             statistics = read_record("Statistics", _read_content(self._file, location))
             index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
-            self._is_index_required = {
-                Opcode.METADATA_INDEX: bool(statistics.metadata_count),
-                Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
+            index_counts = {
+                Opcode.METADATA_INDEX: statistics.metadata_count,
+                Opcode.ATTACHMENT_INDEX: statistics.attachment_count,
             }
+            self._required_index_opcodes = frozenset(
+                index_opcode for index_opcode, count in index_counts.items() if count
+            )
         elif opcode == Opcode.METADATA_INDEX and location.length <= _MAX_HEADER_BYTES:
             entry = read_record("MetadataIndex", _read_content(self._file, location))
             if entry.offset + entry.length <= index.end and self._is_new(entry.offset):
@@ -378,10 +381,7 @@ class _SummaryReader:
     def _is_plausible(self, start: int) -> bool:
         # Chunks must not overlap, all channels must be known, and everything in the file must be listed.
         index, channels = self._index, self._index.definitions.channels
-        if any(
-            is_required and opcode not in self._opcodes
-            for opcode, is_required in self._is_index_required.items()
-        ):
+        if not self._required_index_opcodes <= self._opcodes:
             return False
         end = 0
         for info in sorted(index.chunks, key=lambda each: each.offset):

@@ -216,7 +216,7 @@ def test_input_outside_action_schema_is_an_error_before_run():
 @pytest.mark.parametrize(
     ("it", "end"),
     [
-        (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic without spaces"),
+        (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic name without spaces"),
         (
             block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="up", ANGLE=number(1)),
             "has no option “up”",

@@ -49,7 +49,7 @@ def test_block_waits_for_its_robot(running):
     until(lambda: bool(link.calls))
     assert link.invoked == [("Pepper", "turn", {"direction": "left", "angle": 30})]
     assert run.runtime.scheduler.snapshot().blocks == ("t",)
-    assert run.runtime.status_text.text(["t"]) == "Pepper turns left by 30 °"
+    assert run.runtime.status_text.text(["t"]) == "Pepper turns left by 30°"
     link.answer(link.calls[0], "succeeded")
     run.end()
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})

@@ -47,7 +47,7 @@ def test_query_results_are_the_message_values_with_their_paths() -> None:
     assert FoundPath.from_steps(()) == "$"
 
 
-def test_true_differs_from_one_and_equal_lists_are_equal() -> None:
+def test_filter_compares_lists_by_value_and_distinguishes_true_from_one() -> None:
     lists = {"a": [1, {"b": [2]}], "b": [1, {"b": [2]}], "c": [True, {"b": [2]}]}
     assert list(found("$[?@ == $.a]", lists)) == ["a", "b"]
     assert list(found("$[?@ == true]")) == ["on"]

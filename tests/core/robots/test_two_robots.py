@@ -51,7 +51,7 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
         assert not [p for p in session.document.problems() if p.severity == "error"]
         session.runs.run()
         tick_until(session, lambda: "both" in printed(session), FOUND_S)
-        assert {"Pepper says “Go”", "Turtle turns 20 °"} <= set(printed(session))
+        assert {"Pepper says “Go”", "Turtle turns 20°"} <= set(printed(session))
         tick_until(session, lambda: session.runs.view().state == "proven")
         assert session.runs.view().result_status == "ok"
         with session.fleet.watch_sensors("Turtle"):

@@ -14,7 +14,6 @@ from app.core.robots.voices import (
     RobotVoices,
     Speaker,
 )
-from app.core.storage.settings import Settings
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from tests.ui.fakes import Session
@@ -212,4 +211,3 @@ def test_robot_state_is_not_watched_without_a_speaker() -> None:
     voices.update()
     voices.silence()
     assert STATE.format("Pepper") not in session.source.wanted
-    assert isinstance(session.settings, Settings)

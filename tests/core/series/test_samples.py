@@ -285,7 +285,7 @@ def test_oldest_samples_are_evicted_and_counted_with_correct_stats() -> None:
     assert samples.size_bytes < 8192 * 80
 
 
-def test_late_sample_updates_existing_peaks() -> None:
+def test_out_of_order_sample_updates_the_maximum() -> None:
     samples = Samples()
     times = np.arange(5000) / 1000
     samples.extend(times, np.zeros(5000), np.zeros(5000, dtype=bool))

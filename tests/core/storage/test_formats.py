@@ -101,9 +101,9 @@ def test_damaged_own_settings_file_next_to_a_newer_one_is_backed_up(tmp_path: Pa
     assert (tmp_path / "settings.json").read_bytes() == before
 
 
-def test_layout_state_version_is_tied_to_the_settings_format() -> None:
+def test_layout_state_version_changes_only_with_the_settings_format() -> None:
     assert (FORMAT_VERSION, STATE_VERSION) == (1, 1), (
-        "another number of layouts needs another one of settings"
+        "a new STATE_VERSION requires a new FORMAT_VERSION of the settings"
     )
 
 

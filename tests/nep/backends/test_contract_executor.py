@@ -333,7 +333,7 @@ def test_two_threads_can_spin_the_same_nodes(make: Nodes) -> None:
     assert sorted(got) == list(range(500))  # type: ignore[type-var]
 
 
-def test_spin_and_async_receive_at_the_file_limit_raise_too_many_files_error(
+def test_spin_and_async_receive_at_the_open_file_limit_raise_too_many_files_error(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nodes = [make("a", "zeromq"), make("b", "memory")]

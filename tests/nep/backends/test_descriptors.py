@@ -1,4 +1,4 @@
-"""Tests of programs at their file limit: a clear error, no crash in libzmq, and nothing half created."""
+"""Tests of programs at their open-file limit: a clear error, no crash in libzmq, and nothing half created."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def refused(do):
 """
 
 
-def test_new_publishers_are_rejected_at_the_file_limit_and_existing_ones_work(master: Master) -> None:
+def test_new_publishers_are_rejected_at_the_open_file_limit_and_existing_ones_work(master: Master) -> None:
     code = (
         FEW
         + """
@@ -110,7 +110,7 @@ print(node.new_sub("own").listen(), [each for each in node.graph().topics])
             assert not late.is_closed
 
 
-def test_publisher_with_a_low_file_limit_survives_a_hundred_subscribers(master: Master) -> None:
+def test_publisher_with_a_low_open_file_limit_survives_a_hundred_subscribers(master: Master) -> None:
     """libzmq accepts as many connections as it can; the publisher keeps serving those."""
     code = (
         FEW

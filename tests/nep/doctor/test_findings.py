@@ -279,7 +279,7 @@ def test_original_package_in_the_python_of_the_terminal_is_reported():
     assert "/usr/lib/python3/dist-packages" in one.sentence
 
 
-def test_low_file_limit_is_reported_with_the_number_of_topics_it_allows():
+def test_low_open_file_limit_is_reported_with_the_number_of_topics_it_allows():
     one = found(files=FileFact(256, 10_240))["files"]
     assert one.severity == "warning"
     assert "12 topics" in one.sentence
@@ -289,7 +289,7 @@ def test_low_file_limit_is_reported_with_the_number_of_topics_it_allows():
     assert "files" not in found(files=FileFact(None, None))
 
 
-def test_program_near_its_file_limit_is_reported():
+def test_program_near_its_open_file_limit_is_reported():
     made = found(programs=(ProgramFact(7, "Pepper", 250, 256), ProgramFact(8, "Rover", 90, 256)))
     assert "“Pepper” has 250 of at most 256 files open" in made["files:7"].sentence
     assert (made["files:7"].severity, made["files:7"].command) == ("warning", "ulimit -n 8192")

@@ -267,7 +267,7 @@ def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, 
     assert told.deleted == []
 
 
-def test_drag_through_a_tab_changes_neither_its_program_nor_its_undo_stack(qtbot, view, them, told) -> None:
+def test_drag_through_a_tab_changes_neither_its_blocks_nor_its_undo_stack(qtbot, view, them, told) -> None:
     changes: list[str] = []
     view.changed.connect(lambda key, _program: changes.append(key))
     histories: list[tuple[bool, bool]] = []

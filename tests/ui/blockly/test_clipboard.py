@@ -157,7 +157,7 @@ def test_edit_menu_cuts_copies_and_pastes_blocks(qtbot, view, them):
     qtbot.waitUntil(lambda: types(them) == [], timeout=WAIT_MS)
 
 
-def test_edit_menu_applies_to_a_text_field_of_the_page(qtbot, view, them):
+def test_edit_menu_applies_to_the_focused_text_field_of_the_editor(qtbot, view, them):
     QGuiApplication.clipboard().setText("seven")
     view.open_find()
     them.wait_for("document.activeElement?.tagName", "INPUT")

@@ -1,4 +1,4 @@
-"""Tests that the block editor saves every loaded program unchanged, also unknown and damaged ones."""
+"""Tests that the block editor saves every loaded workspace unchanged, also unknown and damaged ones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.web
 WAIT = {"type": "control_wait", "id": "w", "x": 28, "y": 28}
 
 
-def test_loaded_program_is_saved_unchanged(person):
+def test_loaded_workspace_is_saved_unchanged(person):
     assert person(state=PICTURE).newest() == PICTURE
 
 
@@ -50,7 +50,7 @@ def test_damaged_file_is_preserved_unchanged(person):
     assert person(state=damaged).newest() == damaged
 
 
-def test_flush_before_the_page_is_loaded_returns_the_program(qtbot, view):
+def test_flush_before_the_page_is_loaded_returns_the_workspace(qtbot, view):
     got: list[WorkspaceJson] = []
     view.load(PICTURE)
     view.flush(got.append)
@@ -117,7 +117,7 @@ KNOWN = {
 
 
 class Maker:
-    """Generator of random programs: known and unknown blocks, valid or not, shadows, stacks and nesting."""
+    """Generator of random workspaces: known and unknown blocks, valid or not, shadows, stacks and nesting."""
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
@@ -163,7 +163,7 @@ class Maker:
         return workspace(*tops)
 
 
-def test_random_programs_round_trip(view, person):
+def test_random_workspaces_round_trip(view, person):
     them = person()
     for seed in range(60):
         program = Maker(seed).program()
@@ -171,7 +171,7 @@ def test_random_programs_round_trip(view, person):
         assert them.newest() == program, f"seed {seed}"
 
 
-def test_overlay_covers_the_canvas_while_a_long_program_is_loaded(view, person):
+def test_overlay_covers_the_canvas_while_a_long_behaviour_is_loaded(view, person):
     them = person({**WAIT, "id": "old"})
     them.ask("""(seen => new MutationObserver(() => window.seen = [...(window.seen ?? []), seen()])
         .observe(document.body, {childList: true}) ?? 0)(() => [!!document.querySelector('.nepOpening'),

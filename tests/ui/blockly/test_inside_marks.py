@@ -82,7 +82,7 @@ def test_block_menu_lists_and_focuses_existing_hidden_items(them):
     double_click(them, "loop")
     them.wait_for(MARKS, BOTH[1:])
     rows = open_menu(them, "loop")
-    assert "Show where the program pauses inside" not in rows
+    assert "Show the pause inside this block" not in rows
     them.press(Qt.Key_Escape)
     choose(them, "loop", "Show the note inside this block")
     them.wait_for(FOCUSED, "b")

@@ -12,7 +12,7 @@ pytest_plugins = ["tests.ui.blockly_fixtures"]
 pytestmark = pytest.mark.web
 
 
-def test_theme_change_keeps_program_and_undo(qtbot, view, person):
+def test_theme_change_keeps_blocks_and_undo_stack(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_Delete)
@@ -160,7 +160,7 @@ def test_live_values_are_shown_without_an_edit(qtbot, view, person):
     assert them.newest() == PICTURE
 
 
-def test_empty_program_shows_only_the_grid_and_zoom_buttons(person):
+def test_empty_canvas_shows_only_the_grid_and_zoom_buttons(person):
     them = person()
     assert them.ask("document.querySelectorAll('.blocklyBlockCanvas .blocklyBlock').length") == 0
     assert them.ask("document.querySelectorAll('.blocklyTrash, .blocklyZoom').length") == 0

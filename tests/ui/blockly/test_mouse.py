@@ -54,7 +54,7 @@ def test_fast_drag_connects_to_the_targeted_connection(qtbot, person):
     assert len(order) == 4
 
 
-def test_flush_during_a_drag_returns_a_valid_program(qtbot, view, person):
+def test_flush_during_a_drag_returns_a_valid_workspace(qtbot, view, person):
     them = person(START)
     hat = them.box("[data-id=start] > .blocklyPath")
     them.open_category("Control")
@@ -100,7 +100,7 @@ def test_selected_block_is_reported(qtbot, view, person):
         them.click("[data-id=start] > .blocklyPath", dy=30)
 
 
-def test_typing_in_a_text_field_changes_the_program(qtbot, view, person):
+def test_typing_in_a_text_field_changes_the_workspace(qtbot, view, person):
     text = {"shadow": {"type": "values_text", "id": "t", "fields": {"TEXT": "x"}}}
     say = {"type": "robot_pepper_do_say", "id": "say", "x": 28, "y": 28, "inputs": {"TEXT": text}}
     them = person(say)
@@ -146,7 +146,7 @@ def test_name_of_a_nonexistent_topic_can_be_typed(qtbot, view, person):
     qtbot.waitUntil(lambda: them.tops()[0]["fields"] == {"TOPIC": "/not/yet"}, timeout=WAIT_MS)
 
 
-def test_program_is_built_with_the_keyboard_only(qtbot, view, person):
+def test_block_is_added_from_the_toolbox_with_the_keyboard_only(qtbot, view, person):
     them = person(START)
     them.click("[data-id=start] > .blocklyPath", dy=30)
     them.press(Qt.Key_B, Qt.ControlModifier)

@@ -215,7 +215,7 @@ def test_scripts_and_notes_of_translated_examples_do_not_overlap(qtbot, language
         assert overlaps == [], path.name
 
 
-def test_scripts_are_separated_on_loading_only_in_programs_with_the_key_for_it(qtbot, view):
+def test_scripts_are_separated_on_loading_only_in_files_with_the_key_for_it(qtbot, view):
     second = {"type": "control_wait", "id": "second", "x": 90, "y": 70}
     state = workspace({"type": "events_started", "id": "start", "x": 28, "y": 28}, second)
     view.load(state)

@@ -241,7 +241,9 @@ def test_earlier_message_is_compared_with_its_predecessor(panel, window) -> None
     assert panel.strip.text_label.text() == "Previous message: no difference"
 
 
-def test_history_contains_only_the_shown_topic_and_no_messages_while_suspended(panel, window) -> None:
+def test_history_omits_messages_received_while_suspended_and_is_cleared_for_another_topic(
+    panel, window
+) -> None:
     send(window, panel, seen(1, stamp=1))
     send(window, panel, seen(2, stamp=2))
     panel.suspend()

@@ -353,7 +353,7 @@ def test_recording_saved_by_an_alarm_is_opened_from_its_history(qtbot, window, f
     panel.dispose()
 
 
-def test_topic_is_recorded_from_its_menu(qtbot, folder):
+def test_record_topic_in_the_topic_menu_runs_the_record_command(qtbot, folder):
     window = Window(Session.full())
     panel = window.make(topics.PANEL)
     qtbot.addWidget(panel)

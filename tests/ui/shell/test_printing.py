@@ -84,7 +84,7 @@ def test_print_dialog_is_not_modal(qtbot) -> None:
     assert case.editor.asked == []
 
 
-def test_unwritable_print_target_and_empty_canvas_are_reported(qtbot, tmp_path: Path) -> None:
+def test_unwritable_pdf_path_and_empty_canvas_are_reported(qtbot, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     case = Case(qtbot, b"%PDF", [])
     case.printing.save(tmp_path / "file" / "a.pdf")

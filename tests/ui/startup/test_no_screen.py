@@ -57,7 +57,7 @@ def test_studio_as_root_with_browser_sandbox_exits_with_a_message(tmp_path: Path
     command = [sys.executable, "-m", "app"]
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 2
-    assert "can't run as root with its sandbox. Start Studio as another user" in done.stderr
+    assert "can't run as root with its sandbox; start Studio as another user" in done.stderr
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")

@@ -13,15 +13,15 @@ from app.ui.startup.qt_log import FLAGS_VARIABLE
 from app.ui.startup.sandbox import (
     DISABLE_VARIABLE,
     NO_NAMESPACES_FLAG,
-    SandboxTrial,
+    SandboxTest,
     configure_sandbox,
-    start_trial,
+    start_test,
 )
 
 ROOT = Path(__file__).resolve().parents[3]
 GUARDED = """
 import ctypes, os, struct
-from app.ui.startup.sandbox import SandboxTrial
+from app.ui.startup.sandbox import SandboxTest
 LOAD, EQUAL, SET, RETURN = 0x20, 0x15, 0x45, 0x06
 ALLOW, REFUSE = 0x7FFF0000, 0x00050000
 CLONE, CHROOT, UNSHARE = 56, 161, 272
@@ -40,7 +40,7 @@ def told(*of):
     if (child := os.fork()) == 0:
         if of:
             guard(*of)
-        os._exit(0 if SandboxTrial().is_allowed() else 1)
+        os._exit(0 if SandboxTest().is_allowed() else 1)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 print(told(), told(UNSHARE, 0x10000000, 13), told(UNSHARE, 0x20000000, 1), told(CHROOT, 0, 1))
 """
@@ -50,8 +50,8 @@ These are: none, no user namespaces, no other namespaces within one, no chroot.
 """
 
 
-class Told(SandboxTrial):
-    """Sandbox trial with a given result."""
+class Told(SandboxTest):
+    """Sandbox test with a given result."""
 
     def __init__(self, outcome: bool) -> None:
         self._outcome = outcome
@@ -98,4 +98,4 @@ def test_no_sandbox_flags_are_set_with_namespaces_or_without_a_test_process() ->
 def test_no_sandbox_test_runs_outside_linux_or_if_the_user_set_the_option(
     environ: dict[str, str], platform: str
 ) -> None:
-    assert start_trial(environ, platform) is None
+    assert start_test(environ, platform) is None

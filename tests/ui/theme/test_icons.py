@@ -37,7 +37,7 @@ def inks(image: QImage) -> set[str]:
     return colours
 
 
-def test_every_icon_of_the_design_is_shipped() -> None:
+def test_every_icon_of_the_theme_and_commands_is_shipped() -> None:
     tokens = theme_tokens.load()
     wanted = {*tokens.icons.values(), *tokens.block_icons.values()}
     wanted |= {status.icon for status in tokens.status.values() if status.icon != "dot"}

@@ -87,7 +87,7 @@ export class Bin {
     return this.entries.length;
   }
 
-  /** Empties the bin when another program is loaded. */
+  /** Empties the bin when other blocks are loaded. */
   clear(): void {
     this.entries = [];
     this.restored.clear();

@@ -15,7 +15,7 @@ export class Functions {
     workspace.registerToolboxCategoryCallback(FUNCTIONS, () => this.flyoutContents());
   }
 
-  /** Updates everything after another program was loaded. */
+  /** Updates everything after other blocks were loaded. */
   refresh(): void {
     this.snapshot = this.takeSnapshot();
     this.renameInputs();

@@ -1,4 +1,4 @@
-// Queue of messages from the window, processed in order. Loading a long program blocks painting for about a
+// Queue of messages from the window, processed in order. Loading a long behaviour blocks painting for about a
 // second: the canvas is covered first, so that the old blocks aren't shown under the new title.
 import {t} from './words';
 

@@ -1,5 +1,5 @@
 // Keyboard shortcuts of the page. Blockly assigns bare letters to many commands (D duplicates, C cleans up), so
-// that typing outside a text field would edit the program; here each shortcut has a modifier key, or is removed.
+// that typing outside a text field would edit the blocks; here each shortcut has a modifier key, or is removed.
 // `app/ui/shell/actions/shortcuts.py` lists the shortcuts for users.
 import * as Blockly from 'blockly/core';
 import type {Clipboard} from './clipboard';

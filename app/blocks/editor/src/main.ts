@@ -259,7 +259,7 @@ class Editor {
     }
   }
 
-  /** Sends a picture of the program to the window; "" if there are no blocks. */
+  /** Sends a picture of the blocks to the window; "" if there are no blocks. */
   private async sendPicture({token, kind, white}: PictureRequest): Promise<void> {
     let data = '';
     try {

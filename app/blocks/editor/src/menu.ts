@@ -124,7 +124,7 @@ export function registerMenu(clipboard: Clipboard): void {
     when: (scope) => isEditable(scope) && canHaveBreakpoint(scope.block!), run: (scope) => toggleBreakpoint(scope.block!)});
   block({id: 'nepShowNote', weight: 71, icon: 'sticky-note', words: t('Show the note inside this block'),
     when: (scope) => isEditable(scope) && findHidden(scope.block!, 'note') !== null, run: (scope) => revealBlock(findHidden(scope.block!, 'note')!)});
-  block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show where the program pauses inside'),
+  block({id: 'nepShowPause', weight: 76, icon: 'circle-pause', words: t('Show the pause inside this block'),
     when: (scope) => isEditable(scope) && findHidden(scope.block!, 'pause') !== null, run: (scope) => revealBlock(findHidden(scope.block!, 'pause')!)});
   addSeparator(ScopeType.BLOCK, 80);
   addSeparator(ScopeType.BLOCK, 98);

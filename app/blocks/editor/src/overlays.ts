@@ -71,7 +71,7 @@ export class Overlays {
     this.renderLiveValues();
   }
 
-  /** Clears all states after another program was loaded. */
+  /** Clears all states after other blocks were loaded. */
   reset(): void {
     window.clearTimeout(this.throttleTimer);
     this.throttleTimer = 0;

@@ -1,4 +1,4 @@
-// Print layout of the program: stacks in reading order and in columns, split between two blocks if they don't
+// Print layout of the blocks: stacks in reading order and in columns, split between two blocks if they don't
 // fit on a page. The pages are part of the editor's page and visible to the printer only.
 import * as Blockly from 'blockly/core';
 import {truncateNote, renderItems, expandNote, overflowHeight} from './picture';

@@ -50,7 +50,7 @@ export class Program {
     this.culling.update();
   }
 
-  /** Replaces the program as one undoable edit; the scroll position stays. */
+  /** Replaces the blocks as one undoable edit; the scroll position stays. */
   change(state: Json): void {
     this.flush();
     const {scrollX, scrollY} = this.workspace;
@@ -136,7 +136,7 @@ export class Program {
     this.timer = window.setTimeout(() => this.flush(), DEBOUNCE_MS);
   }
 
-  /** Scrolls the top left corner of the program near that of the viewport. */
+  /** Scrolls the top left corner of the blocks near that of the viewport. */
   scrollToStart(): void {
     const blocks = this.workspace.getTopBlocks(false);
     if (!blocks.length) {
@@ -215,7 +215,7 @@ export class Program {
     this.notifyHistory();
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
-      // The program is incomplete during a drag; wait until the drag ends.
+      // The workspace is incomplete during a drag; wait until the drag ends.
       if (this.workspace.isDragging()) this.onEvent(event);
       else this.flush();
     }, DEBOUNCE_MS);

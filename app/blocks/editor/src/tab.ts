@@ -123,7 +123,7 @@ export class Tab {
     if (flyout instanceof Flyout) flyout.onPin = (isPinned) => listener.pinned(isPinned);
   }
 
-  /** Loads another program and clears the undo history. */
+  /** Loads other blocks and clears the undo history. */
   load(generation: number, state: Record<string, unknown>): void {
     this.cancelInteraction();
     this.program.load(state);
@@ -134,7 +134,7 @@ export class Tab {
     this.bin.clear();
   }
 
-  /** Replaces the program as one undoable edit. */
+  /** Replaces the blocks as one undoable edit. */
   change(state: Record<string, unknown>): void {
     this.cancelInteraction();
     this.program.change(state);

@@ -32,7 +32,7 @@ class GatedRobots(Protocol):
 
     @property
     def movable_robots(self) -> Iterable[Robot]:
-        """Robots that can be moved."""
+        """Robots that messages may move, including real robots whose connection is lost."""
 
     @property
     def described_topics(self) -> frozenset[str]:
@@ -51,7 +51,7 @@ class MovableRobots:
 
     @property
     def movable_robots(self) -> tuple[Robot, ...]:
-        """Robots that can be moved, including real robots whose connection is lost."""
+        """Robots that messages may move, including real robots whose connection is lost."""
         return tuple(link.robot for link in self._movable_links)
 
     @property

@@ -132,8 +132,8 @@ class StopChannel:
             # By name: a hung program that was restarted may still be missing although all others are
             # connected.
             connected_count, missing_names = self.publisher.subscribers, self.publisher.missing
-            is_complete = program.node not in missing_names or connected_count >= len(subscribed_nodes)
-            is_reachable = program.node_id in subscribed_nodes and connected_count > 0 and is_complete
+            is_robot_connected = program.node not in missing_names or connected_count >= len(subscribed_nodes)
+            is_reachable = program.node_id in subscribed_nodes and connected_count > 0 and is_robot_connected
         self.was_connected |= is_reachable
         return is_reachable
 

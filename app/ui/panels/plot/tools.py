@@ -154,12 +154,12 @@ class AddCurveField(SearchField):
         """Popup list, created on first use."""
         window = self.window()
         if self._matches is None or self._matches.parentWidget() is not window:
-            self._close_matches()
+            self._discard_popup()
             self._matches = _MatchPopup(self._theme, window)
             self._matches.list.row_activated.connect(lambda: self._commit(right=False))
         return self._matches
 
-    def _close_matches(self) -> None:
+    def _discard_popup(self) -> None:
         if self._matches is not None:
             self._matches.deleteLater()
             self._matches = None

@@ -127,7 +127,7 @@ class SavedLayouts:
     def can_restore(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
         """Return True if a workbench can restore an imported arrangement.
 
-        The arrangement is restored on trial; afterwards the workbench is as before.
+        The arrangement is restored temporarily; afterwards the workbench is as before.
         """
         self.save(bench, base)
         try:

@@ -23,7 +23,7 @@ MAIN_AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BOTTOM_AREA = Qt.DockWidgetArea.BottomDockWidgetArea
 MAX_BOTTOM_SHARE = 0.42
 """Maximum height of a panel below all columns, as a share of the workbench's height."""
-STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
+STATE_VERSION = 1  # a change also requires a change of app.core.storage.settings.FORMAT_VERSION
 MAX_PANELS_PER_KIND = 8
 
 

@@ -38,7 +38,7 @@ class TwoLines:
         second_font.setPixelSize(theme.font("small").pixelSize())
         first_height, second_height = paint.height_of(name_font), paint.height_of(second_font)
         top = box.center().y() - (first_height + second_height + 2) / 2
-        row = QRectF(box.left(), top, box.width(), first_height)
-        paint.text_line(painter, row, self.name, name_font, theme.colour("text"))
-        row = QRectF(box.left(), top + first_height + 2, box.width(), second_height)
-        paint.text_line(painter, row, self.second_line, second_font, theme.colour("textSecondary"))
+        name_rect = QRectF(box.left(), top, box.width(), first_height)
+        paint.text_line(painter, name_rect, self.name, name_font, theme.colour("text"))
+        second_rect = QRectF(box.left(), top + first_height + 2, box.width(), second_height)
+        paint.text_line(painter, second_rect, self.second_line, second_font, theme.colour("textSecondary"))

@@ -175,7 +175,12 @@ class Channels:
         """
         channel = next((each for each in self._channels.values() if each.id == channel_id), None)
         if type(id_) is not int or not 0 <= id_ <= MAX_ID or id_ in self._subscriptions or channel is None:
-            raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
+            raise NepError(
+                _(
+                    "a subscription needs an 'id' that is a whole number from 0 to {most} and not in use, "
+                    "and the 'channelId' of a topic"
+                ).format(most=MAX_ID)
+            )
         if any(each.channel is channel for each in self._subscriptions.values()):
             raise NepError(_("this channel already has a subscription"))
         if len(self._subscriptions) >= MAX_TOPICS:

@@ -232,7 +232,11 @@ class FoxglovePage(PageConnection):
         fields = channel if isinstance(channel, dict) else {}
         id_, schema_name = fields.get("id"), fields.get("schemaName")
         if type(id_) is not int or not 0 <= id_ <= wire.MAX_ID or id_ in self._advertised:
-            raise NepError(_("a channel needs an unused 'id'"))
+            raise NepError(
+                _("a channel needs an 'id' that is a whole number from 0 to {most} and not in use").format(
+                    most=wire.MAX_ID
+                )
+            )
         if fields.get("encoding") != wire.ENCODING:
             raise NepError(
                 _("messages with the encoding '{encoding}' can't be published; use 'json'").format(

@@ -1,4 +1,4 @@
-"""ROS definitions of NEP's own message types, for rosapi and CBOR, without an installation of ROS.
+"""ROS definitions of the message types that NEP supports without an installation of ROS, for rosapi and CBOR.
 
 The fields and their order are as in ROS 1 (common_msgs 1.13), because readers of cbor-raw decode bytes with
 these definitions. Comments and constants are omitted.
