@@ -11,6 +11,7 @@ and Ubuntu), the virtual environment ``.venv`` with pinned packages, and a virtu
     bench           run the benchmarks
     screenshots     create the images of the README
     guide-pictures  create the images of the guide in each language
+    screens         save images of all panels and sheets: FOLDER --language es
     reference       generate docs/api from the docstrings
     package         build the installers of this system and the client libraries into dist/;
                     -- --system clients builds only the libraries,
@@ -49,6 +50,7 @@ SCRIPTS = {
     "bench": ("tools/bench.py", "dev"),
     "screenshots": ("tools/screenshots.py", "dev"),
     "guide-pictures": ("tools/guide_pictures.py", "dev"),
+    "screens": ("tools/screens.py", "dev"),
     "reference": ("tools/reference.py", "dev"),
 }
 
