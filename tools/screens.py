@@ -25,7 +25,7 @@ from app.ui.application import Options, make_application, make_window
 from app.ui.self_drive import SelfDrive, Step
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.main_window import MainWindow
-from nep.i18n import LANG_VARIABLE
+from nep.i18n import LANG_VARIABLE, set_initial_language
 from nep.masters.master import is_running
 from tools.screenshots import PORTS, write_behaviour
 
@@ -124,6 +124,7 @@ def save_screens(folder: Path, language: str, theme: str, size: QSize) -> int:
                 LANG_VARIABLE: language,
             }
         )
+        set_initial_language()
         behaviour = Path(home) / "Greeting.nepb"
         write_behaviour(behaviour)
         application = make_application()
