@@ -192,4 +192,4 @@ def test_installed_wheel_runs_messages_services_and_commands_in_a_fresh_environm
     ):
         done = subprocess.run(step, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    assert "messages, services and commands are well" in done.stdout
+    assert "messages, services and commands work" in done.stdout

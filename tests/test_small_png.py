@@ -47,5 +47,5 @@ def test_image_with_few_colours_keeps_its_exact_pixels(tmp_path: Path) -> None:
     cv2.imwrite(str(path), made)
     shrink(path)
     assert (cv2.imread(str(path)) == made).all()
-    with pytest.raises(OSError, match="no picture"):
+    with pytest.raises(OSError, match="isn't a readable image"):
         shrink(tmp_path / "missing.png")

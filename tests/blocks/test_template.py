@@ -30,7 +30,7 @@ def test_negative_literal_keeps_its_sign_under_a_power():
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, object(), b"bytes"])
 def test_literal_of_unsupported_value_is_rejected(value):
-    with pytest.raises(ValueError, match=r"program"):
+    with pytest.raises(ValueError, match=r"can't be part of a program|is not a finite number"):
         literal(value)
 
 

@@ -479,7 +479,7 @@ def test_image_files_are_received_as_images(adapter: Adapter, node: Node) -> Non
     adapter.ask("publish", pub=pub, bytes=base64.b64encode(PICTURE).decode())
     picture = listen(subscriber)
     assert picture.shape[:2] == (2, 3)
-    assert "JPEG or PNG" in adapter.refused("publish", pub=pub, bytes="AAEC")
+    assert "JPEG nor a PNG" in adapter.refused("publish", pub=pub, bytes="AAEC")
 
 
 def test_public_calls_behave_as_documented(master: Master) -> None:

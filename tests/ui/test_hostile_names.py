@@ -53,10 +53,9 @@ def test_menu_shows_exactly_the_name(qtbot) -> None:
 def test_every_dynamic_tooltip_uses_the_escaping_function() -> None:
     found = []
     for path in Path(app.ui.__file__).parent.rglob("*.py"):
-        for line in path.read_text("utf-8").splitlines():
-            given = re.search(r"\.setToolTip\((.*)", line)
-            if given and not re.match(r'"[^"]*"\)$|(NAME, )?plain\.tip\(', given[1]):
-                found.append(f"{path.name}: {line.strip()}")
+        for given in re.finditer(r"\.setToolTip\(\s*(.*)", path.read_text("utf-8")):
+            if not re.match(r'"[^"]*"\)$|(NAME_COLUMN, )?plain\.tip\(', given[1]):
+                found.append(f"{path.name}: {given[0].strip()}")
     assert not found
 
 

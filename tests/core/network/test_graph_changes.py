@@ -22,9 +22,9 @@ def test_joining_robot_is_reported_in_one_line_with_topic_count() -> None:
 
 
 def test_single_new_topic_is_named_with_publisher_count() -> None:
-    assert change_messages(graph(one=[]), graph(one=["/a"])) == ["/a is new, 1 publisher"]
+    assert change_messages(graph(one=[]), graph(one=["/a"])) == ["new topic /a (1 publisher)"]
     assert change_messages(graph(one=[], two=[]), graph(one=["/a"], two=["/a"])) == [
-        "/a is new, 2 publishers"
+        "new topic /a (2 publishers)"
     ]
 
 

@@ -108,7 +108,10 @@ def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make)
 def test_remote_access_setting_that_cannot_be_saved_is_applied_and_reported(world, make, tmp_path):
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # stands for a full disk: the settings can't be written
-    for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
+    for hosts, words in (
+        (["192.168.1.20"], "This change couldn't be saved"),
+        ([], "This change couldn't be saved"),
+    ):
         reach.listen_on(hosts)
         world.answer(reach)
         assert world.asked[-1][0] == tuple(hosts)

@@ -69,7 +69,7 @@ def test_run_is_recorded_at_start_and_end_and_again_with_its_confirmed_stop(told
 @pytest.mark.parametrize(
     ("changes", "result", "words"),
     [
-        ({"finished": True}, "ended", ""),
+        ({"is_finished": True}, "ended", ""),
         ({"errors": {"b": "wave failed"}}, "failed", "wave failed"),
         ({}, "stopped", ""),
     ],

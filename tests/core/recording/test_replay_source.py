@@ -296,5 +296,5 @@ def test_opening_an_empty_recording_raises(tmp_path):
     path = tmp_path / "empty.mcap"
     record(path, [])
     source = ReplaySource(path, Pictures(), clock=Clock())
-    with pytest.raises(RecordingError, match="no message"):
+    with pytest.raises(RecordingError, match="no readable messages"):
         source.open()

@@ -134,7 +134,7 @@ def test_robot_that_does_not_reply_to_stop_is_named(pepper, saved):
 def test_missing_robot_is_reported(master, saved):
     code, out = run(saved(workspace(started(say("Hi")))), robot_wait_s=0.2)
     assert code == ROBOT_MISSING
-    assert "Pepper not found." in out
+    assert "Not found: Pepper." in out
 
 
 def test_missing_robot_without_a_description_in_the_file_is_reported(master, saved):
@@ -143,7 +143,7 @@ def test_missing_robot_without_a_description_in_the_file_is_reported(master, sav
     path.write_text(json.dumps(content | {"robots": {}}))
     code, out = run(path, robot_wait_s=0.2)
     assert code == ROBOT_MISSING
-    assert "Pepper not found" in out
+    assert "Not found: Pepper" in out
 
 
 def test_file_that_cannot_be_run_and_missing_master_are_reported_as_unusable(master, saved, tmp_path):
@@ -187,7 +187,7 @@ def test_real_robot_moves_only_with_permission(master, tmp_path):
         path.write_text(json.dumps(content | {"workspace": workspace(started(walk))}))
         code, out = run(path)
         assert code == MAY_NOT_MOVE, out
-        assert "Rosie would move (“walk”). Add --allow-moving if it may." in out
+        assert "Rosie would move (“walk”). To allow this, add --allow-moving." in out
         assert rosie.commands == []
         code, out = run(path, allow_moving=True)
         assert code == OK, out

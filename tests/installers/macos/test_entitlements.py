@@ -61,7 +61,7 @@ def test_misspelt_entitlement_is_detected(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", [False, "true", 1])
 def test_entitlement_that_is_not_true_is_rejected(value: object) -> None:
-    assert problems({f"{CS}allow-jit": value}) == [f"'{CS}allow-jit' must be true or left out"]
+    assert problems({f"{CS}allow-jit": value}) == [f"'{CS}allow-jit' must be true or omitted"]
 
 
 def test_web_process_has_the_entitlements_of_qt_except_library_validation() -> None:

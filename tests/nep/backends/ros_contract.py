@@ -74,7 +74,7 @@ for _name in (
 
 
 @pytest.fixture(autouse=True)
-def _nothing_is_left() -> None:
+def _fail_on_leaks() -> None:
     """Disable the check for leaks: rospy's threads and sockets stay until the process ends."""
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import pytest
 
 import nep
-from tests.nep.backends.ros_contract import Make, _nothing_is_left, make, ros
+from tests.nep.backends.ros_contract import Make, _fail_on_leaks, make, ros
 from tests.nep.programs import eventually
 from tests.nep.services import test_calls as contract
 from tests.nep.services.test_calls import spin
 
-__all__ = ["_nothing_is_left", "make", "ros", "spin"]
+__all__ = ["_fail_on_leaks", "make", "ros", "spin"]
 
 pytestmark = [  # raised inside rospy
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),

@@ -212,13 +212,13 @@ def test_forked_child_can_write_to_the_terminal() -> None:
     terminal = Terminal(sys.stdout)
     terminal.write("parent\\n")
     assert terminal.drain(30.0)
-    terminal._changed.acquire()  # another thread writes just now
+    terminal._condition.acquire()  # another thread writes just now
     child = os.fork()
     if child == 0:
         terminal.write("child\\n")
         terminal.close(30.0)
         os._exit(0)
-    terminal._changed.release()
+    terminal._condition.release()
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     """
     with running(code) as program:

@@ -464,7 +464,7 @@ def test_click_toggles_a_group_and_keys_change_grouping_and_services(panel: Grap
     settle(qtbot, panel)
     assert names(panel) == {"pepper_driver", HERE}
     box = panel.canvas.scene.nodes[f"host:{HERE}"]  # type: ignore[union-attr]
-    assert (box.name, box.line) == ("This computer", "4 nodes")
+    assert (box.name, box.elided_detail) == ("This computer", "4 nodes")
     click(panel.canvas, at(panel, box.rect.center()))
     settle(qtbot, panel)
     assert len(names(panel)) == 5
@@ -496,7 +496,7 @@ def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, windo
     assert scene is not None
     gone = scene.nodes[key_of(panel, "RIZE")]
     assert gone.node.is_gone
-    assert gone.line == "gone for 0 s"
+    assert gone.elided_detail == "gone for 0 s"
     show(
         window,
         graph(3, nodes=(*NODES[:-1], replace(NODES[-1], id="55"), replace(NODES[1], id="66", name="new"))),

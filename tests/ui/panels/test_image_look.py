@@ -104,7 +104,7 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
     panel.show_topic(DEPTH)
     panel.style_bar.contrast.setValue(150)
     panel.style_button.setChecked(True)
-    panel.overlays.set_visible(MARKS, visible=True)
+    panel.overlays.set_visible(MARKS, is_visible=True)
     look = panel.style_bar.picture_style
     panel.show_topic(CAMERA)
     assert panel.style_bar.picture_style != look
@@ -124,7 +124,7 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
 def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, window) -> None:
     panel.show_topic(CAMERA)
     assert panel.overlays.choices() == [MARKS, "/face_positions"]
-    panel.overlays.set_visible(MARKS, visible=True)
+    panel.overlays.set_visible(MARKS, is_visible=True)
     assert MARKS in window.session.watched
     sends(window, panel, CAMERA, np.zeros((240, 320, 3), np.uint8), "bgr8")
     assert panel.view.annotations == ()
@@ -137,10 +137,10 @@ def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, w
     window.session.send(MARKS, {"circles": "none"})
     ticks(window, panel)
     assert panel.view.annotations == ()
-    panel.overlays.set_visible(MARKS, visible=False)
+    panel.overlays.set_visible(MARKS, is_visible=False)
     assert MARKS not in window.session.watched
     for number in range(MAX_OVERLAYS + 3):
-        panel.overlays.set_visible(f"/m{number}", visible=True)
+        panel.overlays.set_visible(f"/m{number}", is_visible=True)
     assert len(panel.overlays.selected_topics) == MAX_OVERLAYS
 
 

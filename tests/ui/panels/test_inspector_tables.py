@@ -224,7 +224,7 @@ def test_history_steps_back_through_messages_and_compares_with_a_pinned_message(
     panel.pin.setChecked(True)
     QTest.keyClick(panel.tree, Qt.Key.Key_Right, Qt.KeyboardModifier.AltModifier)
     panel.history.step(1)
-    assert panel.strip.text_label.text().startswith("Pinned message of ")
+    assert panel.strip.text_label.text().startswith("Pinned message from ")
     assert panel.strip.text_label.text().endswith(": 2 changed")
     press(panel.history.newest)
     ticks(window, panel)

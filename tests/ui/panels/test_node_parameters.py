@@ -183,7 +183,7 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     part.table.select_key("serial")
     assert not part.field.isEnabled()
     assert not part.set_button.isEnabled()
-    assert part.status_label.text() == "Only its own node can set it."
+    assert part.status_label.text() == "Only the node itself can change this parameter."
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.select_key("speed")

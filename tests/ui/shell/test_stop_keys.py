@@ -187,7 +187,7 @@ def test_user_interface_code_makes_no_modal_calls() -> None:
         if isinstance(node, ast.Attribute) and node.attr in MODAL
     ]
     # the speaker's loop has its own thread
-    assert sorted(found) == ["application.py: application.exec", "speaker.py: desk.loop.exec"]
+    assert sorted(found) == ["application.py: application.exec", "speaker.py: worker.loop.exec"]
 
 
 @pytest.mark.parametrize("key", KEYS, ids=["F12", "Ctrl+."])

@@ -399,7 +399,7 @@ def test_robots_chip_is_translated(pseudo, states: tuple[str, ...], run: str) ->
 def test_status_bar_items_are_translated(pseudo, session) -> None:
     facts = StatusFormatter(session())
     told = [facts.health(), facts.save_status(), facts.topics(), facts.master(), facts.traffic()]
-    told += [facts.lost(), facts.displayed_messages(), facts.window()]
+    told += [facts.lost(), facts.displayed_messages(), facts.refresh_duration()]
     for alert in list(facts._session.alerts.active):
         facts._session.alerts.resolve(alert.id)
     told.append(facts.health())

@@ -181,7 +181,7 @@ class DeveloperTools(QObject):
         self.layout.set_label(name)
         self.layout.setAccessibleName(_("Layout {name}").format(name=name))
         if self._runs.view().state in IDLE_STATES:
-            self._hide_tools_without_room()
+            self._show_tools_with_room()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
@@ -208,7 +208,7 @@ class DeveloperTools(QObject):
         paint.show_when(self.record, width >= scaled(MIN_WIDTH_WITH_RECORD_PX))
         self._hide_tools_without_room()
 
-    def _hide_crowded(self) -> None:
+    def _hide_tools_without_room(self) -> None:
         # Hides further tools if the run state, or the texts of the language, need more room. They stay hidden
         # during the run, so that the other tools don't move with every change of the run state.
         source = () if self.source.is_recording else (self.source,)
@@ -219,7 +219,7 @@ class DeveloperTools(QObject):
                 tool.hide()
                 self._tools_hidden_for_space.append(tool)
 
-    def _hide_tools_without_room(self) -> None:
+    def _show_tools_with_room(self) -> None:
         while self._tools_hidden_for_space:
             tool = self._tools_hidden_for_space[-1]
             if self._bar.needed_width() + tool.sizeHint().width() + GAP > self._bar.width():

@@ -618,7 +618,7 @@ def test_export_that_cannot_be_written_is_reported(qtbot, panel, window, tmp_pat
     for kind in (CSV_KIND, PNG_KIND):
         panel.exporter.write(tmp_path / "file" / f"a{kind.suffix}", kind)
         qtbot.waitUntil(
-            lambda: panel.refresh() or any("can't write" in each.lower() for each in window.toasts)
+            lambda: panel.refresh() or any(each.startswith("Can't export") for each in window.toasts)
         )
         window.toasts.clear()
     assert not [
