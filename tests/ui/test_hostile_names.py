@@ -51,11 +51,12 @@ def test_menu_shows_exactly_the_name(qtbot) -> None:
 
 
 def test_every_dynamic_tooltip_uses_the_escaping_function() -> None:
-    found = []
-    for path in Path(app.ui.__file__).parent.rglob("*.py"):
-        for given in re.finditer(r"\.setToolTip\(\s*(.*)", path.read_text("utf-8")):
-            if not re.match(r'"[^"]*"\)$|(NAME_COLUMN, )?plain\.tip\(', given[1]):
-                found.append(f"{path.name}: {given[0].strip()}")
+    found = [
+        f"{path.name}: {given[0].strip()}"
+        for path in Path(app.ui.__file__).parent.rglob("*.py")
+        for given in re.finditer(r"\.setToolTip\(\s*(.*)", path.read_text("utf-8"))
+        if not re.match(r'"[^"]*"\)$|(NAME_COLUMN, )?plain\.tip\(', given[1])
+    ]
     assert not found
 
 

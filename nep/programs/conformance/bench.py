@@ -355,7 +355,7 @@ class Bench:
     def _on_push(self, message: OutgoingMessage) -> None:
         if isinstance(message.body, PublisherAdded) and self.connect_delay_s is not None:
             record = message.body.publisher.publisher
-            due = time.monotonic() + self.connect_delay_s * self.scale
+            due = time.monotonic() + self.connect_delay_s  # not scaled, like the 0.5 s that `new_pub` waits
             for subscriber in self.subscribers:
                 if subscriber.topic == record.topic and subscriber.node.id == message.to:
                     self._pending_connections.append((due, subscriber, record.endpoints[0]))
