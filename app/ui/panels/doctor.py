@@ -151,7 +151,7 @@ class DoctorPanel(PanelWidget):
             self._shown_texts = texts
             self._show(findings)
         if doctor.finished_s is not None:
-            self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.finished_s)))
+            self.set_title(self.title(), time.strftime("%H:%M", time.localtime(doctor.finished_s)))
         self._show_chip(is_done=partial_findings is None)
         self._update_progress(is_done=partial_findings is None)
         self.pages.show_rows(bool(self.rows))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
-    QHBoxLayout,
+    QGridLayout,
     QSizePolicy,
     QWidget,
 )
@@ -19,8 +19,9 @@ from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Chip, ContentScrollArea, label, paint
+from app.ui.widgets import Button, Chip, ContentScrollArea, ElidedLabel, label, paint
 from app.ui.widgets.cards import Tile
+from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import StatusIcon
 from app.ui.widgets.keyboard import is_activation_key
 from app.ui.widgets.labels import PartlyBoldLabel
@@ -36,11 +37,16 @@ if TYPE_CHECKING:
 STATUS_BY_SEVERITY = {"error": "error", "warning": "warn", "info": "info"}
 SEVERITY_NAMES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
 MAX_ROWS = 60
+MIN_SENTENCE_SHARE = 0.45  # share of a row's width; with less, the buttons are below the sentence
+MIN_STATUS_WIDTH = 60
+SPACING, LEFT_MARGIN, RIGHT_MARGIN, BOTTOM_MARGIN = 10, 14, 8, 6
 NO_PROBLEMS_TEXT = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
     """Row of a problem: icon, sentence with its subject in bold, and a button for each fix.
+
+    In a narrow row the buttons are below the sentence.
 
     Args:
         line: Problem with its fixes.
@@ -60,7 +66,7 @@ class ProblemRow(QWidget):
         super().__init__()
         problem = line.problem
         self._theme, self.line, self.problem, self._is_large = theme, line, problem, is_large
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         severity = _(SEVERITY_NAMES[problem.severity])
         text = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
         self.setAccessibleName(text)
@@ -69,33 +75,64 @@ class ProblemRow(QWidget):
         if problem.block_id:
             self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(14, 0, 8, 0)
-        row.setSpacing(10)
+        self._grid = grid = QGridLayout(self)
+        grid.setContentsMargins(LEFT_MARGIN, 0, RIGHT_MARGIN, 0)
+        grid.setHorizontalSpacing(SPACING)
+        grid.setVerticalSpacing(0)
+        grid.setColumnStretch(2, 1)
         status = STATUS_BY_SEVERITY[problem.severity]
-        row.addWidget(StatusIcon(theme, status, colour="text" if status == "info" else ""))
+        self._icons: list[QWidget] = [StatusIcon(theme, status, colour="text" if status == "info" else "")]
         category = problem.category or "values"
         icon = problem.icon or theme.block_icon(category)
         if problem.category:
-            row.addWidget(Tile(theme, icon, category, 22))
+            self._icons.append(Tile(theme, icon, category, 22))
+        for column, each in enumerate(self._icons):
+            grid.addWidget(each, 0, column)
         kind = "bodyLarge" if is_large else "body"
-        row.addWidget(PartlyBoldLabel(theme, problem.message, problem.subject, kind), 1)
+        self.sentence = PartlyBoldLabel(theme, problem.message, problem.subject, kind)
+        grid.addWidget(self.sentence, 0, 2)
         self.buttons = [self._make_fix_button(fix) for fix in line.fixes]
+        self._button_row = QWidget()
+        self._button_row.setMinimumWidth(1)
+        flow = Flow(self._button_row, gap=SPACING, row_gap=4)
         for button in self.buttons:
-            row.addWidget(button)
+            flow.addWidget(button)
+        grid.addWidget(self._button_row, 0, 3)
+        self._button_row.setVisible(bool(self.buttons))
+        self._is_stacked = False
+        self._arrange()
+        theme.changed.connect(self._arrange)
 
     def _make_fix_button(self, fix: Fix) -> Button:
         button = Button(self._theme, fix.label, size="small")
         button.clicked.connect(lambda: self.fix_requested.emit(fix.action))
         return button
 
+    def _arrange(self) -> None:
+        self._grid.setRowMinimumHeight(0, self._line_height())
+        others_width = sum(each.sizeHint().width() + SPACING for each in (*self._icons, self._button_row))
+        sentence_width = self.width() - LEFT_MARGIN - RIGHT_MARGIN - others_width
+        min_width = min(self.width() * MIN_SENTENCE_SHARE, self.sentence.full_width())
+        is_stacked = bool(self.buttons) and sentence_width < min_width
+        if is_stacked != self._is_stacked:
+            self._is_stacked = is_stacked
+            self._grid.setContentsMargins(LEFT_MARGIN, 0, RIGHT_MARGIN, BOTTOM_MARGIN if is_stacked else 0)
+            self._grid.addWidget(self._button_row, *((1, 2) if is_stacked else (0, 3)))
+
     def contains_focus(self) -> bool:
         """Return True if the row or one of its buttons has the focus."""
         return self.hasFocus() or any(button.hasFocus() for button in self.buttons)
 
     def sizeHint(self) -> QSize:
+        return QSize(300, max(self._line_height(), self._grid.sizeHint().height()))
+
+    def _line_height(self) -> int:
         size = "comfortable" if self._is_large else "compact"
-        return QSize(300, max(round(self._theme.scaled(self._theme.size("row", size))), 30))
+        return max(round(self._theme.scaled(self._theme.size("row", size))), 30)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._arrange()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
@@ -134,7 +171,8 @@ class ProblemsPanel(PanelWidget):
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.status_label = label(_("Checked as you build"), "body", role="textSecondary")
+        self.status_label = ElidedLabel("body", "textSecondary", min_elided_width=MIN_STATUS_WIDTH)
+        self.status_label.setText(_("Checked as you build"))
         self.header = [self.status_label]
         self._scroll = ScrollColumn(_("Problems"), margins=(0, 4, 0, 4))
         self._column = self._scroll.column

@@ -13,6 +13,7 @@ from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
+from app.ui.text import plain
 from app.ui.text.numbers import age_text
 from app.ui.text.sensor_values import ReadingText, reading_text
 from app.ui.theme.icons import paint_icon
@@ -29,6 +30,7 @@ ROW_HEIGHTS = {"compact": 26, "comfortable": 28}
 PRIORITY_KEYWORDS = ("touch", "distance", "battery")  # listed first; other sensors keep their order
 TITLE_WIDTH, VALUE_WIDTH = 100, 96
 ICON_SIZE = 18
+DETAILS_GAP = 6
 
 
 class SensorRow(QWidget):
@@ -77,21 +79,32 @@ class SensorRow(QWidget):
         bold.setWeight(bold.Weight.Bold)
         icon = QRectF(rect.left(), middle - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
         paint_icon(painter, icon, self.sensor.icon, theme.colour("textSecondary"))
-        title_width = max(theme.scaled(TITLE_WIDTH), paint.width_of(font, self.title) + 4)
+        text_width = paint.width_of(font, self.title) + 4
+        title_width = max(theme.scaled(TITLE_WIDTH), text_width)
         title = QRectF(rect.left() + 26, rect.top(), title_width, rect.height())
         paint.text_line(painter, title, self.title, font, theme.colour("text"))
         value_width = max(paint.width_of(bold, self.reading.value), theme.scaled(54))
         value = QRectF(rect.right() - value_width, rect.top(), value_width, rect.height())
         paint.text_line(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
         details_rect = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
+        hidden_details = ""
         if self.reading.fraction is not None and details_rect.width() > 30:
             track = QRectF(
                 details_rect.left(), details_rect.center().y() - 3, details_rect.width(), BAR_HEIGHT
             )
             paint_bar(painter, theme, track, self.reading.fraction)
-        elif self.reading.details and details_rect.width() > 20:
-            paint.text_line(painter, details_rect, self.reading.details, font, theme.colour("textSecondary"))
+        elif self.reading.details:
+            details_width = paint.width_of(font, self.reading.details)
+            if details_width > details_rect.width():
+                details_rect.setLeft(title.left() + text_width + DETAILS_GAP)
+            if details_width <= details_rect.width():
+                colour = theme.colour("textSecondary")
+                paint.text_line(painter, details_rect, self.reading.details, font, colour)
+            else:
+                hidden_details = self.reading.details
         painter.end()
+        if plain.tip(hidden_details) != self.toolTip():
+            self.setToolTip(plain.tip(hidden_details))
 
 
 class SensorsPanel(OneRobotPanel):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
@@ -21,6 +22,7 @@ class Flow(QLayout):
         self._gap, self._row_gap = gap, row_gap
         self._push_index = -1
         self._greedy_by_widget: dict[QWidget, bool] = {}
+        self._attached_widgets: set[QWidget] = set()
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
@@ -37,6 +39,11 @@ class Flow(QLayout):
         self._greedy_by_widget[widget] = is_greedy
         self.addWidget(widget)
 
+    def add_attached(self, widget: QWidget) -> None:
+        """Add a widget without a gap or line break before it, such as a punctuation mark."""
+        self._attached_widgets.add(widget)
+        self.addWidget(widget)
+
     # -- overrides of QLayout
     # ---------------------------------------------------------------------------------
 
@@ -50,7 +57,11 @@ class Flow(QLayout):
         return self._items[index] if 0 <= index < len(self._items) else None
 
     def takeAt(self, index: int) -> QLayoutItem | None:
-        return self._items.pop(index) if 0 <= index < len(self._items) else None
+        if not 0 <= index < len(self._items):
+            return None
+        item = self._items.pop(index)
+        self._attached_widgets -= {item.widget()}
+        return item
 
     def expandingDirections(self) -> Qt.Orientation:
         return Qt.Orientation(0)
@@ -63,7 +74,7 @@ class Flow(QLayout):
 
     def sizeHint(self) -> QSize:
         items = [*self._visible_items()]
-        width = sum(self._preferred_width(item) for item in items) + self._gap * max(0, len(items) - 1)
+        width = sum(self._preferred_width(item) for item in items) + self._total_gap(items)
         height = max((item.sizeHint().height() for item in items), default=0)
         return self._with_margins(QSize(width, height))
 
@@ -107,6 +118,19 @@ class Flow(QLayout):
         widget = item.widget()
         return widget in self._greedy_by_widget
 
+    def _is_attached(self, item: QLayoutItem) -> bool:
+        return item.widget() in self._attached_widgets
+
+    def _gap_before(self, item: QLayoutItem) -> int:
+        return 0 if self._is_attached(item) else self._gap
+
+    def _total_gap(self, items: Sequence[QLayoutItem]) -> int:
+        return sum(self._gap_before(item) for item in items[1:])
+
+    def _attached_width(self, items: Sequence[QLayoutItem]) -> int:
+        # Width of the attached widgets at the beginning of `items`.
+        return sum(self._preferred_width(item) for item in itertools.takewhile(self._is_attached, items))
+
     def _arrange(self, rect: QRect, *, should_move: bool) -> int:
         # Returns the height; places the items only if `should_move`.
         margins = self.contentsMargins()
@@ -134,7 +158,7 @@ class Flow(QLayout):
             item.minimumSize().width() if self._is_elastic(item) else self._preferred_width(item)
             for item in items
         ]
-        spare = room - sum(widths) - self._gap * (len(items) - 1)
+        spare = room - sum(widths) - self._total_gap(items)
         if spare < 0:
             return []
         for index, item in enumerate(items):
@@ -146,25 +170,29 @@ class Flow(QLayout):
         first = next((index for index, item in enumerate(items) if item in pushed_items), len(items))
         row, left = [], 0
         for index, (item, width) in enumerate(zip(items, widths, strict=True)):
+            left += self._gap_before(item) if index else 0
             left += spare if index == first else 0
             row.append((item, left, width))
-            left += width + self._gap
+            left += width
         return row
 
     def _rows(self, items: list[QLayoutItem], room: int) -> list[list[tuple[QLayoutItem, int, int]]]:
         # An item that is wider than the space gets its own row.
         rows: list[list[tuple[QLayoutItem, int, int]]] = []
-        left = room + 1
-        for item in items:
-            width = min(room, self._maximum_width(item, room))
-            remaining_width = room - left
+        right = 0
+        for index, item in enumerate(items):
+            row_width = room - self._attached_width(items[index + 1 :])
+            width = min(row_width, self._maximum_width(item, row_width))
+            left = right + self._gap_before(item)
+            remaining_width = row_width - left
             if width > remaining_width >= self._minimum_width(item):
                 width = remaining_width
-            if width > remaining_width:
+            if not rows or (width > remaining_width and not self._is_attached(item)):
                 rows.append([])
                 left = 0
+                width = min(row_width, self._maximum_width(item, row_width))
             rows[-1].append((item, left, width))
-            left += width + self._gap
+            right = left + width
         return rows
 
 

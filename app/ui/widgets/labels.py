@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from app.ui.text import plain
@@ -41,10 +41,10 @@ class ElidedLabel(QLabel):
 
     mode = Qt.TextElideMode.ElideMiddle
 
-    def __init__(self, kind: str, role: str, min_width: int = 0) -> None:
-        # `min_width` is the minimum width in px.
+    def __init__(self, kind: str, role: str, min_width: int = 0, *, min_elided_width: int = 0) -> None:
+        # `min_width` is the minimum width in px; a text elided to less than `min_elided_width` isn't painted.
         super().__init__()
-        self._min_width = min_width
+        self._min_width, self._min_elided_width = min_width, min_elided_width
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setProperty("kind", kind)
         self.setProperty("role", role)
@@ -52,15 +52,20 @@ class ElidedLabel(QLabel):
     def minimumSizeHint(self) -> QSize:
         return QSize(min(self._min_width, super().sizeHint().width()), super().minimumSizeHint().height())
 
+    def displayed_text(self) -> str:
+        """Return the text as it is painted."""
+        width = self.contentsRect().width()
+        elided = self.fontMetrics().elidedText(self.text(), self.mode, width + 1)
+        return elided if elided == self.text() or width >= self._min_elided_width else ""
+
     def paintEvent(self, _event: QPaintEvent) -> None:
-        room = self.contentsRect()
-        elided = self.fontMetrics().elidedText(self.text(), self.mode, room.width() + 1)
-        full_text = self.text() if elided != self.text() else ""
+        displayed_text = self.displayed_text()
+        full_text = self.text() if displayed_text != self.text() else ""
         if plain.tip(full_text) != self.toolTip():
             self.setToolTip(plain.tip(full_text))
         painter = QPainter(self)
         painter.setPen(self.palette().color(self.foregroundRole()))
-        painter.drawText(room, int(paint.LEFT), elided)
+        painter.drawText(self.contentsRect(), int(paint.LEFT), displayed_text)
         painter.end()
 
 
@@ -129,16 +134,28 @@ class PartlyBoldLabel(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(200, round(QFontMetricsF(self._theme.font(self._kind)).height()) + 2)
 
+    def full_width(self) -> float:
+        """Return the width in px of the full text."""
+        return sum(paint.width_of(self._font(strong=strong), text) for text, strong in self._parts)
+
+    def _font(self, *, strong: bool) -> QFont:
+        font = self._theme.font(self._kind)
+        if strong:
+            font.setWeight(font.Weight.Bold)
+        return font
+
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         rect = QRectF(self.rect())
-        for text, strong in self._parts:
-            font = self._theme.font(self._kind)
-            if strong:
-                font.setWeight(font.Weight.Bold)
-            if text and rect.width() > 4:
-                paint.text_line(painter, rect, text, font, self._theme.colour("text"))
-            rect.setLeft(rect.left() + QFontMetricsF(font).horizontalAdvance(text))
+        for index, (text, strong) in enumerate(self._parts):
+            font = self._font(strong=strong)
+            next_text = "".join(part for part, _strong in self._parts[index + 1 :])
+            if next_text and paint.width_of(font, f"{text}…") > rect.width():
+                # no space for an ellipsis in the next part, so that this part is elided
+                paint.text_line(painter, rect, text + next_text, font, self._theme.colour("text"))
+                break
+            paint.text_line(painter, rect, text, font, self._theme.colour("text"))
+            rect.setLeft(rect.left() + paint.width_of(font, text))
         painter.end()
 
 

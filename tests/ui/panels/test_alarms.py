@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QMenu
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.ui.panels.alarms import PANEL
 from app.ui.panels.alarms.columns import csv_text
@@ -92,6 +92,36 @@ def test_alarm_added_in_the_empty_panel_watches_the_entered_topic(panel, window)
     assert panel.field is None
     assert said(panel) == "When /robot/camera is silent for 2 s , show a banner"
     assert window.session.alarms.alarms.evaluator.topics == {"/robot/camera"}
+
+
+@pytest.mark.parametrize("width", [752, 420])
+def test_words_after_the_text_field_of_a_slot_stay_visible(panel, qtbot, width: int) -> None:
+    panel.resize(width, 600)
+    panel.alarms.set_rule(BELOW)
+    panel.refresh()
+    limit = slot(panel, "limit")
+    row = panel.rows[0]
+    qtbot.waitUntil(lambda: limit.width() < 100 and row.width() > 300)
+    width_before = limit.width()
+    press(limit)
+    qtbot.waitUntil(lambda: panel.field.width() >= 200)
+
+    def covered() -> list[QWidget]:
+        children = row.sentence.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        field = panel.field.geometry().translated(-row.sentence.pos())
+        return [each for each in children if each is not limit and each.geometry().intersects(field)]
+
+    qtbot.waitUntil(lambda: covered() == [])
+    QTest.keyClick(panel.field, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: limit.width() == width_before)
+
+
+def test_comma_follows_the_previous_word_without_a_gap(panel, qtbot) -> None:
+    panel.alarms.set_rule(BELOW)
+    panel.refresh()
+    comma = next(each for each in panel.rows[0]._labels if each.text() == ",")
+    qtbot.waitUntil(lambda: comma.x() > 0)
+    assert comma.x() == slot(panel, "time").geometry().right() + 1
 
 
 def test_parts_of_an_alarm_sentence_are_edited_by_keyboard(panel) -> None:

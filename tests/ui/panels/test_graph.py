@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.graph.activity import QUIET_TIMEOUT_S
 from app.core.graph.layout import GraphLayout, LayoutSizes
-from app.core.graph.node_graph import NodeGraph
+from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
 from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
 from app.ui.panels.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
@@ -164,6 +164,22 @@ def test_graph_shows_nodes_edges_and_rates(panel: GraphPanel) -> None:
     }  # fmt: skip
     assert {item.name for item in scene.groups} == {"This computer", "pepper"}
     assert all(item.label is not None for item in scene.lines if item.line.kind == "topic")
+
+
+def test_edge_labels_are_within_the_bounds_and_do_not_overlap_nodes(qtbot, qapp, panel: GraphPanel) -> None:
+    # A vertical edge at the left border, with a label that is wider than the margin of the group.
+    line = GraphLine("topic", ("a",), ("b",), ("/Pepper/battery_of_the_robot",))
+    nodes = tuple(DrawnNode(key, key, "", "program") for key in ("a", "b"))
+    layout = GraphLayout(
+        {"a": (0.0, 0.0), "b": (250.0, 200.0)},
+        routes={(line.key, "a", "b"): ((-70.0, 24.0), (-70.0, 200.0), (174.0, 200.0))},
+    )
+    scene = GraphScene(panel.theme, NodeGraph(nodes, (line,)), layout, LayoutSizes(), HERE)
+    scene.complete(panel._stats_of)
+    label = scene.lines[0].label
+    assert label is not None
+    assert scene.bounds.contains(label)
+    assert not any(item.rect.intersects(label) for item in scene.nodes.values())
 
 
 def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtbot) -> None:

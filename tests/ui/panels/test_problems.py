@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QRectF, Qt
+from PySide6.QtGui import QFont, QFontMetricsF
 from PySide6.QtTest import QTest
 
 from app.blocks import Problem
 from app.core.reports.not_installed import MissingLibraries, alert_missing
 from app.ui.panels.problems import PANEL, ProblemsPanel
+from app.ui.widgets import paint
 from app.ui.widgets.keyboard import tab_stops
+from app.ui.widgets.labels import PartlyBoldLabel
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys, press
 from tests.ui.sample_data import pepper
@@ -162,3 +165,48 @@ def test_unavailable_block_editor_is_a_problem_regardless_of_the_blocks(panel, w
     panel.refresh()
     assert len(panel.rows) == before + 1
     assert "sudo apt install libnss3" in panel.rows[0].accessibleName()
+
+
+def test_fix_buttons_are_below_the_sentence_in_a_narrow_panel(qtbot, panel) -> None:
+    row = panel.rows[0]
+    button, sentence = row.buttons[0], row.sentence
+
+    def is_below() -> bool:
+        return button.mapTo(row, QPoint()).y() >= sentence.geometry().bottom()
+
+    assert not is_below()
+    assert sentence.width() >= sentence.full_width()
+    panel.resize(285, 300)
+    qtbot.waitUntil(is_below)
+    qtbot.waitUntil(lambda: button.mapTo(row, QPoint(0, button.height())).y() <= row.height())
+    assert sentence.width() > 0.6 * row.width()
+    assert panel.rows[1].y() >= row.geometry().bottom()
+    panel.resize(900, 300)
+    qtbot.waitUntil(lambda: not is_below())
+
+
+def test_status_text_is_elided_or_left_out_in_a_narrow_title_bar(panel) -> None:
+    status_label = panel.status_label
+    shown = []
+    for width in (300, 90, 40):
+        status_label.resize(width, 20)
+        shown.append(status_label.displayed_text())
+    assert shown[0] == "Checked as you build"
+    assert "…" in shown[1]
+    assert shown[2] == ""
+
+
+def test_sentence_that_does_not_fit_ends_with_an_ellipsis_at_any_width(qtbot, panel, monkeypatch) -> None:
+    sentence = PartlyBoldLabel(panel.theme, "NAO isn't connected; wave is skipped.", "wave")
+    qtbot.addWidget(sentence)
+    painted: list[str] = []
+
+    def record(_painter: object, rect: QRectF, text: str, font: QFont, *_: object) -> None:
+        painted.append(QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1))
+
+    monkeypatch.setattr(paint, "text_line", record)
+    for width in range(40, int(sentence.full_width()) - 4):
+        painted.clear()
+        sentence.resize(width, 20)
+        sentence.grab()
+        assert painted[-1].endswith("…"), width

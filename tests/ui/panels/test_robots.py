@@ -227,3 +227,20 @@ def test_connected_robot_has_no_menu(panel) -> None:
 def test_last_seen_time_is_formatted_relative_to_today(now, words) -> None:
     seen = dt.datetime(2026, 11, 20, 16, 20, tzinfo=dt.timezone.utc)
     assert seen_text(seen.timestamp(), dt.datetime(*now, tzinfo=dt.timezone.utc)) == words
+
+
+def test_narrow_header_shrinks_the_search_field_before_it_hides_the_description(panel) -> None:
+    header, about, finder = panel.head, panel.about, panel.finder
+    header.name.setText("Pepper in the laboratory")
+    widths = []
+    for width in range(1200, 619, -1):
+        header.resize(width, header.height())
+        if not about.isVisibleTo(header):
+            break
+        widths.append(finder.width())
+        assert about.displayed_text() == "virtual, 6 actions"
+    else:
+        pytest.fail("the description is never hidden")
+    assert (widths[0], widths[-1]) == (180, 110)
+    assert finder.isVisibleTo(header)
+    assert finder.width() > 110  # the search field takes the space of the description

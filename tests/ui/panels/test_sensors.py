@@ -5,8 +5,10 @@ import pytest
 from app.robots.description.inputs import Choice
 from app.robots.description.model import DataField, Sensor
 from app.ui.panels import sensors
-from app.ui.panels.sensors import PANEL, SensorsPanel
+from app.ui.panels.sensors import PANEL, SensorRow, SensorsPanel
 from app.ui.text.sensor_values import ReadingText, quantity_text, reading_text
+from app.ui.theme import fonts
+from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 from tests.ui.sample_data import pepper
@@ -137,3 +139,27 @@ def test_panel_without_a_robot_shows_an_empty_state_and_rows_follow_the_descript
     panel.refresh()
     assert (count, len(panel.rows)) == (8, 2)
     assert window.session.looked_at == ["Pepper"]
+
+
+def test_details_move_next_to_the_title_or_are_left_out_in_a_narrow_row(qtbot, qapp, monkeypatch) -> None:
+    fonts.load()
+    row = SensorRow(Theme("light"), POSE)
+    qtbot.addWidget(row)
+    row.show_value({"x": 1.284, "y": -0.307, "theta": 31.2}, 0.0)
+    painted: dict[str, float] = {}
+    monkeypatch.setattr(
+        sensors.paint, "text_line", lambda _painter, rect, text, *_: painted.update({text: rect.left()})
+    )
+    details_left = []
+    for width in (384, 290, 220):
+        painted.clear()
+        row.resize(width, 28)
+        row.grab()
+        assert {"Position", "1.3, \u22120.3 m"} <= set(painted)
+        details_left.append(painted.get("facing 31°"))
+    wide, narrow, hidden = details_left
+    assert wide is not None
+    assert narrow is not None
+    assert wide > narrow
+    assert hidden is None
+    assert row.toolTip() == "facing 31°"

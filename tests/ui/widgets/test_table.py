@@ -221,6 +221,18 @@ def test_context_menu_of_the_header_lists_the_columns(qtbot, qapp, view) -> None
     menu.close()
 
 
+@pytest.mark.parametrize(("width", "shows_chip"), [(220, True), (120, False)])
+def test_cell_shows_its_chip_only_beside_the_full_text(view, width: int, shows_chip: bool) -> None:
+    image = QImage(width, 26, QImage.Format.Format_RGB32)
+    image.fill(view.theme.colour("panel"))
+    painter = QPainter(image)
+    cell = Cell("camera_driver", "chevron-right", chip="new")
+    view.itemDelegate()._paint_cell(painter, QRectF(0, 0, width, 26), cell, "text", is_numeric=False)
+    painter.end()
+    colours = [image.pixelColor(x, 6) for x in range(width)]
+    assert (view.theme.colour("accentTint") in colours) is shows_chip
+
+
 def test_cell_paints_its_sparkline(qapp, view, model) -> None:
     delegate = view.itemDelegate()
     image = QImage(80, 26, QImage.Format.Format_RGB32)

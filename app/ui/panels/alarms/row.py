@@ -107,10 +107,7 @@ class AlarmRow(QWidget):
         }
         for part in parts:
             if part.kind == "word":
-                word_label = label(part.text, "body", role="textSecondary")
-                self._labels.append(word_label)
-                self._flow.addWidget(word_label)
-                word_label.show()
+                self._add_word(part.text)
                 continue
             slot = self.slots.get(part.key)
             if slot is None:
@@ -132,6 +129,13 @@ class AlarmRow(QWidget):
         QWidget.setTabOrder(previous, self.snooze_button)
         QWidget.setTabOrder(self.snooze_button, self.more_button)
         self.sentence.updateGeometry()
+
+    def _add_word(self, text: str) -> None:
+        word_label = label(text, "body", role="textSecondary")
+        self._labels.append(word_label)
+        add = self._flow.add_attached if text == "," else self._flow.addWidget
+        add(word_label)
+        word_label.show()
 
     def _new_slot(self, part: PhrasePart) -> AlarmSlot:
         slot = AlarmSlot(self._theme, part, _(SLOT_NAMES[part.role]))

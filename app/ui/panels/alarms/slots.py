@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QPoint, QRect, QRectF, QSize, QStringListModel, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QFont, QKeyEvent, QPainter, QPen
-from PySide6.QtWidgets import QCompleter, QLineEdit, QStyledItemDelegate, QToolTip, QWidget
+from PySide6.QtGui import QFocusEvent, QFont, QKeyEvent, QMoveEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import QApplication, QCompleter, QLineEdit, QStyledItemDelegate, QToolTip, QWidget
 
 from app.ui.panels.alarms.phrases import PhrasePart
 from app.ui.text import plain
@@ -19,20 +19,24 @@ from app.ui.widgets.menus import FieldContextMenu
 
 HEIGHT, PADDING, ICON, GAP, MAX_WIDTH = 24, 7, 14, 5, 300
 FIELD_WIDTH = 240
+MOUSE_POLL_MS = 50
 
 
 class AlarmSlot(PaintedButton):
     """Button for a slot of an alarm's sentence.
 
-    `removed` is emitted when Delete or Backspace is pressed on an action.
+    `removed` is emitted when Delete or Backspace is pressed on an action, `geometry_changed` when the layout
+    moved or resized the slot.
     """
 
     elides_text = True
     removed = Signal()
+    geometry_changed = Signal()
 
     def __init__(self, theme: Theme, part: PhrasePart, name: str) -> None:
         super().__init__(theme)
         self.part, self._name = part, name
+        self._reserved_width = 0
         self._update_text(part)
 
     def show_part(self, part: PhrasePart) -> None:
@@ -46,13 +50,43 @@ class AlarmSlot(PaintedButton):
         self.updateGeometry()
         self.update()
 
+    def reserve_width(self, width: int) -> None:
+        """Widen the slot, so that the layout makes room for a text field over it."""
+        self._reserved_width = width
+        self._update_layout()
+
+    def release_width(self) -> None:
+        """Undo `reserve_width`, as soon as no mouse button is pressed."""
+        if QApplication.mouseButtons() != Qt.MouseButton.NoButton:
+            # A button that moves between press and release would miss the click.
+            QTimer.singleShot(MOUSE_POLL_MS, self, self.release_width)
+            return
+        self._reserved_width = 0
+        self._update_layout()
+
+    def _update_layout(self) -> None:
+        self.updateGeometry()
+        parent = self.parentWidget()
+        layout = parent.layout() if parent is not None else None
+        if layout is not None:
+            layout.activate()
+
+    def moveEvent(self, event: QMoveEvent) -> None:
+        super().moveEvent(event)
+        self.geometry_changed.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.geometry_changed.emit()
+
     def sizeHint(self) -> QSize:
         theme = self._theme
         width = paint.width_of(self._font(), self.text()) + 2 * PADDING
         if self.part.icon:
             width += theme.scaled(ICON) + (GAP if self.text() else 0)
         height = max(HEIGHT, round(paint.height_of(self._font())) + 6)
-        return QSize(min(round(width) + 2, round(theme.scaled(MAX_WIDTH))), height)
+        width = min(round(width) + 2, round(theme.scaled(MAX_WIDTH)))
+        return QSize(max(width, self._reserved_width), height)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(min(self.sizeHint().width(), 40), self.sizeHint().height())
@@ -122,7 +156,7 @@ class SlotField(QLineEdit):
         rejection: str = "",
     ) -> None:
         super().__init__(text, row)
-        self.slot, self._apply, self._is_closed = slot, apply, False
+        self.slot, self._row, self._apply, self._is_closed = slot, row, apply, False
         self._rejection = rejection
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
@@ -140,16 +174,16 @@ class SlotField(QLineEdit):
             popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
         self.textEdited.connect(lambda _text: self._set_invalid(is_invalid=False))
-        self._position_over_slot(theme, row)
+        slot.reserve_width(max(slot.sizeHint().width() + 24, round(theme.scaled(FIELD_WIDTH))))
+        slot.geometry_changed.connect(self._position_over_slot)
+        self.closed.connect(slot.release_width)
+        self._position_over_slot()
         self.selectAll()
         self.show()
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _position_over_slot(self, theme: Theme, row: QWidget) -> None:
-        rect = QRect(self.slot.mapTo(row, QPoint()), self.slot.size())
-        rect.setWidth(max(rect.width() + 24, round(theme.scaled(FIELD_WIDTH))))
-        if rect.right() > row.width() - 4:
-            rect.moveRight(max(rect.width(), row.width() - 4))
+    def _position_over_slot(self) -> None:
+        rect = QRect(self.slot.mapTo(self._row, QPoint()), self.slot.size())
         middle, height = rect.center().y(), max(rect.height() + 4, self.sizeHint().height())
         rect.setHeight(height)
         rect.moveTop(middle - height // 2)

@@ -6,7 +6,14 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from app.core.graph.walk import GraphSelection
-from app.ui.panels.graph.scene import BRIDGE_END_WIDTH, GraphScene, GroupItem, LineItem, NodeItem
+from app.ui.panels.graph.scene import (
+    BRIDGE_END_WIDTH,
+    LABEL_PADDING,
+    GraphScene,
+    GroupItem,
+    LineItem,
+    NodeItem,
+)
 from app.ui.panels.graph.texts import group_note, node_icon, percent_text, quiet_text
 from app.ui.theme.icons import paint_icon
 from app.ui.widgets import paint
@@ -157,11 +164,15 @@ class _ScenePainter:
         if is_selected:
             paint.box(
                 painter,
-                rect.adjusted(-5, -1, 5, 1),
+                rect.adjusted(-2, -1, 2, 1),
                 theme.radius("chip"),
                 theme.colour("accentTint"),
                 theme.colour("accent"),
             )
+        elif (background := self.scene.label_background(item)) is not None:
+            is_in_group = any(group.rect.contains(rect.center()) for group in self.scene.groups)
+            painter.fillRect(background, theme.colour("window" if is_in_group else "panel"))
+        rect = rect.adjusted(LABEL_PADDING, 0, -LABEL_PADDING, 0)
         colour = theme.colour("accentText" if is_selected else "text")
         _paint_text(painter, rect, names, self.scene.label_font, colour)
         if rate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -36,9 +37,10 @@ from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
 from app.ui.panels.graph.card import CARD_WIDTH, CardSources, GraphCard, node_card, topic_card
 from app.ui.panels.graph.painting import paint_scene
-from app.ui.panels.graph.scene import GraphScene
+from app.ui.panels.graph.scene import NODE_TEXT_INSET, GraphScene
 from app.ui.panels.graph.texts import (
     LineStats,
+    behaviour_detail,
     counts_text,
     finite_or_none,
     group_name,
@@ -59,8 +61,9 @@ from app.ui.panels.row_actions import (
     topic_actions,
 )
 from app.ui.text import plain
+from app.ui.text.nodes import cpu_text
 from app.ui.text.numbers import bandwidth_text, group_digits
-from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
+from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label, paint
 from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, ngettext
@@ -280,7 +283,11 @@ class GraphPanel(PanelWidget):
         return graph is not None and any(node.is_gone for node in graph.nodes)
 
     def _sizes(self) -> LayoutSizes:
-        return LayoutSizes().scaled(self.theme.scaled(1.0))
+        # Nodes are wide enough for the details of a behaviour, whose length depends on the language.
+        sizes = LayoutSizes().scaled(self.theme.scaled(1.0))
+        detail_width = paint.width_of(self.theme.font("caption"), behaviour_detail(cpu_text(1.0)))
+        width, height = sizes.node
+        return replace(sizes, node=(max(width, math.ceil(detail_width + NODE_TEXT_INSET)), height))
 
     def _update_empty_state(self) -> None:
         if self.session.master.kind == "none":

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
+from PySide6.QtCore import QMarginsF, QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF, QPainterPath, QPolygonF
 
 from app.core.graph.layout import MAX_AVOIDING_ROUTES, GraphLayout, LayoutSizes, Position
@@ -34,6 +34,12 @@ LINE_MARGIN = 14.0
 CELL_SIZE = (160.0, 48.0)
 LABEL_RATE_CHARS = 7
 """Number of characters that every label reserves for the rate."""
+LABEL_PADDING = 3.0
+"""Margin in px left and right of a label's text."""
+NODE_PADDING = 4.0
+"""Minimum distance in px of a label from the boxes of nodes."""
+NODE_TEXT_INSET = 46.0
+"""Part in px of a node's width that is not available for its texts."""
 MIN_SMALL_TEXT_PX = 7.0
 """Font height in px below which small text is not painted, because it would be illegible."""
 TINY_SCALE = 0.2
@@ -177,9 +183,19 @@ class GraphScene:
         )
         avoidable_lines = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
         self._line_areas = _OccupiedAreas(
-            _segment_rect(*part) for item in avoidable_lines for part in _segments(item)
+            [
+                *(_segment_rect(*part) for item in avoidable_lines for part in _segments(item)),
+                *(border for item in self.groups for border in _border_rects(item.rect)),
+            ]
         )
-        self._occupied_areas = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *header_rects])
+        margins = QMarginsF(NODE_PADDING, NODE_PADDING, NODE_PADDING, NODE_PADDING)
+        self._occupied_areas = _OccupiedAreas(
+            [
+                *(item.rect.marginsAdded(margins) for item in self.nodes.values()),
+                *header_rects,
+                *(item.quiet_rect for item in self.groups if item.quiet_rect is not None),
+            ]
+        )
 
     def _update_fonts(self) -> None:
         theme = self.theme
@@ -190,11 +206,13 @@ class GraphScene:
         self.char_width = QFontMetricsF(self.label_font).horizontalAdvance("0")
 
     def _text_width(self, node: DrawnNode) -> float:
-        return self.sizes.node[0] - 46 - (BRIDGE_END_WIDTH if node.bridged_network else 0)
+        return self.sizes.node[0] - NODE_TEXT_INSET - (BRIDGE_END_WIDTH if node.bridged_network else 0)
 
     @staticmethod
-    def _elide(font: QFont, text: str, width: float) -> str:
-        return QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideMiddle, width)
+    def _elide(
+        font: QFont, text: str, width: float, mode: Qt.TextElideMode = Qt.TextElideMode.ElideMiddle
+    ) -> str:
+        return QFontMetricsF(font).elidedText(text, mode, width)
 
     def _group_item(self, group: GraphGroup) -> GroupItem:
         rect = QRectF(*self.layout.groups[group.key])
@@ -235,7 +253,9 @@ class GraphScene:
             if detail == item.detail:
                 return None
             item.detail = detail
-            item.elided_detail = self._elide(self.small_font, detail, self._text_width(item.node))
+            item.elided_detail = self._elide(
+                self.small_font, detail, self._text_width(item.node), Qt.TextElideMode.ElideRight
+            )
             return item.rect
         current, previous = stats_of(item.line), item.stats
         item.stats = current
@@ -256,16 +276,16 @@ class GraphScene:
             self.update_stats(item, stats_of, with_small_text=True)
 
     def _label_rect_for(self, item: LineItem) -> QRectF | None:
-        # Tries the longest horizontal segment first, and prefers places that no other line crosses.
+        # Prefers places that few lines and borders of groups cross; among these, the longest horizontal
+        # segment. Candidates outside the bounds are moved inside, because "Show all" fits only the bounds.
         char_count = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
-        width, height = char_count * self.char_width + 4, QFontMetricsF(self.label_font).height()
+        width = char_count * self.char_width + 2 * LABEL_PADDING
+        height = QFontMetricsF(self.label_font).height()
+        candidates = (_moved_inside(rect, self.bounds) for rect in _label_candidates(item, width, height))
         free_rects = [
-            rect for rect in _label_candidates(item, width, height) if self._occupied_areas.is_free(rect)
+            rect for rect in candidates if self.bounds.contains(rect) and self._occupied_areas.is_free(rect)
         ]
-        label_rect = next(
-            (rect for rect in free_rects if self._line_areas.is_free(rect)),
-            free_rects[0] if free_rects else None,
-        )
+        label_rect = min(free_rects, key=self._line_areas.overlap_count, default=None)
         if label_rect is not None:
             self._occupied_areas.add(label_rect)
         return label_rect
@@ -306,6 +326,14 @@ class GraphScene:
     def has_stats(scale: float) -> bool:
         """Return True if line widths, arrows and rates are shown at a scale."""
         return scale >= TINY_SCALE
+
+    def label_background(self, item: LineItem) -> QRectF | None:
+        """Return the rectangle behind the text of a line's label, or None if no label is shown."""
+        if item.label is None or not item.stats.label:
+            return None
+        rect = QRectF(item.label)
+        rect.setWidth(len(item.stats.label) * self.char_width + 2 * LABEL_PADDING)
+        return rect
 
     def has_small_text(self, scale: float) -> bool:
         """Return True if the small text is legible at a scale."""
@@ -420,6 +448,22 @@ def _label_candidates(item: LineItem, width: float, height: float) -> Iterator[Q
             yield QRectF(begin[0] - 5 - width, top + room * fraction, width, height)
 
 
+def _moved_inside(rect: QRectF, area: QRectF) -> QRectF:
+    left = max(area.left(), min(rect.left(), area.right() - rect.width()))
+    top = max(area.top(), min(rect.top(), area.bottom() - rect.height()))
+    return QRectF(QPointF(left, top), rect.size())
+
+
+def _border_rects(rect: QRectF) -> tuple[QRectF, ...]:
+    corners = (
+        (rect.left(), rect.top()),
+        (rect.right(), rect.top()),
+        (rect.right(), rect.bottom()),
+        (rect.left(), rect.bottom()),
+    )
+    return tuple(_segment_rect(*part) for part in itertools.pairwise((*corners, corners[0])))
+
+
 def _segments(item: LineItem) -> list[tuple[Position, Position]]:
     return [part for points in item.routes.values() for part in itertools.pairwise(points)]
 
@@ -467,6 +511,10 @@ class _OccupiedAreas:
 
     def is_free(self, rect: QRectF) -> bool:
         return not any(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ()))
+
+    def overlap_count(self, rect: QRectF) -> int:
+        # Counts a rectangle once per cell, which is exact enough for a comparison.
+        return sum(other.intersects(rect) for cell in _cells(rect) for other in self._cells.get(cell, ()))
 
     def add(self, rect: QRectF) -> None:
         for cell in _cells(rect):

@@ -90,8 +90,14 @@ def node_detail(node: DrawnNode) -> str:
         return _("this window")
     if node.kind == "bridge":
         return pgettext("node", "bridge")
-    language = _("behaviour") if node.kind == "behaviour" else entry.language or _network_text(node)
-    return ", ".join(filter(None, (language, cpu)))
+    if node.kind == "behaviour":
+        return behaviour_detail(cpu)
+    return ", ".join(filter(None, (entry.language or _network_text(node), cpu)))
+
+
+def behaviour_detail(cpu: str) -> str:
+    """Return the second line in the box of a behaviour; `cpu` is its CPU use as text, or ""."""
+    return ", ".join(filter(None, (_("behaviour"), cpu)))
 
 
 def _network_text(node: DrawnNode) -> str:

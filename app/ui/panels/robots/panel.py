@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -23,10 +23,20 @@ from app.ui.panels.base import Panel, PanelContext
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
-from app.ui.panels.robots.list import LIST_WIDTH, RobotList
+from app.ui.panels.robots.list import RobotList
 from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, SearchField, Separator, label
+from app.ui.widgets import (
+    Button,
+    Chip,
+    ElidedLabel,
+    EmptyAction,
+    EmptyState,
+    SearchField,
+    Separator,
+    label,
+    paint,
+)
 from app.ui.widgets.file_dialogs import FileDialogs
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
@@ -41,25 +51,30 @@ if TYPE_CHECKING:
 
 EXPANDED_CARD_COUNT = 4
 LIST_MIN_WIDTH = 760
-FINDER_MIN_WIDTH, ABOUT_MIN_WIDTH = 620, 440
-FINDER_WIDTH = 180
+HEADER_MIN_WIDTH_WITH_FINDER = 620
+FINDER_MIN_WIDTH, FINDER_MAX_WIDTH = 110, 180
+HEADER_GAP = 10
 PICTURE_CODEC = "image"
 
 
 class RobotHeader(QWidget):
-    """Header with name and state of the selected robot, a search field for actions, and a Stop button."""
+    """Header with name and state of the selected robot, a search field for actions, and a Stop button.
+
+    In a narrow header the search field shrinks first, then the description of the robot is hidden.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self._theme = theme
         self.name = label("", "heading")
         self.chip = Chip(theme)
         self.about = ElidedLabel("body", "textSecondary")
         self.finder = SearchField(theme, _("Find an action"))
-        self.finder.setFixedWidth(FINDER_WIDTH)
+        self.finder.setFixedWidth(FINDER_MAX_WIDTH)
         self.finder.setMinimumHeight(theme.size("control", "form"))
         self.stop = Button(theme, _("Stop"), "square", kind="stop", size="large")
         self.stop.has_filled_icon = True
-        row = Flow(self)
+        self._row = row = Flow(self, gap=HEADER_GAP)
         row.setContentsMargins(16, 7, 16, 8)
         row.addWidget(self.name)
         row.addWidget(self.chip)
@@ -67,6 +82,25 @@ class RobotHeader(QWidget):
         row.push()
         row.addWidget(self.finder)
         row.addWidget(self.stop)
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() in {QEvent.Type.LayoutRequest, QEvent.Type.Resize}:
+            self._fit()
+        return super().event(event)
+
+    def _fit(self) -> None:
+        shows_finder = self.width() >= self._theme.scaled(HEADER_MIN_WIDTH_WITH_FINDER)
+        margins = self._row.contentsMargins()
+        others_width = sum(each.sizeHint().width() + HEADER_GAP for each in (self.name, self.chip, self.stop))
+        room = self.width() - margins.left() - margins.right() - others_width
+        about_width = self.about.sizeHint().width()
+        min_finder_width = FINDER_MIN_WIDTH + HEADER_GAP if shows_finder else 0
+        shows_about = about_width + min_finder_width <= room
+        if shows_about:
+            room -= about_width + HEADER_GAP
+        self.finder.setFixedWidth(max(FINDER_MIN_WIDTH, min(FINDER_MAX_WIDTH, room)))
+        paint.show_when(self.finder, shows_finder)
+        paint.show_when(self.about, shows_about)
 
 
 class SessionImageSource:
@@ -365,15 +399,11 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def _fit(self) -> None:
-        # In a narrow panel the description is hidden first, then the list.
         width = self.width() / self.theme.scaled(1.0)
         count = self.list.count
         is_list_visible = count > 1 or (count == 1 and width >= LIST_MIN_WIDTH)
         self.list.setVisible(is_list_visible)
         self._list_line.setVisible(is_list_visible)
-        room = width - (LIST_WIDTH if is_list_visible else 0)
-        self.finder.setVisible(room >= FINDER_MIN_WIDTH)
-        self.about.setVisible(room >= ABOUT_MIN_WIDTH)
 
     def focus_filter(self) -> bool:
         self.finder.setFocus(Qt.FocusReason.ShortcutFocusReason)

@@ -154,11 +154,16 @@ class CellDelegate(QStyledItemDelegate):
         font = self._view.cell_font(cell)
         metrics = QFontMetricsF(font)
         colour = theme.colour(role)
-        reserved_width = (ICON_SIZE + 5.0 if cell.icon else 0.0) + (
-            self._chip_width(cell.chip) + 8 if cell.chip else 0.0
-        )
-        text, room = cell.text, max(0.0, box.width() - reserved_width)
-        advance = metrics.horizontalAdvance(text)
+        text, advance = cell.text, metrics.horizontalAdvance(cell.text)
+        reserved_width = ICON_SIZE + 5.0 if cell.icon else 0.0
+        chip = cell.chip
+        if chip:
+            chip_width = self._chip_width(chip) + 8
+            if reserved_width + advance + chip_width <= box.width():
+                reserved_width += chip_width
+            else:
+                chip = None  # the text is preferred
+        room = max(0.0, box.width() - reserved_width)
         if advance > room:
             elide_mode = Qt.TextElideMode.ElideMiddle if cell.elide_middle else Qt.TextElideMode.ElideRight
             text = metrics.elidedText(text, elide_mode, room)
@@ -175,8 +180,8 @@ class CellDelegate(QStyledItemDelegate):
         painter.setFont(font)
         painter.setPen(colour)
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
-        if cell.chip:
-            self._paint_chip(painter, QPointF(x + advance + 8, box.center().y()), cell.chip)
+        if chip:
+            self._paint_chip(painter, QPointF(x + advance + 8, box.center().y()), chip)
 
     def _chip_font(self) -> QFont:
         return self._theme.font("caption")
