@@ -8,6 +8,9 @@ from collections.abc import Iterator, Sequence
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
 
+_ATTACHED = "attachedInFlow"
+"""Property of widgets without a gap before them."""
+
 
 class Flow(QLayout):
     """Layout that arranges items in one row if they fit, else in several, vertically centred in each row.
@@ -22,7 +25,6 @@ class Flow(QLayout):
         self._gap, self._row_gap = gap, row_gap
         self._push_index = -1
         self._greedy_by_widget: dict[QWidget, bool] = {}
-        self._attached_widgets: set[QWidget] = set()
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
@@ -41,7 +43,7 @@ class Flow(QLayout):
 
     def add_attached(self, widget: QWidget) -> None:
         """Add a widget without a gap or line break before it, such as a punctuation mark."""
-        self._attached_widgets.add(widget)
+        widget.setProperty(_ATTACHED, True)
         self.addWidget(widget)
 
     # -- overrides of QLayout
@@ -57,11 +59,7 @@ class Flow(QLayout):
         return self._items[index] if 0 <= index < len(self._items) else None
 
     def takeAt(self, index: int) -> QLayoutItem | None:
-        if not 0 <= index < len(self._items):
-            return None
-        item = self._items.pop(index)
-        self._attached_widgets -= {item.widget()}
-        return item
+        return self._items.pop(index) if 0 <= index < len(self._items) else None
 
     def expandingDirections(self) -> Qt.Orientation:
         return Qt.Orientation(0)
@@ -119,7 +117,8 @@ class Flow(QLayout):
         return widget in self._greedy_by_widget
 
     def _is_attached(self, item: QLayoutItem) -> bool:
-        return item.widget() in self._attached_widgets
+        widget = item.widget()
+        return widget is not None and widget.property(_ATTACHED) is True
 
     def _gap_before(self, item: QLayoutItem) -> int:
         return 0 if self._is_attached(item) else self._gap
