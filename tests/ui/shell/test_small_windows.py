@@ -24,8 +24,7 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
-from app.ui.widgets import Chip, IconButton, SteadyLabel, StopButton
-from app.ui.widgets.inputs.fields import FilterField
+from app.ui.widgets import Chip, StopButton
 from app.ui.widgets.menus import geometry_beside_stop
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
@@ -316,90 +315,6 @@ def test_status_chip_in_a_narrow_title_loses_its_text_before_the_tabs_do(
     assert front.width() >= front.full_width()
     title.resize(500, 40)
     qtbot.waitUntil(lambda: chip.width() == chip.full_width())
-
-
-def dock_title(
-    qtbot, window: MainWindow, widgets: list[QWidget], subtitle: str = "", names: tuple[str, ...] = ()
-) -> DockTitle:
-    """Return the title bar of a panel with these header widgets; the last name is that of the front tab."""
-
-    class WithHeader(PanelWidget):
-        def header_widgets(self) -> list[QWidget]:
-            return widgets
-
-    panel = WithHeader(window.show_layout("behaviour").docks["robot"].panel.context, "Camera")
-    panel.set_title("Camera", subtitle)
-    title = DockTitle(window.theme, panel, "compact")
-    qtbot.addWidget(panel)
-    qtbot.addWidget(title)
-    title.set_tabs([(name, "bot", name == names[-1], lambda: None) for name in names])
-    title.resize(800, 32)
-    title.show()
-    return title
-
-
-def test_chip_without_room_in_a_title_is_hidden_instead_of_clipped(qtbot, window: MainWindow) -> None:
-    chip = Chip(window.theme, "No program yet", "off")
-    title = dock_title(qtbot, window, [chip], names=tuple("ABCDEFGHI"))
-    qtbot.waitUntil(lambda: chip.isVisible() and chip.width() == chip.full_width())
-    title.resize(285, 32)
-    qtbot.waitUntil(lambda: not chip.isVisible())
-    qtbot.waitUntil(lambda: not list(overlaps_in(title)))
-    chip.set("Still no program", "off")  # the panel shows its chip again
-    qtbot.wait(SETTLE_MS)
-    assert not chip.isVisible()
-    title.resize(800, 32)
-    qtbot.waitUntil(lambda: chip.isVisible() and chip.width() == chip.full_width())
-    title.resize(285, 32)
-    chip.set("")
-    title.resize(800, 32)
-    qtbot.wait(SETTLE_MS)
-    assert not chip.isVisible()
-
-
-def test_narrow_title_hides_subtitle_and_rate_before_the_front_tab_is_elided(
-    qtbot, window: MainWindow
-) -> None:
-    rate = SteadyLabel("body", "textSecondary", min_width=110)
-    rate.setText("15 fps (12 shown)")
-    title = dock_title(qtbot, window, [rate], "/Pepper/camera", ("Image", "Camera"))
-    subtitle, front = title._subtitle, title._tabs[1]
-    qtbot.waitUntil(lambda: subtitle.isVisible() and rate.isVisible())
-
-    def is_front_complete() -> bool:
-        return front.width() >= front.full_width()
-
-    seen = []
-    for width in range(500, 180, -10):
-        title.resize(width, 32)
-        qtbot.waitUntil(is_front_complete)
-        if not seen or seen[-1] != (subtitle.isVisible(), rate.isVisible()):
-            seen.append((subtitle.isVisible(), rate.isVisible()))
-    assert seen[0] == (True, True)
-    assert seen[1] == (False, True), "the subtitle is hidden first"
-    assert (False, False) in seen
-    title.resize(500, 32)
-    qtbot.waitUntil(lambda: subtitle.isVisible() and rate.isVisible())
-
-
-def test_filter_in_a_narrow_title_is_narrowed_and_no_button_lies_on_it(qtbot, window: MainWindow) -> None:
-    field, repeat = FilterField(window.theme, "Filter sent messages"), IconButton(window.theme, "repeat", "R")
-    title = dock_title(qtbot, window, [field, repeat], names=("Console", "Alarms", "Nodes", "Sent"))
-    for width in (285, 500, 250):
-        title.resize(width, 32)
-        qtbot.waitUntil(lambda: not list(overlaps_in(title)))
-        assert field.isVisible()
-    assert field.toolTip() == "Filter sent messages"
-
-
-def overlaps_in(title: DockTitle) -> Iterator[str]:
-    """Return overlapping or cut widgets in the row of a title bar."""
-    row = title.more.parentWidget()
-    children = [child for child in row.children() if isinstance(child, QWidget) and child.isVisible()]
-    yield from _pairs(children)
-    for child in children:
-        if not row.rect().contains(child.geometry()):
-            yield f"{type(child).__name__} at {child.geometry()} is cut"
 
 
 SCREEN = QRect(0, 0, 1024, 600)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui.panels.base import Density, PanelWidget
 from app.ui.text import plain
@@ -14,14 +14,11 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, ElidedLabel, IconButton, paint, set_role
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.inputs.fields import FilterField
 from nep.i18n import _
 
 ICON_SIZE, GAP = 16, 7
 BADGE_SIZE = 18
 MIN_NAME_WIDTH = 56  # px at 100 %; if there is less room, the front panel is shown as an icon too
-MIN_SUBTITLE_CHARS = 6
-MAX_WIDTH = 16777215  # px, QWIDGETSIZE_MAX
 
 
 class TitleTab(PaintedButton):
@@ -126,19 +123,12 @@ class DockTitle(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = ElidedLabel("code", "textTertiary")
-        self._subtitle.mode = Qt.TextElideMode.ElideLeft  # topics of one robot differ at their end
         self._tabs: list[TitleTab] = []
-        self._collapsed: set[QWidget] = set()  # labels and chips hidden for lack of room
-        self._expanding: set[QWidget] = set()
-        # `show` activates the layout of the window, which crashes while the window moves a dock
-        self._expand_timer = QTimer(self, interval=0, singleShot=True)
-        self._expand_timer.timeout.connect(self._expand)
         self.more = IconButton(theme, "ellipsis", _("Options of {panel}").format(panel=panel.title()))
         self.more.clicked.connect(lambda: self.menu_requested.emit(self.more))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.setSizeConstraint(QVBoxLayout.SizeConstraint.SetNoConstraint)  # can be narrower than its tabs
         self._shared = QWidget()  # row for panel tabs above the title of a panel that has tabs itself
         self._shared_row = QHBoxLayout(self._shared)
         self._shared_row.setContentsMargins(5, 1, 6, 1)
@@ -197,7 +187,6 @@ class DockTitle(QWidget):
         for tab in self._tabs:
             if tab.isChecked():
                 tab.setText(self._panel.title())
-        self.fit_tabs()
 
     def set_active(self, is_active: bool) -> None:
         """Set whether the panel has the focus; its name is then painted in the primary text colour."""
@@ -235,129 +224,49 @@ class DockTitle(QWidget):
         return self._row if self._title_widget is None else self._shared_row
 
     def fit_tabs(self) -> None:
-        """Shorten or hide parts of the title bar until it fits into its width.
+        """Shorten chips and tabs until the title bar fits into its width.
 
         Chips are reduced to icons if this makes room for all full titles. Otherwise the tabs of hidden
-        panels are reduced, and the chips only if that isn't enough. Then labels are hidden and the filter
-        is narrowed; the tab of the front panel is reduced last. Chips with the status "off" keep their
-        text, because their icon is generic. Chips for which even icons leave no room are hidden.
+        panels are reduced, and the chips only if that isn't enough; the tab of the front panel is
+        reduced last. Chips with the status "off" keep their text, because their icon is generic.
         Without tabs, all chips show their text.
         """
-        if not self._tabs and self._title_widget is not None:
+        chips = [chip for chip in self._other_widgets() if isinstance(chip, Chip) and chip.status != "off"]
+        if not self._tabs:
+            for chip in chips:
+                chip.set_icon_only(False)
             return
-        others = self._other_widgets()
-        chips = [each for each in others if isinstance(each, Chip) and each.status != "off"]
-        full_width, front_width, min_width = self._tab_widths()
-        room = self._room_for_tabs(others)
+        room = self._room_for_tabs()
         chip_texts_width = sum(chip.full_width() - chip.icon_only_width() for chip in chips)
-        shrinks_chips = bool(self._tabs) and (
-            room < full_width <= room + chip_texts_width or front_width > room
-        )
-        for chip in chips:
-            chip.set_icon_only(shrinks_chips)
+        full_width = sum(tab.full_width() for tab in self._tabs)
+        background_width = sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
+        front_width = background_width + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
+        shrinks_chips = full_width > room and (full_width <= room + chip_texts_width or front_width > room)
         room += chip_texts_width if shrinks_chips else 0
         is_icon_only = full_width > room
-        room, collapsed = self._make_room(room, others, front_width, min_width)
-        self._resize_tabs(room, is_icon_only=is_icon_only)
-        subtitle_room = room - (front_width if is_icon_only else full_width)
-        if self._subtitle in others and subtitle_room < self._min_subtitle_width():
-            collapsed.add(self._subtitle)
-        self._collapse(collapsed)
-
-    def _tab_widths(self) -> tuple[int, int, int]:
-        # Widths in px with all titles, with the title of the front panel only, and with icons only.
-        if not self._tabs:
-            name = self.name
-            return name.sizeHint().width(), name.sizeHint().width(), name.minimumSizeHint().width()
-        min_width = sum(tab.icon_only_width() for tab in self._tabs)
-        front_title = sum(tab.full_width() - tab.icon_only_width() for tab in self._tabs if tab.isChecked())
-        return sum(tab.full_width() for tab in self._tabs), min_width + front_title, min_width
-
-    def _make_room(
-        self, room: int, others: Sequence[QWidget], front_width: int, min_width: int
-    ) -> tuple[int, set[QWidget]]:
-        # Return the width in px for the tabs, and the labels and chips to hide.
-        collapsed: set[QWidget] = set()
-        spacing = self._tab_row.spacing()
-        filters = [each for each in others if isinstance(each, FilterField)]
-        labels = [each for each in others if isinstance(each, QLabel) and each is not self._subtitle]
-        if front_width > room:
-            room += sum(each.sizeHint().width() - each.minimumSizeHint().width() for each in filters)
-        if front_width > room and self._subtitle in others:
-            collapsed.add(self._subtitle)
-            room += spacing
-        for label in reversed(labels):
-            if front_width > room:
-                collapsed.add(label)
-                room += label.sizeHint().width() + spacing
-        if min_width > room:
-            room += sum(each.minimumSizeHint().width() - each.icon_only_width() for each in filters)
-        for chip in reversed([each for each in others if isinstance(each, Chip)]):
-            if min_width > room:
-                collapsed.add(chip)
-                room += chip.sizeHint().width() + spacing
-        return room, collapsed
-
-    def _resize_tabs(self, room: int, *, is_icon_only: bool) -> None:
-        _full_width, front_width, min_width = self._tab_widths()
-        front_room = room - sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
-        is_narrow = front_width > room and front_room < self._theme.scaled(MIN_NAME_WIDTH)
+        is_narrow = room - background_width < self._theme.scaled(MIN_NAME_WIDTH)
+        for chip in chips:
+            chip.set_icon_only(shrinks_chips)
         for tab in self._tabs:
             tab.set_icon_only(is_icon_only and (not tab.isChecked() or is_narrow))
-            # without a minimum, the layout would elide the title together with the subtitle and the filter
-            title_width = min(tab.sizeHint().width(), front_room) if tab.isChecked() and not is_narrow else 0
-            tab.setMinimumWidth(tab.sizeHint().width() if front_width <= room else max(0, title_width))
-            tab.setMaximumWidth(MAX_WIDTH if min_width <= room else max(1, room // len(self._tabs)))
-
-    def _min_subtitle_width(self) -> float:
-        shortest = paint.width_of(self._theme.font("code"), "0" * MIN_SUBTITLE_CHARS)
-        return min(shortest, self._subtitle.sizeHint().width())
-
-    def _collapse(self, widgets: set[QWidget]) -> None:
-        # Hide these labels and chips, and show all others that were hidden.
-        self._expanding = self._collapsed - widgets
-        self._collapsed |= widgets
-        for widget in widgets:
-            widget.hide()
-        if self._expanding:
-            self._expand_timer.start()
-
-    def _expand(self) -> None:
-        expanding, self._expanding = self._expanding, set()
-        self._collapsed -= expanding
-        for widget in expanding:
-            paint.show_when(widget, self._is_wanted(widget))
 
     def _other_widgets(self) -> list[QWidget]:
-        # Includes collapsed widgets.
         row = self._tab_row
         items = (row.itemAt(index) for index in range(row.count()))
         widgets = (item.widget() for item in items if item is not None)
-        return [
-            each
-            for each in widgets
-            if each
-            and each is not self.name
-            and each not in self._tabs
-            and (not each.isHidden() or (each in self._collapsed and self._is_wanted(each)))
-        ]
+        return [each for each in widgets if each and not each.isHidden() and each not in self._tabs]
 
-    def _is_wanted(self, widget: QWidget) -> bool:
-        # Chips and the subtitle are hidden while their text is empty.
-        if isinstance(widget, Chip):
-            return bool(widget.text)
-        return widget is not self._subtitle or bool(self._subtitle.text())
-
-    def _room_for_tabs(self, others: Sequence[QWidget]) -> int:
-        # Width in px for the tabs, or for the name, with the full text of all chips and labels.
-        row = self._tab_row
+    def _room_for_tabs(self) -> int:
+        # Width in px with the full text of all chips.
+        row, others = self._tab_row, self._other_widgets()
         margins, used_width = row.contentsMargins(), 0
         for widget in others:
             if isinstance(widget, Chip):
                 used_width += widget.full_width()
-            elif widget is not self._subtitle:
-                used_width += widget.sizeHint().width()
-        gaps = row.spacing() * (len(others) + max(1, len(self._tabs)) - 1)
+            else:
+                hint = widget.minimumSizeHint() if widget is self._subtitle else widget.sizeHint()
+                used_width += hint.width()
+        gaps = row.spacing() * (len(others) + len(self._tabs) - 1)
         return self.width() - margins.left() - margins.right() - used_width - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:

@@ -7,7 +7,6 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QResize
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy, QWidget
 
 from app.robots.description.typed_number import parse_number
-from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -18,7 +17,6 @@ from nep.i18n import number as number_text
 
 MAX_LINES = 5
 MIN_HEIGHT = 34
-MIN_FILTER_WIDTH, ICON_FIELD_WIDTH = 80, 40  # px
 STYLE_SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for rounding
 
 
@@ -39,13 +37,6 @@ class SearchField(QLineEdit):
         self._arrange()
         theme.changed.connect(self._arrange)
 
-    def set_key(self, key: str) -> None:
-        """Set the shortcut to show; "" for none."""
-        if key != self._key:
-            self._key = key
-            self._arrange()
-            self.update()
-
     def _arrange(self) -> None:
         right = round(paint.key_width(self._theme, self._key)) + 2 if self._key else 0
         self.setTextMargins(20, 0, right, 0)
@@ -61,7 +52,7 @@ class SearchField(QLineEdit):
 
 
 class FilterField(SearchField):
-    """Field to filter a list. Esc clears the field. In a narrow title bar only the icon is shown.
+    """Field to filter a list. Esc clears the field.
 
     `exited` is emitted on Down and Enter, which move the focus to the list.
     """
@@ -73,21 +64,7 @@ class FilterField(SearchField):
         super().__init__(theme, _("Filter"), "/")
         self.setAccessibleName(name)
         self.setMaximumWidth(190)
-
-    def minimumSizeHint(self) -> QSize:
-        # not a minimum width, because a crowded layout would place other widgets over the field
-        return QSize(MIN_FILTER_WIDTH, super().minimumSizeHint().height())
-
-    def icon_only_width(self) -> int:
-        """Return the width in px that the icon needs."""
-        return ICON_FIELD_WIDTH
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        is_narrow = self.width() < MIN_FILTER_WIDTH
-        self.set_key("" if is_narrow else "/")
-        self.setPlaceholderText("" if is_narrow else _("Filter"))
-        self.setToolTip(plain.tip(self.accessibleName()) if is_narrow else "")
+        self.setMinimumWidth(90)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.text():
