@@ -34,14 +34,12 @@ class FieldSeries:
 
     Attributes:
         last: Newest value as received.
-        missing_count: Number of messages without the field.
     """
 
     def __init__(self, topic: str, path: FieldPath) -> None:
         self.topic, self.path = topic, path
         self.numbers, self.states = Samples(), States()
         self.last: object = MISSING
-        self.missing_count = 0
 
     @property
     def is_state(self) -> bool:
@@ -79,7 +77,6 @@ class FieldSeries:
                 self.states.add(time_s, str(state), gap=has_state_gap)
                 has_number_gap, has_state_gap, has_states = True, False, True
             else:
-                self.missing_count += 1
                 if has_states:
                     self.states.add(time_s, None)
                 has_number_gap = True
@@ -95,7 +92,6 @@ class FieldSeries:
         self.numbers.clear()
         self.states.clear()
         self.last = MISSING
-        self.missing_count = 0
 
 
 def to_float(value: object) -> float:
