@@ -166,20 +166,31 @@ def test_graph_shows_nodes_edges_and_rates(panel: GraphPanel) -> None:
     assert all(item.label is not None for item in scene.lines if item.line.kind == "topic")
 
 
-def test_edge_labels_are_within_the_bounds_and_do_not_overlap_nodes(qtbot, qapp, panel: GraphPanel) -> None:
-    # A vertical edge at the left border, with a label that is wider than the margin of the group.
-    line = GraphLine("topic", ("a",), ("b",), ("/Pepper/battery_of_the_robot",))
-    nodes = tuple(DrawnNode(key, key, "", "program") for key in ("a", "b"))
+def scene_with_edge_at_the_left(panel: GraphPanel, topic: str, **others: tuple[float, float]) -> GraphScene:
+    """Return a graph with an edge from a to b along its left border, and other nodes at these positions."""
+    line = GraphLine("topic", ("a",), ("b",), (topic,))
+    positions = {"a": (0.0, 0.0), "b": (250.0, 200.0), **others}
     layout = GraphLayout(
-        {"a": (0.0, 0.0), "b": (250.0, 200.0)},
-        routes={(line.key, "a", "b"): ((-70.0, 24.0), (-70.0, 200.0), (174.0, 200.0))},
+        positions, routes={(line.key, "a", "b"): ((-100.0, 24.0), (-100.0, 200.0), (174.0, 200.0))}
     )
-    scene = GraphScene(panel.theme, NodeGraph(nodes, (line,)), layout, LayoutSizes(), HERE)
+    graph = NodeGraph(tuple(DrawnNode(key, key, "", "program") for key in positions), (line,))
+    scene = GraphScene(panel.theme, graph, layout, LayoutSizes(), HERE)
     scene.complete(panel._stats_of)
+    return scene
+
+
+def test_edge_labels_are_within_the_bounds_and_do_not_overlap_nodes(panel: GraphPanel) -> None:
+    scene = scene_with_edge_at_the_left(panel, "/Pepper/battery_of_the_robot")
     label = scene.lines[0].label
     assert label is not None
     assert scene.bounds.contains(label)
     assert not any(item.rect.intersects(label) for item in scene.nodes.values())
+
+
+def test_edge_label_without_room_within_the_bounds_is_not_drawn(panel: GraphPanel) -> None:
+    topic = "/Pepper/battery_of_the_robot_and_its_charging_station"  # longer than the horizontal segment
+    scene = scene_with_edge_at_the_left(panel, topic, c=(0.0, 60.0), d=(0.0, 120.0), e=(0.0, 180.0))
+    assert scene.lines[0].label is None
 
 
 def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtbot) -> None:
