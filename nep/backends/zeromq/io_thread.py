@@ -25,9 +25,9 @@ import selectors
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import NamedTuple, Protocol, TypeVar
 
 import zmq
 from zmq.utils import garbage
@@ -47,6 +47,7 @@ from nep.system.forks import notify_after_fork
 from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep.io")
+T = TypeVar("T")
 _RETRY_S = 1.0
 
 _MAX_SOCKETS = 65_535
@@ -392,6 +393,30 @@ class SharedContext:
                 self._idle_wakers.append(waker)
                 return
         waker.close()
+
+    @contextmanager
+    def removed(self, lock: threading.Lock, owners: set[T], owner: T) -> Iterator[bool]:
+        """Remove an owner of sockets from the open ones of its node, to close its sockets in the context.
+
+        Yields False if it was removed already, so that only one thread closes the sockets. Until they are
+        closed, the context isn't terminated: their use would raise an error, and a socket left open would
+        block the termination forever.
+
+        Args:
+            lock: Lock that guards `owners`.
+            owners: Open owners of a node.
+            owner: Owner to remove.
+        """
+        with lock:
+            is_removed = owner in owners
+            if is_removed:
+                owners.remove(owner)
+                self.acquire()
+        try:
+            yield is_removed
+        finally:
+            if is_removed:
+                self.release()
 
     def acquire(self) -> None:
         """Add a user, so that the context isn't terminated before the matching `release`."""

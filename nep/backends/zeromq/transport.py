@@ -126,7 +126,7 @@ class ZeromqTransport:
         self._sink_io: IoThread | None = None
         self._lock = threading.Lock()
         self._sessions: dict[str, MasterSession] = {}
-        self._publishers: dict[int, OwnedPublisher] = {}
+        self._publishers: set[OwnedPublisher] = set()
         self._subscribers: dict[int, _Subscriber] = {}
         self._busy_wakers: list[Waker] = []
         self._threads = threading.local()
@@ -211,21 +211,26 @@ class ZeromqTransport:
     def _add_publisher(self, publisher: OwnedPublisher) -> None:
         with self._lock:
             self._check_open_locked()
-            self._publishers[publisher.spec.id] = publisher
+            self._publishers.add(publisher)
             self._io.add(publisher)  # before `close` can remove the publisher, which acquires this lock first
 
     def _publisher_closer(self, unregister: Callable[[], None]) -> Callable[[OwnedPublisher, float], None]:
         def close(publisher: OwnedPublisher, timeout_s: float) -> None:
-            with self._lock:
-                self._publishers.pop(publisher.spec.id, None)
-                self._direct_endpoints.pop(publisher.spec.id, None)
-            unregister()
-            publisher.send_bye()
-            publisher.finish(time.monotonic() + timeout_s)
-            self._io.remove(publisher)
-            publisher.release()
+            deadline = time.monotonic() + timeout_s
+            with self._shared.removed(self._lock, self._publishers, publisher) as is_removed:
+                if is_removed:
+                    unregister()
+                    publisher.send_bye()
+                    self._release_publisher(publisher, deadline)
 
         return close
+
+    def _release_publisher(self, publisher: OwnedPublisher, deadline: float) -> None:
+        publisher.finish(deadline)
+        self._io.remove(publisher)
+        publisher.release()
+        with self._lock:
+            self._direct_endpoints.pop(publisher.spec.id, None)
 
     # ---- subscribers
 
@@ -459,7 +464,7 @@ class ZeromqTransport:
                 return
             self._is_closed = True
             sessions = list(self._sessions.values())
-            publishers = list(self._publishers.values())
+            publishers = list(self._publishers)
         for session in sessions:
             session.start_leave()
         self._services.begin_close()
@@ -476,7 +481,7 @@ class ZeromqTransport:
             self._is_terminated = True
             self._wake_waits_locked()
             sessions = list(self._sessions.values())
-            publishers = list(self._publishers.values())
+            publishers = list(self._publishers)
             subscribers = list(self._subscribers.values())
             sink_io = self._sink_io
         for publisher in publishers:
@@ -490,9 +495,9 @@ class ZeromqTransport:
             subscriber.close()
         self._services.close(max(0.0, deadline - time.monotonic()))
         for publisher in publishers:
-            publisher.finish(deadline)
-            self._io.remove(publisher)
-            publisher.release()
+            with self._shared.removed(self._lock, self._publishers, publisher) as is_removed:
+                if is_removed:
+                    self._release_publisher(publisher, deadline)
         for session in sessions:
             session.close()
         if sink_io is not None:
@@ -515,7 +520,7 @@ class ZeromqTransport:
         self._services.forked()
         for session in self._sessions.values():
             close_in_child(session.endpoint)
-        for endpoint_owner in (*self._publishers.values(), *self._subscribers.values()):
+        for endpoint_owner in (*self._publishers, *self._subscribers.values()):
             if isinstance(endpoint_owner, NativePublisher | NativeSubscriber | PatternSubscriber):
                 close_in_child(*endpoint_owner.endpoints)
 

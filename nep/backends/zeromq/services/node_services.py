@@ -88,11 +88,11 @@ class ZeromqServices:
 
     def _create_tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
         def close(server: TcpServer, timeout_s: float) -> None:
-            with self._lock:
-                self._servers.discard(server)
             deadline = time.monotonic() + timeout_s
-            server.begin_close()
-            server.release(deadline)
+            with self._shared.removed(self._lock, self._servers, server) as is_removed:
+                if is_removed:
+                    server.begin_close()
+                    server.release(deadline)
 
         server = TcpServer(self._shared.io, spec, f"{direct.ip}:{direct.port}", close)
         with _release_on_error(server):
@@ -101,14 +101,14 @@ class ZeromqServices:
 
     def _new_server(self, spec: ServerSpec, framing: Framing, unregister: Callable[[], None]) -> RouterServer:
         def close(server: RouterServer, timeout_s: float) -> None:
-            with self._lock:
-                self._servers.discard(server)
             deadline = time.monotonic() + timeout_s
-            server.begin_close()
-            self._shared.io.remove(server)
-            while server.serve(now := time.monotonic()).due is not None and now < deadline:
-                pass  # calls received in the meantime are rejected, too
-            server.release(deadline)
+            with self._shared.removed(self._lock, self._servers, server) as is_removed:
+                if is_removed:
+                    server.begin_close()
+                    self._shared.io.remove(server)
+                    while server.serve(now := time.monotonic()).due is not None and now < deadline:
+                        pass  # calls received in the meantime are rejected, too
+                    server.release(deadline)
 
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
         return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
@@ -156,10 +156,10 @@ class ZeromqServices:
         session.wait_for_address(spec.wait_s)
 
         def close(surveyor: SurveyClient) -> None:
-            with self._lock:
-                self._surveyors.discard(surveyor)
-            session.remove_subscriber(spec.id)
-            surveyor.release()
+            with self._shared.removed(self._lock, self._surveyors, surveyor) as is_removed:
+                if is_removed:
+                    session.remove_subscriber(spec.id)
+                    surveyor.release()
 
         def new_client(endpoint: str) -> SocketClient:
             return self._new_client(spec, NATIVE, lambda: None, None, endpoint)
@@ -198,11 +198,11 @@ class ZeromqServices:
         is_tcp: bool = False,
     ) -> SocketClient:
         def close(client: SocketClient) -> None:
-            with self._lock:
-                self._clients.discard(client)
-            unregister()
-            self._shared.io.remove(client)
-            client.release()
+            with self._shared.removed(self._lock, self._clients, client) as is_removed:
+                if is_removed:
+                    unregister()
+                    self._shared.io.remove(client)
+                    client.release()
 
         def connect_to(endpoint: str, serve: Callable[[float], PollState]) -> Connection:
             if is_tcp:
