@@ -180,8 +180,8 @@ class SocketSubscriber(Generic[R]):
         """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
         self._read_ahead = ReadAhead(spec.max_messages)
-        self._may_exceed_bound = spec.max_messages >= 10 * MAX_READ_AHEAD
-        """True if the queue is long enough to exceed its limit by a few messages."""
+        self._may_exceed_bound = self._is_keeping_all and spec.max_messages >= 10 * MAX_READ_AHEAD
+        """True if the queue may exceed its limit by a few messages, because the limit is high."""
         self._last_read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0

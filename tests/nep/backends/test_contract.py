@@ -282,6 +282,20 @@ def test_keep_latest_delivers_only_the_newest_message(make: Make) -> None:
     assert sub.lost == 0
 
 
+def test_keep_latest_delivers_only_the_newest_message_of_a_batch(make: Make) -> None:
+    sub, pub = make("b").new_sub("topic", keep="latest"), make("a").new_pub("topic")
+    for n in range(5):
+        sub.listen()  # from now on, the reading thread reads the socket for a while
+        for each in range(100):
+            pub.publish([n, each])
+        last: object = None
+        while last != [n, 99]:
+            last = sub.listen(timeout_s=30.0)[1]
+        assert sub.listen() == (False, {})
+    assert sub.received == 500
+    assert sub.lost == 0
+
+
 def test_full_inbox_drops_the_oldest_and_counts(make: Make) -> None:
     sub = make("b").new_sub("topic", max_messages=10)
     pub = make("a").new_pub("topic")
