@@ -9,6 +9,7 @@ const hints = new WeakMap<Blockly.Workspace, Hint>();
 export class Hint {
   private readonly box = document.createElement('div');
   private timer = 0;
+  private view = '';
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
     hints.set(workspace, this);
@@ -16,7 +17,8 @@ export class Hint {
     this.box.setAttribute('role', 'status');
     workspace.getInjectionDiv().append(this.box);
     workspace.addChangeListener((event) => {
-      if (event.type === Blockly.Events.VIEWPORT_CHANGE) this.hide();
+      // the event of an earlier change, such as the closing flyout, may arrive late
+      if (event.type === Blockly.Events.VIEWPORT_CHANGE && this.view !== this.currentView()) this.hide();
     });
     workspace.getInjectionDiv().addEventListener('pointerdown', () => this.hide(), true);
   }
@@ -33,6 +35,7 @@ export class Hint {
   /** Shows the text below this position on the page, or above it if there is no space. */
   show(text: string, position: Blockly.utils.Coordinate): void {
     window.clearTimeout(this.timer);
+    this.view = this.currentView();
     this.box.textContent = text;
     const frame = this.workspace.getInjectionDiv().getBoundingClientRect();
     const {offsetWidth, offsetHeight} = this.box;
@@ -42,6 +45,11 @@ export class Hint {
     this.box.style.left = `${left}px`;
     this.box.style.top = `${Math.max(MARGIN, top)}px`;
     this.timer = window.setTimeout(() => this.hide(), DISPLAY_MS);
+  }
+
+  private currentView(): string {
+    const {scrollX, scrollY, scale} = this.workspace;
+    return [scrollX, scrollY, scale].join();
   }
 
   hide(): void {
