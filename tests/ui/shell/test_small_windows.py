@@ -24,7 +24,8 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
-from app.ui.widgets import Chip, StopButton
+from app.ui.widgets import Chip, IconButton, StopButton
+from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.menus import geometry_beside_stop
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
@@ -315,6 +316,61 @@ def test_status_chip_in_a_narrow_title_loses_its_text_before_the_tabs_do(
     assert front.width() >= front.full_width()
     title.resize(500, 40)
     qtbot.waitUntil(lambda: chip.width() == chip.full_width())
+
+
+def dock_title(qtbot, window: MainWindow, widgets: list[QWidget], names: tuple[str, ...]) -> DockTitle:
+    """Return the title bar of a panel with these header widgets; the last name is that of the front tab."""
+
+    class WithHeader(PanelWidget):
+        def header_widgets(self) -> list[QWidget]:
+            return widgets
+
+    panel = WithHeader(window.show_layout("behaviour").docks["robot"].panel.context, "Camera")
+    title = DockTitle(window.theme, panel, "compact")
+    qtbot.addWidget(panel)
+    qtbot.addWidget(title)
+    title.set_tabs([(name, "bot", name == names[-1], lambda: None) for name in names])
+    title.resize(800, 32)
+    title.show()
+    return title
+
+
+def test_off_chip_is_reduced_to_its_icon_if_the_tabs_need_its_room(qtbot, window: MainWindow) -> None:
+    chip = Chip(window.theme, "No program yet", "off")
+    title = dock_title(qtbot, window, [chip], tuple("ABCDEF"))
+    qtbot.waitUntil(lambda: chip.width() == chip.full_width())
+    title.resize(285, 32)
+    qtbot.waitUntil(lambda: chip.width() == chip.icon_only_width())
+    assert chip.toolTip() == "No program yet"
+    qtbot.waitUntil(lambda: not list(overlaps_in(title)))
+    title.resize(800, 32)
+    qtbot.waitUntil(lambda: chip.width() == chip.full_width())
+
+
+def test_filter_in_a_narrow_title_shows_only_its_icon_and_no_button_lies_on_it(
+    qtbot, window: MainWindow
+) -> None:
+    field, repeat = FilterField(window.theme, "Filter sent messages"), IconButton(window.theme, "repeat", "R")
+    title = dock_title(qtbot, window, [field, repeat], ("Console", "Alarms", "Nodes", "Sent"))
+    for width in (285, 500, 250):
+        title.resize(width, 32)
+        qtbot.waitUntil(lambda: not list(overlaps_in(title)))
+        assert field.isVisible()
+    assert field.toolTip() == "Filter sent messages"
+    assert field.placeholderText() == ""
+    title.resize(800, 32)
+    qtbot.waitUntil(lambda: field.placeholderText() == "Filter")
+    assert field.toolTip() == ""
+
+
+def overlaps_in(title: DockTitle) -> Iterator[str]:
+    """Return overlapping or cut widgets in the row of a title bar."""
+    row = title.more.parentWidget()
+    children = [child for child in row.children() if isinstance(child, QWidget) and child.isVisible()]
+    yield from _pairs(children)
+    for child in children:
+        if not row.rect().contains(child.geometry()):
+            yield f"{type(child).__name__} at {child.geometry()} is cut"
 
 
 SCREEN = QRect(0, 0, 1024, 600)

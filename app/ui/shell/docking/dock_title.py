@@ -228,12 +228,14 @@ class DockTitle(QWidget):
 
         Chips are reduced to icons if this makes room for all full titles. Otherwise the tabs of hidden
         panels are reduced, and the chips only if that isn't enough; the tab of the front panel is
-        reduced last. Chips with the status "off" keep their text, because their icon is generic.
+        reduced after that. Chips with the status "off" are reduced last, because their icon is generic.
         Without tabs, all chips show their text.
         """
-        chips = [chip for chip in self._other_widgets() if isinstance(chip, Chip) and chip.status != "off"]
+        all_chips = [each for each in self._other_widgets() if isinstance(each, Chip)]
+        chips = [chip for chip in all_chips if chip.status != "off"]
+        off_chips = [chip for chip in all_chips if chip.status == "off"]
         if not self._tabs:
-            for chip in chips:
+            for chip in all_chips:
                 chip.set_icon_only(False)
             return
         room = self._room_for_tabs()
@@ -244,9 +246,13 @@ class DockTitle(QWidget):
         shrinks_chips = full_width > room and (full_width <= room + chip_texts_width or front_width > room)
         room += chip_texts_width if shrinks_chips else 0
         is_icon_only = full_width > room
-        is_narrow = room - background_width < self._theme.scaled(MIN_NAME_WIDTH)
         for chip in chips:
             chip.set_icon_only(shrinks_chips)
+        shrinks_off_chips = sum(tab.icon_only_width() for tab in self._tabs) > room
+        for chip in off_chips:
+            chip.set_icon_only(shrinks_off_chips)
+            room += chip.full_width() - chip.icon_only_width() if shrinks_off_chips else 0
+        is_narrow = room - background_width < self._theme.scaled(MIN_NAME_WIDTH)
         for tab in self._tabs:
             tab.set_icon_only(is_icon_only and (not tab.isChecked() or is_narrow))
 

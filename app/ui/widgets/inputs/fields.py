@@ -7,6 +7,7 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QResize
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy, QWidget
 
 from app.robots.description.typed_number import parse_number
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -17,6 +18,7 @@ from nep.i18n import number as number_text
 
 MAX_LINES = 5
 MIN_HEIGHT = 34
+MIN_FILTER_WIDTH, MIN_FILTER_TEXT_WIDTH = 40, 80  # px
 STYLE_SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for rounding
 
 
@@ -37,6 +39,13 @@ class SearchField(QLineEdit):
         self._arrange()
         theme.changed.connect(self._arrange)
 
+    def set_key(self, key: str) -> None:
+        """Set the shortcut to show; "" for none."""
+        if key != self._key:
+            self._key = key
+            self._arrange()
+            self.update()
+
     def _arrange(self) -> None:
         right = round(paint.key_width(self._theme, self._key)) + 2 if self._key else 0
         self.setTextMargins(20, 0, right, 0)
@@ -52,7 +61,7 @@ class SearchField(QLineEdit):
 
 
 class FilterField(SearchField):
-    """Field to filter a list. Esc clears the field.
+    """Field to filter a list. Esc clears the field. In a narrow title bar only the icon is shown.
 
     `exited` is emitted on Down and Enter, which move the focus to the list.
     """
@@ -64,7 +73,17 @@ class FilterField(SearchField):
         super().__init__(theme, _("Filter"), "/")
         self.setAccessibleName(name)
         self.setMaximumWidth(190)
-        self.setMinimumWidth(90)
+
+    def minimumSizeHint(self) -> QSize:
+        # not a minimum width, because a crowded layout would place other widgets over the field
+        return QSize(MIN_FILTER_WIDTH, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_icon_only = self.width() < MIN_FILTER_TEXT_WIDTH
+        self.set_key("" if is_icon_only else "/")
+        self.setPlaceholderText("" if is_icon_only else _("Filter"))
+        self.setToolTip(plain.tip(self.accessibleName()) if is_icon_only else "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.text():
