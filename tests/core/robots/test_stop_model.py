@@ -2,7 +2,7 @@
 
 Studio's session, its stopper and the robots' driver kit are the real code; time, network, bodies and
 people are simulated (`tests.core.robots.stop_model`). ``NEP_STOP_HISTORIES=100000`` searches that many
-random histories instead of the fixed ones.
+random histories instead of the fixed ones, of which ``--long`` runs more.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tests.core.robots.stop_model.robots import SimulatedRobot
 from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedBridge
 
 HISTORIES = int(os.environ.get("NEP_STOP_HISTORIES", "0"))
-FIXED_HISTORIES = 2000
+FIXED_HISTORIES, LONG_FIXED_HISTORIES = 300, 2000
 STEPS = 10
 NAMES = ("Arm", "Base")
 REACT_S = 0.5
@@ -367,8 +367,9 @@ def test_regression_histories_keep_confirmed_stops_correct(history: list[Step]) 
 
 
 @pytest.mark.timeout(600 + HISTORIES)
-def test_confirmed_stop_is_correct_in_random_histories() -> None:
-    count = HISTORIES or FIXED_HISTORIES
+def test_confirmed_stop_is_correct_in_random_histories(pytestconfig: pytest.Config) -> None:
+    is_long = pytestconfig.getoption("--long")
+    count = HISTORIES or (LONG_FIXED_HISTORIES if is_long else FIXED_HISTORIES)
     run_state_machine_as_test(
         StopModel,
         settings=settings(
