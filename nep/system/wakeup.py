@@ -23,10 +23,11 @@ class Waker:
     can only poll sockets. The constructor raises `TooManyFilesError`.
     """
 
+    _event = -1
+    _sockets: tuple[socket.socket, ...] = ()
+
     def __init__(self) -> None:
         self._lock = threading.RLock()  # the number of a closed descriptor may already belong to another file
-        self._event = -1
-        self._sockets: tuple[socket.socket, ...] = ()
         try:
             if _HAS_EVENTFD:
                 self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)

@@ -144,6 +144,10 @@ def test_single_file_is_discovered_as_a_plug_in(package: Path) -> None:
         discover("plugs_for_test", "BACKEND", Backend)
 
 
+def test_waker_whose_constructor_was_interrupted_is_finalized_without_an_error() -> None:
+    Waker.__new__(Waker).__del__()
+
+
 def test_waker_makes_its_descriptor_readable_until_cleared() -> None:
     waker = Waker()
     assert select.select([waker.fd], [], [], 0)[0] == []
