@@ -182,7 +182,9 @@ def test_coroutine_that_ignores_cancellation_is_reported_until_finished(drone):
     ears.command(id="s", op="stop")
     eventually(lambda: "told" in body.events and "stopped" in body.events)
     clock.advance(STOP_REPLY_TIMEOUT_S + 0.01)
-    assert ears.final("s", "stop")["error"] == "Drone may still move: stubborn is still running"
+    error = str(ears.final("s", "stop")["error"])  # the stop function itself may just be ending
+    assert error.startswith("Drone may still move: stubborn")
+    assert error.endswith("still running")
     body.let_go.set()
     eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
 
