@@ -24,7 +24,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.masters.graph import Graph
 from nep.protocol import requests, wire
-from nep.protocol.encoding import ReplyEncoder, encode_request, to_plain
+from nep.protocol.encoding import encode_reply, encode_request
 
 FOLDER = Path(__file__).resolve().parents[1] / "tests" / "data" / "wire"
 MALFORMED_COUNT = 1000
@@ -272,7 +272,6 @@ PUSHED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
 class _Master:
     def __init__(self) -> None:
         self._graph = Graph(EPOCH, 0.0, learn_s=0.0)
-        self._encoder = ReplyEncoder()
         self._calls = {"talker": 0, "listener": 0}
 
     def ask(self, asked: Asked) -> tuple[bytes, bytes, list[bytes]]:
@@ -280,8 +279,8 @@ class _Master:
         self._calls[sender] += 1
         call = self._calls[sender]
         outgoing = self._graph.apply(request, call, 0.0, sender, is_foreign=True)
-        reply = next(self._encoder.encode(each.body, call) for each in outgoing if each.call is not None)
-        pushes = [self._encoder.encode(each.body) for each in outgoing if each.call is None]
+        reply = next(encode_reply(each.body, call) for each in outgoing if each.call is not None)
+        pushes = [encode_reply(each.body) for each in outgoing if each.call is None]
         return encode_request(request, call), reply, pushes
 
 
@@ -320,7 +319,7 @@ def master() -> dict[str, Any]:
             }
         )
     ping = encode_request(requests.Ping(), 1)
-    done_reply = msgpack.packb({"is": "done", "re": 1, "what": to_plain(requests.DoneReply(1, 0))})
+    done_reply = encode_reply(requests.DoneReply(1, 0), 1)
     return {
         "epoch": str(EPOCH),
         "asked": request_cases,

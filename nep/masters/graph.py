@@ -13,13 +13,14 @@ monotonic time in seconds.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from nep.errors import WireError
 from nep.i18n import _
 from nep.masters.clocks import Clocks
-from nep.masters.leases import LEASE_DURATION_S, Leases, RawRenewal
+from nep.masters.leases import LEASE_DURATION_S, Leases
 from nep.masters.pattern_index import MAX_PATTERNS, MAX_PATTERNS_PER_NODE
 from nep.masters.registry import (
     GUARANTEED_RECORDS,
@@ -227,25 +228,6 @@ class Graph:
     def view(self) -> GraphView:
         """Return a snapshot of the graph."""
         return self._snapshot_builder.view(self.epoch)
-
-    def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
-        """Handle a renewal of the usual form; return the newest sequence numbers by publisher id.
-
-        Returns None if the renewal must be passed to `apply`; some of its statistics may already have been
-        stored.
-
-        Args:
-            renewal: Parsed renewal.
-            now: Current time.
-            sender: Connection of the request.
-        """
-        if renewal.revision < self._registry.publishers_revision:
-            return None
-        member = self._renew_member(renewal, now, sender)
-        if member is None:
-            return None
-        self._leases.renew(member, now)
-        return self._registry.last_seqs(member)
 
     def node_at(self, route: str) -> RegisteredNode | None:
         """Return the node that registered over the connection `route`, or None."""
@@ -459,14 +441,12 @@ class Graph:
         remotes = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return FoundReply(self.epoch, self.revision, tuple(remotes))
 
-    def _renew_member(self, renewal: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
+    def _renew_member(self, request: Renew, now: float, sender: str) -> RegisteredNode | None:
         # None: the node must join again.
-        member = self._member_at(renewal.node_id, sender)
-        if member is None or renewal.epoch != self.epoch:
+        member = self._member_at(request.node_id, sender)
+        if member is None or request.epoch != self.epoch or not self._registry.renew(member, request, now):
             return None
-        if not self._registry.renew(member, renewal.publishers, renewal.subscribers, now, renewal.cpu_ratio):
-            return None
-        self.clocks.store(member, renewal.clock, now)
+        self.clocks.store(member, request.clock, now)
         return member
 
     def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:
@@ -475,17 +455,7 @@ class Graph:
         return member if member is not None and member.route == sender else None
 
     def _renew(self, request: Renew, now: float, sender: str) -> Reply:
-        renewal = RawRenewal(
-            0,
-            request.node_id,
-            request.epoch,
-            request.revision,
-            tuple(map(vars, request.publishers)),
-            tuple(map(vars, request.subscribers)),
-            request.cpu_ratio,
-            request.clock,
-        )
-        member = self._renew_member(renewal, now, sender)
+        member = self._renew_member(request, now, sender)
         if member is None:
             rejoining_member = self._member_at(request.node_id, sender)
             if rejoining_member is not None:

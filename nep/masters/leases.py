@@ -1,16 +1,8 @@
-"""Leases: renewal schedule, and nodes whose renewal is late or whose lease has expired.
-
-Renewals of the usual form, which every node sends every second, are parsed and answered without
-creating request objects (`RawRenewal`). All others take the general path, which reports errors.
-"""
+"""Leases: renewal schedule, and nodes whose renewal is late or whose lease has expired."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
-
-from nep.masters.registry import Counts, RegisteredNode, Registry
-from nep.messages.packing import pack_saturated, unpack, unpack_bounded
+from nep.masters.registry import RegisteredNode, Registry
 from nep.protocol.requests import RENEW_INTERVAL_S
 
 LEASE_DURATION_S = 3.0
@@ -27,10 +19,6 @@ _SLOT_WIDTH_S = 0.1
 In large graphs, renewals are scheduled in slots, because waking up the master costs more than a
 renewal.
 """
-
-_RENEWAL_PREFIX = b"\x83\xa2do\xa5renew"
-"""First bytes of renewals sent by nep. Other implementations may order the fields differently."""
-_SMALL_BODY_BYTES, _MAX_LISTS = 4096, 20_000
 
 
 class Leases:
@@ -103,100 +91,3 @@ class Leases:
             for node_id, member in self._registry.members.items()
             if member.renewed_at + member.renew_interval_s <= latest and not member.is_managed
         ]
-
-
-class RawRenewal(NamedTuple):
-    """Parsed renewal of the usual form.
-
-    `publishers` and `subscribers` are lists, but their items are not validated.
-    """
-
-    call: int
-    node_id: str
-    epoch: int
-    revision: int
-    publishers: Counts
-    subscribers: Counts
-    cpu_ratio: float | None
-    clock: tuple[int, ...] | None = None
-
-
-def is_renewal(body: bytes) -> bool:
-    """Return True if a body begins like a renewal of nep, so that `parse_renewal` can probably parse it."""
-    return body.startswith(_RENEWAL_PREFIX)
-
-
-def parse_renewal(body: bytes) -> RawRenewal | None:
-    """Parse a renewal of the usual form; return None for any other body."""
-    if not body.startswith(_RENEWAL_PREFIX):
-        return None
-    try:
-        envelope: Any = (
-            unpack_bounded(body, _MAX_LISTS, _MAX_LISTS) if len(body) > _SMALL_BODY_BYTES else unpack(body)
-        )
-        payload = envelope["what"]
-        renewal = RawRenewal(
-            envelope["call"],
-            payload["node_id"],
-            payload["epoch"],
-            payload["revision"],
-            payload.get("publishers", ()),
-            payload.get("subscribers", ()),
-            payload.get("cpu_ratio"),
-            _parse_clock(payload.get("clock")),
-        )
-    except (ValueError, LookupError, TypeError, AttributeError):
-        return None
-    is_usual = type(renewal.call) is type(renewal.epoch) is type(renewal.revision) is int
-    is_usual = is_usual and renewal.call >= 0 and type(renewal.node_id) is str
-    is_usual = is_usual and type(renewal.cpu_ratio) in {float, type(None)}
-    is_usual = is_usual and {type(renewal.publishers), type(renewal.subscribers)} <= {list, tuple}
-    return renewal if is_usual else None
-
-
-def _parse_clock(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - untrusted input
-    # Raises `ValueError` for an unusual value.
-    if value is None:
-        return None
-    if value == []:
-        return ()
-    if type(value) not in {list, tuple} or not all(type(each) is int for each in value):
-        raise ValueError(value)
-    return tuple(value)
-
-
-def encode_renewed(
-    call: int,
-    epoch: int,
-    revision: int,
-    last_seqs: Mapping[int, int],
-    hosts: tuple[str, ...],
-    next_s: float = RENEW_INTERVAL_S,
-    *,
-    times: tuple[int, ...] = (),
-    clocks: Mapping[str, tuple[int, int]] | None = None,
-) -> bytes:
-    """Encode a `RenewedReply` reply without changed topics.
-
-    Args:
-        call: Id of the request.
-        epoch: Epoch of the master.
-        revision: Revision of the graph.
-        last_seqs: Newest sequence numbers by publisher id.
-        hosts: Addresses at which the master serves other computers.
-        next_s: Seconds until the next renewal.
-        times: Times of receipt and reply, as returned by `Clocks.renewal_timestamps`.
-        clocks: Clock differences, as returned by `Clocks.differences`.
-    """
-    payload: dict[str, object] = {"epoch": epoch, "revision": revision}
-    if last_seqs:
-        payload["last_seqs"] = last_seqs
-    if hosts:
-        payload["hosts"] = hosts
-    if next_s != RENEW_INTERVAL_S:
-        payload["next_s"] = next_s
-    if times:
-        payload["times"] = times
-    if clocks:
-        payload["clocks"] = clocks
-    return pack_saturated({"is": "renewed", "re": call, "what": payload})

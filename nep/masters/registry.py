@@ -6,9 +6,9 @@ Also validates registrations (`check_request`).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from nep.errors import NepError, WireError
 from nep.i18n import _
@@ -25,6 +25,7 @@ from nep.protocol.requests import (
     NodeRecord,
     PublisherRecord,
     RemotePublisher,
+    Renew,
     Request,
     SubscriberRecord,
     clamp_count,
@@ -53,8 +54,6 @@ _MAX_PROBLEM_LENGTH = 500
 """Maximum length in characters of a problem that a node reports."""
 RATE_DECAY_S = 12.0
 """Time in seconds after a publisher's last message during which its rate is still updated."""
-Counts = Sequence[Mapping[str, Any]]
-"""Received statistics, with the fields of `PublisherCount` or `SubscriberCount`."""
 
 
 @dataclass
@@ -379,55 +378,36 @@ class Registry:
         del self.members[node_id]
         self.revision += 1
 
-    def renew(
-        self,
-        member: RegisteredNode,
-        publisher_counts: Counts,
-        subscriber_counts: Counts,
-        now: float,
-        cpu_ratio: float | None = None,
-    ) -> bool:
+    def renew(self, member: RegisteredNode, renewal: Renew, now: float) -> bool:
         """Store a node's statistics and renew its lease. Numbers out of range are clamped.
 
         Args:
             member: The node.
-            publisher_counts: Received maps with the fields of `PublisherCount`; need not be valid.
-            subscriber_counts: Received maps with the fields of `SubscriberCount`; need not be valid.
+            renewal: Renewal of the node.
             now: Current time (s, monotonic).
-            cpu_ratio: CPU usage of the node's process (1.0 is one core), or None if unknown.
 
         Returns:
-            False if the maps are invalid or don't match the registrations; some may have been stored by
-                then.
+            False if the statistics don't match the registrations; some may have been stored by then.
         """
-        try:
-            publishers, subscribers = member.publishers, member.subscribers
-            if len(publisher_counts) != len(publishers) or len(subscriber_counts) != len(subscribers):
-                return False
-            for counts in publisher_counts:
-                publisher = publishers[counts["id"]]
-                count, size_bytes, last_seq = counts["count"], counts["bytes"], counts["last_seq"]
-                stamp_ns, problem = counts.get("last_stamp_ns"), counts.get("problem", "")
-                errors = counts.get("errors", 0)
-                if not type(count) is type(size_bytes) is type(last_seq) is type(errors) is int:
-                    return False
-                if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
-                    return False
-                self.update_counts(publisher, count, size_bytes, now)
-                self.update_last_message(publisher, last_seq, stamp_ns)
-                publisher.errors = clamp_count(errors)
-                if problem != publisher.problem:
-                    self.update_problem(publisher, problem)
-            for stats in subscriber_counts:
-                received, lost, problem = stats["received"], stats["lost"], stats.get("problem", "")
-                if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
-                    return False
-                self.update_subscriber(subscribers[stats["id"]], received, lost, problem)
-            member.renewed_at, member.cpu_ratio = now, _parse_ratio(cpu_ratio)
-            if member.unconnected_node_ids:
-                member.unconnected_node_ids.clear()
-        except (LookupError, TypeError, AttributeError):  # a missing field or publisher, or not a map
+        publishers, subscribers = member.publishers, member.subscribers
+        if len(renewal.publishers) != len(publishers) or len(renewal.subscribers) != len(subscribers):
             return False
+        for counts in renewal.publishers:
+            publisher = publishers.get(counts.id)
+            if publisher is None:
+                return False
+            self.update_counts(publisher, counts.count, counts.bytes, now)
+            self.update_last_message(publisher, counts.last_seq, counts.last_stamp_ns)
+            publisher.errors = clamp_count(counts.errors)
+            if counts.problem != publisher.problem:
+                self.update_problem(publisher, counts.problem)
+        for stats in renewal.subscribers:
+            subscriber = subscribers.get(stats.id)
+            if subscriber is None:
+                return False
+            self.update_subscriber(subscriber, stats.received, stats.lost, stats.problem)
+        member.renewed_at, member.cpu_ratio = now, _plausible_ratio(renewal.cpu_ratio)
+        member.unconnected_node_ids.clear()
         return True
 
     def update_counts(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
@@ -501,7 +481,7 @@ class Registry:
         self.publishers_revision = self._topic_revisions[topic] = self.revision
 
 
-def _parse_ratio(value: float | None) -> float | None:
+def _plausible_ratio(value: float | None) -> float | None:
     # None for an implausible CPU usage.
     return value if value is not None and 0.0 <= value < _MAX_CORES else None
 

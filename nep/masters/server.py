@@ -8,25 +8,22 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
-from dataclasses import replace
 
 import zmq
+from msgspec.structs import replace
 
 from nep.errors import ClosedError, NepError, WaitTimeoutError, WireError
 from nep.i18n import _
 from nep.masters.bad_requests import BadRequestCounter, describe_sender
 from nep.masters.graph import Graph, OutgoingMessage, with_hosts, without_nodes
-from nep.masters.leases import encode_renewed, is_renewal, parse_renewal
 from nep.masters.listen_addresses import ListenAddresses
 from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
-from nep.protocol.encoding import ReceivedRequest, ReplyEncoder, decode_request, gc_disabled
+from nep.protocol.encoding import ReceivedRequest, decode_request, encode_reply
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     DoneReply,
     Listen,
-    QueryGraph,
     RejectedReply,
     Renew,
     RenewedReply,
@@ -94,10 +91,9 @@ class MasterServer:
         self._submissions: deque[Submission] = deque()
         self._pending_submissions: dict[int, Submission] = {}
         self._last_call = 0
-        self._encoder = ReplyEncoder()
         self._bad_requests = BadRequestCounter()
-        self._renewals: list[tuple[bytes, bytes, int]] = []
-        """Renewals without a reply yet: sender, body, and time of receipt (ns since 1970)."""
+        self._renewals: list[tuple[str, ReceivedRequest, int]] = []
+        """Renewals without a reply yet: sender, request, and time of receipt (ns since 1970)."""
         self._notify_at = 0.0
         self._is_open = False
         self._is_closing = self._is_forked = False
@@ -239,7 +235,7 @@ class MasterServer:
             submission = self._submissions.popleft()
             self._last_call -= 1  # negative numbers are distinct from calls of nodes
             self._pending_submissions[self._last_call] = submission
-            self._apply_request(ReceivedRequest(self._last_call, submission.request), "")
+            self._send(self._execute("", ReceivedRequest(self._last_call, submission.request), 0))
 
     def _serve_router(self) -> None:
         deadline = time.monotonic() + _TICK_INTERVAL_S
@@ -253,88 +249,52 @@ class MasterServer:
             except zmq.ZMQError:
                 _logger.exception("the master failed to receive a request")
                 return
-            if len(body) == 1 and is_renewal(body[0]):
-                self._renewals.append((sender, body[0], time.time_ns()))
+            received = decode_request(body[0] if len(body) == 1 else b"")
+            if isinstance(received.request, Renew):
+                self._renewals.append((_route_of(sender), received, time.time_ns()))
             else:
                 self._reply_to_renewals()  # in order of arrival
-                self._serve_request(sender, body, self._router.peer_address())
+                self._serve_request(_route_of(sender), received, self._router.peer_address())
 
     def _reply_to_renewals(self) -> None:
         # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
-        replies = [self._try_renew(*renewal) for renewal in renewals]
-        for (sender, body, _received_ns), reply in zip(renewals, replies, strict=True):
-            if reply is None:
-                self._serve_request(sender, [body], "")
-            elif not self._router.send(sender, reply):
-                self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
+        self._send([each for renewal in renewals for each in self._execute(*renewal)])
 
-    def _try_renew(self, sender: bytes, body: bytes, received_ns: int) -> bytes | None:
-        # If this fails for a renewal, the general path handles it and replies.
-        try:
-            return self._renew_fast(sender, body, received_ns)
-        except Exception as error:  # noqa: BLE001 - logged; other renewals go on
-            self._log_failure(error, "handle a renewal")
-            return None
-
-    def _renew_fast(self, sender: bytes, body: bytes, received_ns: int) -> bytes | None:
-        # None if it is not a usual renewal.
-        renewal = parse_renewal(body)
-        if renewal is None:
-            return None
-        graph = self._graph
-        now = time.monotonic()
-        last_seqs = graph.renew_fast(renewal, now, _route_of(sender))
-        if last_seqs is None:
-            return None
-        member = graph.members[renewal.node_id]
-        clocks = graph.clocks.differences(member, now)
-        timestamps = () if renewal.clock is None else graph.clocks.renewal_timestamps(member, received_ns)
-        return encode_renewed(
-            renewal.call,
-            graph.epoch,
-            graph.revision,
-            last_seqs,
-            self._listen_addresses.hosts,
-            member.renew_interval_s,
-            times=timestamps,
-            clocks=clocks,
-        )
-
-    def _serve_request(self, sender: bytes, body: list[bytes], peer: str) -> None:
-        received = decode_request(body[-1] if len(body) == 1 else b"")
+    def _serve_request(self, sender: str, received: ReceivedRequest, peer: str) -> None:
         if isinstance(received.request, Listen) and self._listen_addresses.hosts and peer != "127.0.0.1":
             reason = _("this setting can be changed only on the master's own computer")
             received = ReceivedRequest(received.call, WireError(reason, code="listen"))
-        name = _route_of(sender)
-        reason = self._apply_request(received, name)
+        outgoing = self._execute(sender, received, time.time_ns())
+        self._send(outgoing)
+        reason = _rejection_reason(outgoing)
         if reason:
-            member = self._graph.node_at(name)
+            member = self._graph.node_at(sender)
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
             self._bad_requests.add(*describe_sender(node_id, node_name, peer), reason, time.monotonic())
 
-    def _apply_request(self, received: ReceivedRequest, sender: str) -> str:
-        # An empty sender means this process. Returns the reason of a rejection, or "".
-        request, outgoing = received.request, tuple[OutgoingMessage, ...]()
+    def _execute(
+        self, sender: str, received: ReceivedRequest, received_ns: int
+    ) -> tuple[OutgoingMessage, ...]:
+        # An empty sender means this process.
+        request = received.request
+        reply: Reply
         try:
             if isinstance(request, WireError):
-                outgoing = (OutgoingMessage(sender, self._create_rejection(request), received.call),)
+                reply = self._create_rejection(request)
             elif isinstance(request, Listen):
-                outgoing = (OutgoingMessage(sender, self._listen(request), received.call),)
+                reply = self._listen(request)
             else:
-                now, is_foreign = time.monotonic(), bool(sender)
-                with gc_disabled() if isinstance(request, QueryGraph) else nullcontext():
-                    received_ns = time.time_ns()
-                    outgoing = self._graph.apply(request, received.call, now, sender, is_foreign=is_foreign)
-                    if isinstance(request, Renew) and request.clock is not None:
-                        outgoing = self._with_times(outgoing, received_ns)
-                    self._send(outgoing)
-                return _rejection_reason(outgoing)
+                outgoing = self._graph.apply(
+                    request, received.call, time.monotonic(), sender, is_foreign=bool(sender)
+                )
+                if isinstance(request, Renew) and request.clock is not None:
+                    outgoing = self._with_times(outgoing, received_ns)
+                return outgoing
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
             self._log_failure(error, "execute a request")
-            outgoing = (OutgoingMessage(sender, self._create_rejection(), received.call),)
-        self._send(outgoing)
-        return request.reason if isinstance(request, WireError) else ""
+            reply = self._create_rejection()
+        return (OutgoingMessage(sender, reply, received.call),)
 
     def _with_times(
         self, outgoing: Sequence[OutgoingMessage], received_ns: int
@@ -384,12 +344,12 @@ class MasterServer:
             route = member.route
         reply = with_hosts(without_nodes(message.body, dead), self._listen_addresses.hosts)
         try:
-            body = self._encoder.encode(reply, message.call or 0)
+            body = encode_reply(reply, message.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
             self._log_failure(error, "encode a message")
             if message.call is None:
                 return True
-            body = self._encoder.encode(self._create_rejection(), message.call)
+            body = encode_reply(self._create_rejection(), message.call)
         return self._router.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _node_ids_at(self, route: str) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from nep.i18n import _, format_list
 from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
-from nep.protocol.encoding import create_frozen
 from nep.protocol.graph_view import (
     Alert,
     ClientInfo,
@@ -99,19 +98,18 @@ class GraphSnapshotBuilder:
 
 def _node_info(member: RegisteredNode) -> NodeInfo:
     node, clock = member.node, member.clock
-    field_values: dict[str, object] = {
-        "id": node.id,
-        "name": node.name,
-        "host": node.host,
-        "pid": node.pid,
-        "language": node.language,
-        "generation": node.generation,
-        "since_ns": node.since_ns,
-        "cpu_ratio": member.cpu_ratio,
-        "clock_offset_ns": None if clock is None else clock.offset_ns,
-        "clock_uncertainty_ns": None if clock is None else clock.uncertainty_ns,
-    }
-    return create_frozen(NodeInfo, field_values)
+    return NodeInfo(
+        id=node.id,
+        name=node.name,
+        host=node.host,
+        pid=node.pid,
+        language=node.language,
+        generation=node.generation,
+        since_ns=node.since_ns,
+        cpu_ratio=member.cpu_ratio,
+        clock_offset_ns=None if clock is None else clock.offset_ns,
+        clock_uncertainty_ns=None if clock is None else clock.uncertainty_ns,
+    )
 
 
 def _topic_info(
@@ -142,19 +140,18 @@ def _topic_info(
         if subscriber.lost is not None:
             lost = clamp_count((lost or 0) + subscriber.lost)
             received += subscriber.received or 0
-    field_values: dict[str, object] = {
-        "name": name,
-        "msg_type": first.msg_type if first else subscribing[0][1].record.msg_type,
-        "codec": first.codec if first else "",
-        "publishers": tuple(publishers),
-        "subscribers": tuple(subscribers),
-        "rate_hz": rate,
-        "bandwidth_Bps": bandwidth,
-        "last_stamp_ns": stamp_ns,
-        "lost": lost,
-        "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
-    }
-    return create_frozen(TopicInfo, field_values)
+    return TopicInfo(
+        name=name,
+        msg_type=first.msg_type if first else subscribing[0][1].record.msg_type,
+        codec=first.codec if first else "",
+        publishers=tuple(publishers),
+        subscribers=tuple(subscribers),
+        rate_hz=rate,
+        bandwidth_Bps=bandwidth,
+        last_stamp_ns=stamp_ns,
+        lost=lost,
+        loss_ratio=None if lost is None else lost / (lost + received) if lost else 0.0,
+    )
 
 
 def _publishers_for_rate(
@@ -169,29 +166,27 @@ def _publisher_info(
     member: RegisteredNode, publisher: RegisteredPublisher, rates: tuple[float, float] | None
 ) -> PublisherInfo:
     record = publisher.record
-    field_values: dict[str, object] = {
-        "id": record.id,
-        "node_id": member.node.id,
-        "endpoints": record.endpoints,
-        "latched": record.latched,
-        "count": publisher.count,
-        "bytes": publisher.bytes,
-        "last_seq": publisher.last_seq,
-        "last_stamp_ns": publisher.last_stamp_ns,
-        "rate_hz": None if rates is None else rates[0],
-        "bandwidth_Bps": None if rates is None else rates[1],
-    }
-    return create_frozen(PublisherInfo, field_values)
+    return PublisherInfo(
+        id=record.id,
+        node_id=member.node.id,
+        endpoints=record.endpoints,
+        latched=record.latched,
+        count=publisher.count,
+        bytes=publisher.bytes,
+        last_seq=publisher.last_seq,
+        last_stamp_ns=publisher.last_stamp_ns,
+        rate_hz=None if rates is None else rates[0],
+        bandwidth_Bps=None if rates is None else rates[1],
+    )
 
 
 def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -> SubscriberInfo:
-    field_values: dict[str, object] = {
-        "id": subscriber.record.id,
-        "node_id": member.node.id,
-        "received": subscriber.received,
-        "lost": subscriber.lost,
-    }
-    return create_frozen(SubscriberInfo, field_values)
+    return SubscriberInfo(
+        id=subscriber.record.id,
+        node_id=member.node.id,
+        received=subscriber.received,
+        lost=subscriber.lost,
+    )
 
 
 def _service_info(topic: str, registry: Registry) -> ServiceInfo:

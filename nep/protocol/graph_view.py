@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+
+from msgspec import Struct, field
 
 BRIDGES_TOPIC = "/nep/bridges"
 """Topic of the bridges' state (connected networks, message counts). Every publisher of it is a bridge."""
 
 
-@dataclass(frozen=True)
-class Alert:
+def to_plain(value: Struct) -> dict[str, object]:
+    """Convert a value of this module to maps, lists and scalars, with all fields."""
+    return {name: _plain_field(getattr(value, name)) for name in value.__struct_fields__}
+
+
+def _plain_field(value: object) -> object:
+    if isinstance(value, Struct):
+        return to_plain(value)
+    return [_plain_field(each) for each in value] if isinstance(value, tuple) else value
+
+
+class Alert(Struct, frozen=True, gc=False, omit_defaults=True):
     """Current problem of the network, described for people.
 
     Attributes:
@@ -24,8 +35,7 @@ class Alert:
     hint: str = ""
 
 
-@dataclass(frozen=True)
-class NodeInfo:
+class NodeInfo(Struct, frozen=True, gc=False):
     """Node of the graph.
 
     Attributes:
@@ -55,8 +65,7 @@ class NodeInfo:
     clock_uncertainty_ns: int | None = None
 
 
-@dataclass(frozen=True)
-class PublisherInfo:
+class PublisherInfo(Struct, frozen=True, gc=False):
     """Publisher of a topic. Counters are as of the last renewal: 1 s old at most, more in large graphs.
 
     Attributes:
@@ -85,8 +94,7 @@ class PublisherInfo:
     bandwidth_Bps: float | None  # noqa: N815 - B/s
 
 
-@dataclass(frozen=True)
-class SubscriberInfo:
+class SubscriberInfo(Struct, frozen=True, gc=False):
     """Subscriber of a topic.
 
     Attributes:
@@ -102,8 +110,7 @@ class SubscriberInfo:
     lost: int | None
 
 
-@dataclass(frozen=True)
-class TopicInfo:
+class TopicInfo(Struct, frozen=True, gc=False):
     """Topic with its publishers and subscribers. Unknown values are None.
 
     Attributes:
@@ -131,8 +138,7 @@ class TopicInfo:
     loss_ratio: float | None = None
 
 
-@dataclass(frozen=True)
-class PatternInfo:
+class PatternInfo(Struct, frozen=True, gc=False, omit_defaults=True):
     """Subscribers with a pattern, such as "/robot/*/camera". The pattern itself is not a topic.
 
     Attributes:
@@ -146,8 +152,7 @@ class PatternInfo:
     subscribers: tuple[SubscriberInfo, ...] = ()
 
 
-@dataclass(frozen=True)
-class ServerInfo:
+class ServerInfo(Struct, frozen=True, gc=False, omit_defaults=True):
     """Server of a service.
 
     Attributes:
@@ -167,8 +172,7 @@ class ServerInfo:
     bytes: int
 
 
-@dataclass(frozen=True)
-class ClientInfo:
+class ClientInfo(Struct, frozen=True, gc=False, omit_defaults=True):
     """Client of a service.
 
     Attributes:
@@ -184,8 +188,7 @@ class ClientInfo:
     failed: int | None
 
 
-@dataclass(frozen=True)
-class ServiceInfo:
+class ServiceInfo(Struct, frozen=True, gc=False, omit_defaults=True):
     """Service with its servers and clients.
 
     Attributes:
@@ -205,8 +208,7 @@ class ServiceInfo:
     errors: int = 0
 
 
-@dataclass(frozen=True)
-class GraphView:
+class GraphView(Struct, frozen=True, gc=False, omit_defaults=True):
     """Snapshot of the whole graph. Returned by `Node.graph`.
 
         for topic in node.graph().topics.values():
@@ -239,10 +241,10 @@ class GraphView:
         return {
             "epoch": self.epoch,
             "revision": self.revision,
-            "nodes": [asdict(node) for node in self.nodes.values()],
-            "topics": [asdict(topic) for topic in self.topics.values()],
-            "alerts": [asdict(alert) for alert in self.alerts],
+            "nodes": [to_plain(node) for node in self.nodes.values()],
+            "topics": [to_plain(topic) for topic in self.topics.values()],
+            "alerts": [to_plain(alert) for alert in self.alerts],
             "listens": list(self.listens),
-            "services": [asdict(service) for service in self.services.values()],
-            "patterns": [asdict(pattern) for pattern in self.patterns.values()],
+            "services": [to_plain(service) for service in self.services.values()],
+            "patterns": [to_plain(pattern) for pattern in self.patterns.values()],
         }

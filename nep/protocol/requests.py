@@ -12,8 +12,9 @@ docs/adr/0014-who-speaks-for-a-node.md.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from hashlib import sha256
+
+from msgspec import Struct, field
 
 from nep.protocol.graph_view import Alert, GraphView
 
@@ -29,8 +30,7 @@ def clamp_count(value: int) -> int:
     return value if 0 <= value <= MAX_COUNT else 0 if value < 0 else MAX_COUNT
 
 
-@dataclass(frozen=True)
-class NodeRecord:
+class NodeRecord(Struct, frozen=True, gc=False, omit_defaults=True):
     """Registration record of a node.
 
     Attributes:
@@ -52,12 +52,15 @@ class NodeRecord:
     language: str = "Python"
     generation: str = "native"
     since_ns: int = 0
-    key: str = field(default="", repr=False)
+    key: str = ""
     computer: str = ""
 
+    def __repr__(self) -> str:
+        shown_fields = (name for name in self.__struct_fields__ if name != "key")  # the key is secret
+        return f"NodeRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in shown_fields)})"
 
-@dataclass(frozen=True)
-class PublisherRecord:
+
+class PublisherRecord(Struct, frozen=True, gc=False, omit_defaults=True):
     """Registration record of a publisher.
 
     Attributes:
@@ -84,8 +87,7 @@ class PublisherRecord:
     history: int = 0
 
 
-@dataclass(frozen=True)
-class SubscriberRecord:
+class SubscriberRecord(Struct, frozen=True, gc=False, omit_defaults=True):
     """Registration record of a subscriber.
 
     Attributes:
@@ -132,8 +134,7 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
     return record is None or (record.number > 0 and derive_id(node.key, record.number) == record.id)
 
 
-@dataclass(frozen=True)
-class PublisherCount:
+class PublisherCount(Struct, frozen=True, gc=False, omit_defaults=True):
     """Statistics of a publisher or server: totals and the newest message.
 
     Attributes:
@@ -155,8 +156,7 @@ class PublisherCount:
     errors: int = 0
 
 
-@dataclass(frozen=True)
-class SubscriberCount:
+class SubscriberCount(Struct, frozen=True, gc=False, omit_defaults=True):
     """Statistics of a subscriber or client.
 
     Attributes:
@@ -172,8 +172,7 @@ class SubscriberCount:
     problem: str = ""
 
 
-@dataclass(frozen=True)
-class RemotePublisher:
+class RemotePublisher(Struct, frozen=True, gc=False, omit_defaults=True):
     """Publisher and its node, with everything that a subscriber needs to connect.
 
     Attributes:
@@ -189,8 +188,7 @@ class RemotePublisher:
     computer: str = ""
 
 
-@dataclass(frozen=True)
-class ExpectedSubscriber:
+class ExpectedSubscriber(Struct, frozen=True, gc=False, omit_defaults=True):
     """Registered subscriber that a new publisher waits for."""
 
     id: int
@@ -201,8 +199,7 @@ class ExpectedSubscriber:
 # ---- requests
 
 
-@dataclass(frozen=True)
-class Join:
+class Join(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to register a node and all its records, replacing its previous registration.
 
     Attributes:
@@ -221,24 +218,21 @@ class Join:
     managed: bool = False
 
 
-@dataclass(frozen=True)
-class AddPublisher:
+class AddPublisher(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to register a publisher, and its node if unknown. Reply: `AddedReply`."""
 
     node: NodeRecord
     publisher: PublisherRecord
 
 
-@dataclass(frozen=True)
-class AddSubscriber:
+class AddSubscriber(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to register a subscriber, and its node if unknown. Reply: `FoundReply`."""
 
     node: NodeRecord
     subscriber: SubscriberRecord
 
 
-@dataclass(frozen=True)
-class RemovePublisher:
+class RemovePublisher(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to unregister a publisher.
 
     Attributes:
@@ -252,23 +246,20 @@ class RemovePublisher:
     last_seq: int = 0
 
 
-@dataclass(frozen=True)
-class RemoveSubscriber:
+class RemoveSubscriber(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to unregister a subscriber."""
 
     node_id: str
     id: int
 
 
-@dataclass(frozen=True)
-class Leave:
+class Leave(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to unregister a node with all its records."""
 
     node_id: str
 
 
-@dataclass(frozen=True)
-class Renew:
+class Renew(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to renew a lease, with statistics. Reply: `RenewedReply`.
 
     Attributes:
@@ -292,8 +283,7 @@ class Renew:
     clock: tuple[int, ...] | None = None
 
 
-@dataclass(frozen=True)
-class ReportMissing:
+class ReportMissing(Struct, frozen=True, gc=False, omit_defaults=True):
     """Report of subscribers that did not connect to a new publisher in time.
 
     Attributes:
@@ -307,8 +297,7 @@ class ReportMissing:
     subscriber_ids: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class ReportAlerts:
+class ReportAlerts(Struct, frozen=True, gc=False, omit_defaults=True):
     """Report of all current alerts of an attachment, replacing its previous alerts.
 
     Only for `Master.submit`; has no wire encoding.
@@ -322,8 +311,7 @@ class ReportAlerts:
     alerts: tuple[Alert, ...]
 
 
-@dataclass(frozen=True)
-class Listen:
+class Listen(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to serve other computers. Reply: `DoneReply`. Rejected if sent from another computer.
 
     Attributes:
@@ -333,13 +321,11 @@ class Listen:
     hosts: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class QueryGraph:
+class QueryGraph(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request for the whole graph. Reply: `GraphReply`."""
 
 
-@dataclass(frozen=True)
-class Ping:
+class Ping(Struct, frozen=True, gc=False, omit_defaults=True):
     """Request to check that a master is running. Reply: `DoneReply`."""
 
 
@@ -362,8 +348,7 @@ Request = (
 # ---- replies
 
 
-@dataclass(frozen=True)
-class _MasterMessage:
+class _MasterMessage(Struct, frozen=True, gc=False, omit_defaults=True):
     """Base class of replies and pushes.
 
     Attributes:
@@ -375,13 +360,11 @@ class _MasterMessage:
     revision: int
 
 
-@dataclass(frozen=True)
-class DoneReply(_MasterMessage):
+class DoneReply(_MasterMessage, frozen=True):
     """Reply to an executed request that has no result, such as a ping."""
 
 
-@dataclass(frozen=True)
-class AddedReply(_MasterMessage):
+class AddedReply(_MasterMessage, frozen=True):
     """Reply to a registered publisher.
 
     Attributes:
@@ -396,8 +379,7 @@ class AddedReply(_MasterMessage):
     hosts: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class FoundReply(_MasterMessage):
+class FoundReply(_MasterMessage, frozen=True):
     """Reply to a registered subscriber or a joined node.
 
     Attributes:
@@ -411,16 +393,14 @@ class FoundReply(_MasterMessage):
     pattern: bool = False
 
 
-@dataclass(frozen=True)
-class TopicPublishers:
+class TopicPublishers(Struct, frozen=True, gc=False, omit_defaults=True):
     """All publishers of one topic."""
 
     topic: str
     publishers: tuple[RemotePublisher, ...]
 
 
-@dataclass(frozen=True)
-class RenewedReply(_MasterMessage):
+class RenewedReply(_MasterMessage, frozen=True):
     """Reply to a renewal.
 
     Attributes:
@@ -447,15 +427,13 @@ class RenewedReply(_MasterMessage):
     clocks: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class GraphReply(_MasterMessage):
+class GraphReply(_MasterMessage, frozen=True):
     """Reply with the whole graph."""
 
     view: GraphView
 
 
-@dataclass(frozen=True)
-class RejectedReply(_MasterMessage):
+class RejectedReply(_MasterMessage, frozen=True):
     """Reply to a rejected request.
 
     Attributes:
@@ -474,8 +452,7 @@ Reply = DoneReply | AddedReply | FoundReply | RenewedReply | GraphReply | Reject
 # ---- pushes
 
 
-@dataclass(frozen=True)
-class PublisherAdded(_MasterMessage):
+class PublisherAdded(_MasterMessage, frozen=True):
     """Notification of a new publisher on a subscribed topic, or of a publisher's new endpoints.
 
     Attributes:
@@ -488,8 +465,7 @@ class PublisherAdded(_MasterMessage):
     is_new: bool = False
 
 
-@dataclass(frozen=True)
-class PublisherRemoved(_MasterMessage):
+class PublisherRemoved(_MasterMessage, frozen=True):
     """Notification that a publisher of a subscribed topic is no longer registered.
 
     Attributes:
@@ -506,8 +482,7 @@ class PublisherRemoved(_MasterMessage):
     last_seq: int = 0
 
 
-@dataclass(frozen=True)
-class Probe(_MasterMessage):
+class Probe(_MasterMessage, frozen=True):
     """Test of the connection to a node that missed a renewal. Ignored by the receiver."""
 
 

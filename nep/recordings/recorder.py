@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,7 +14,7 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.programs.robots.moving import DESCRIPTION_TYPE
-from nep.protocol.graph_view import GraphView
+from nep.protocol.graph_view import GraphView, to_plain
 from nep.protocol.topic_glob import glob_matches, is_glob, widened_pattern
 from nep.protocol.wire import check_topic
 from nep.recordings.formats.channels import Role
@@ -170,7 +170,7 @@ class Recorder:
             self._stop_event.wait(poll_interval_s)
 
     def _handle_graph(self, graph: GraphView) -> None:
-        alerts = [asdict(each) for each in graph.alerts]
+        alerts = [to_plain(each) for each in graph.alerts]
         if alerts != self._last_alerts and (alerts or self._last_alerts is not None):
             self._writer.write_entry("alerts", {"alerts": alerts})
         self._last_alerts = alerts

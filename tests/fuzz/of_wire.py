@@ -11,7 +11,6 @@ from nep.backends.zeromq.services.tcp_stream import TcpStream
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.errors import BadTopicError, NepError, WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import encode_renewed, parse_renewal
 from nep.masters.registry import check_request
 from nep.protocol import batch, encoding, service_wire, topic_pattern, wire
 from nep.protocol.graph_view import GraphView
@@ -31,6 +30,7 @@ from nep.protocol.requests import (
     RejectedReply,
     RemotePublisher,
     Renew,
+    RenewedReply,
     SubscriberCount,
     SubscriberRecord,
     derive_id,
@@ -218,14 +218,6 @@ def requests_of_nodes(data: bytes) -> None:
     check_request(received.request)
 
 
-@TARGETS.add(seeds=requests, words=WORDS)
-def renewals(data: bytes) -> None:
-    raw = parse_renewal(data)
-    if raw is not None:
-        assert raw.call >= 0
-        encode_renewed(raw.call, raw.epoch, raw.revision, {1: 2}, ("127.0.0.1",), 3.0)
-
-
 def conversations() -> Iterator[bytes]:
     all_of_them = [*requests()]
     yield joined(all_of_them)
@@ -235,14 +227,13 @@ def conversations() -> Iterator[bytes]:
 @TARGETS.add(WireError, seeds=conversations, words=(*WORDS, SEPARATOR), slower=4)
 def a_master(data: bytes) -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
-    encoder = encoding.ReplyEncoder()
     for number, body in enumerate(parts_of(data)[:20]):
         received = encoding.decode_request(body)
         if not isinstance(received.request, WireError | Listen):
             for each in graph.apply(received.request, received.call, float(number), "a", is_foreign=True):
-                encoding.decode_reply(encoder.encode(each.body, each.call or 0))
+                encoding.decode_reply(encoding.encode_reply(each.body, each.call or 0))
         graph.tick(float(number))
-        encoding.decode_reply(encoder.encode(GraphReply(1, 2, graph.view()), 1))
+        encoding.decode_reply(encoding.encode_reply(GraphReply(1, 2, graph.view()), 1))
 
 
 def answers() -> Iterator[bytes]:
@@ -250,13 +241,11 @@ def answers() -> Iterator[bytes]:
     yield encoding.encode_reply(RejectedReply(1, 2, "no"), 2)
     yield encoding.encode_reply(FoundReply(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
     yield encoding.encode_reply(GraphReply(1, 2, GraphView(1, 2, {}, {}, ())), 4)
-    yield encode_renewed(1, 2, 3, {4: 5}, ("127.0.0.1",), 2.0)
+    yield encoding.encode_reply(RenewedReply(2, 3, last_seqs={4: 5}, hosts=("127.0.0.1",), next_s=2.0), 1)
 
 
 @TARGETS.add(WireError, seeds=answers, words=WORDS)
 def answers_of_the_master(data: bytes) -> None:
-    number = encoding.call_of_graph_reply(data)
-    assert number is None or number > 0
     call, answer = encoding.decode_reply(data)
     _call, again = encoding.decode_reply(encoding.encode_reply(answer, call))
     assert repr(again) == repr(answer)

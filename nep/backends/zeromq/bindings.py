@@ -16,19 +16,17 @@ import os
 import socket
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 
 import zmq
+from msgspec.structs import replace
 
-from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port, enable_keep_alive
+from nep.backends.zeromq.sockets import Socket, bind_free_port, enable_keep_alive
 from nep.errors import AddressInUseError, TooManyFilesError
 from nep.protocol.requests import RemotePublisher
-from nep.system.addresses import endpoint_of, is_loopback, reachable_endpoint
+from nep.system.addresses import LOOPBACK, endpoint_of, is_loopback, reachable_endpoint
 from nep.system.descriptors import has_free_descriptors
 
 _logger = logging.getLogger("nep")
-SMALL_CODECS = frozenset({"json", "string", "msgpack"})
-"""Codecs whose messages are usually small, such as commands, replies and states."""
 _TCP_PREFIX = f"tcp://{LOOPBACK}:"
 _UNIX_SOCKET_PREFIX = "ipc://@nep-"
 _MIN_FREE_FDS_TO_BIND = 384

@@ -10,15 +10,16 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Protocol
+
+from msgspec.structs import replace
 
 from nep.backends.zeromq.bindings import has_room_for_unix_sockets, select_endpoint
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingRequest, RpcClient
-from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, LOOPBACK, Socket, local_address_towards
+from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, Socket, local_address_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
@@ -58,7 +59,7 @@ from nep.protocol.requests import (
     SubscriberRecord,
 )
 from nep.protocol.topic_pattern import matches
-from nep.system.addresses import MasterNameResolver, is_endpoint, is_loopback, resolve_host
+from nep.system.addresses import LOOPBACK, MasterNameResolver, is_endpoint, is_loopback, resolve_host
 from nep.system.cpu import CpuLoad
 
 _MAX_RENEW_INTERVAL_S = 30.0

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, RejectionCounter, Socket, wait_until
+from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, Socket
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
-from nep.i18n import _
-from nep.protocol.encoding import call_of_graph_reply, decode_reply, encode_request
+from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.requests import Push, RejectedReply, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 
@@ -39,8 +40,6 @@ class PendingRequest:
     callback: ReplyCallback | None = None
     reply: Reply | None = None
     is_sent: bool = False
-    graph_reply: bytes | None = None
-    """Encoded graph reply, which the waiting thread decodes."""
 
 
 class ReceivedMessage(NamedTuple):
@@ -139,7 +138,7 @@ class RpcClient:
         with self._changed:
             while not wait_until(
                 self._changed,
-                lambda: request.reply is not None or request.graph_reply is not None or self._is_closed,
+                lambda: request.reply is not None or self._is_closed,
                 _remaining_s(started_at, timeout_s),
             ):
                 if timeout_s is not None and time.monotonic() - started_at >= timeout_s:
@@ -150,26 +149,11 @@ class RpcClient:
                 request.is_sent = False  # requests are idempotent, so they may be resent
                 self._flush_locked()
                 self._after_use()
-        if request.graph_reply is not None:
-            return self._decode_reply(request.graph_reply)
         if request.reply is None:
             raise ClosedError("the node")
         if isinstance(request.reply, RejectedReply):
             raise RequestRefusedError(request.reply.reason)
         return request.reply
-
-    def _decode_reply(self, graph_reply: bytes) -> Reply:
-        # Runs in the calling thread: decoding a graph of thousands of topics takes long.
-        try:
-            reply = decode_reply(graph_reply)[1]
-        except WireError as error:
-            self._reject(error)
-            raise RequestRefusedError(
-                _("the master's reply can't be read: {reason}").format(reason=error.reason)
-            ) from error
-        if isinstance(reply, Push):
-            raise RequestRefusedError(_("the master's message isn't a reply"))
-        return reply
 
     def notify(self, request: Request, callback: ReplyCallback | None = None) -> None:
         """Send a request without waiting; the request is dropped if no master is connected.
@@ -253,13 +237,6 @@ class RpcClient:
 
     def _read_one_locked(self) -> ReceivedMessage | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
-        graph_request_number = call_of_graph_reply(body)
-        if graph_request_number is not None:
-            graph_request = self._requests.pop(graph_request_number, None)
-            if graph_request is not None:  # otherwise its request has timed out
-                graph_request.graph_reply = body
-                self._changed.notify_all()
-            return None
         try:
             number, reply = decode_reply(body)
         except WireError as error:

@@ -19,7 +19,7 @@ import zmq
 from nep.errors import WireError
 from nep.masters.graph import Graph, OutgoingMessage
 from nep.programs.conformance.ports import bind_again
-from nep.protocol.encoding import ReplyEncoder, decode_request
+from nep.protocol.encoding import decode_request, encode_reply
 from nep.protocol.requests import (
     NodeRecord,
     PublisherAdded,
@@ -69,7 +69,6 @@ class ScriptedMaster:
     def __init__(self, context: zmq.Context[Any], on_push: Callable[[OutgoingMessage], None]) -> None:
         self._context = context
         self._on_push = on_push
-        self._encoder = ReplyEncoder()
         self.received: list[RecordedRequest] = []
         self.reply_filter: ReplyFilter = lambda _request, reply: reply
         self.port = 0
@@ -134,7 +133,7 @@ class ScriptedMaster:
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )
         for _turn in range(2):
-            self.push(node_id, self._encoder.encode(notification))
+            self.push(node_id, encode_reply(notification))
 
     def push(self, node_id: str, body: bytes) -> None:
         """Send an encoded message to the adapter's node, even an invalid one."""
@@ -164,7 +163,7 @@ class ScriptedMaster:
                 self._reply(request, message)
 
     def _reply(self, request: RecordedRequest, message: OutgoingMessage) -> None:
-        encoded = self._encoder.encode(message.body, message.call or 0)
+        encoded = encode_reply(message.body, message.call or 0)
         reply = self.reply_filter(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
             self._send(message.to, msgpack.packb(reply))
@@ -176,7 +175,7 @@ class ScriptedMaster:
         if member.route == PEER:
             self._on_push(message)
         else:
-            self._send(member.route, self._encoder.encode(message.body))
+            self._send(member.route, encode_reply(message.body))
 
     def _send(self, route: str, body: bytes) -> None:
         if self._socket is None:

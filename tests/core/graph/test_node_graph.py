@@ -1,8 +1,9 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import replace as with_changes
 
 import pytest
+from msgspec.structs import replace
 
 from app.core.graph.node_graph import (
     WEB_GROUP,
@@ -154,7 +155,7 @@ def test_internal_topics_and_services_are_drawn_on_request() -> None:
     found = lines(node_graph(facts(), choices))
     assert ("/nep/log",) in found
     assert ("/nep/parameters/1",) in found
-    assert ("remember_face",) not in lines(node_graph(facts(), replace(choices, shows_services=False)))
+    assert ("remember_face",) not in lines(node_graph(facts(), with_changes(choices, shows_services=False)))
 
 
 def test_collapsed_group_is_one_box_with_all_lines_of_its_nodes() -> None:
@@ -178,9 +179,11 @@ def test_quiet_nodes_are_hidden_and_counted_until_their_group_shows_them() -> No
     }  # fmt: skip
     assert graph.hidden_quiet_count == 2
     assert [each.quiet_count for each in graph.groups] == [2, 0]
-    shown = node_graph(facts(), replace(choices, groups_with_visible_quiet_nodes=frozenset({"host:lab-pc"})))
+    shown = node_graph(
+        facts(), with_changes(choices, groups_with_visible_quiet_nodes=frozenset({"host:lab-pc"}))
+    )
     assert {each.name for each in shown.nodes if each.is_quiet} == {"studio", "RIZE"}
-    assert node_graph(facts(), replace(choices, hides_quiet=False)).hidden_quiet_count == 0
+    assert node_graph(facts(), with_changes(choices, hides_quiet=False)).hidden_quiet_count == 0
 
 
 def test_group_of_only_quiet_nodes_stays_visible() -> None:
@@ -213,7 +216,7 @@ def test_web_pages_are_grouped_and_titled_by_the_web_server(group_by: GroupBy) -
         replace(node("8", "web_lab:8080_50002"), language="web"),
     )
     known = {"web_lab:8080_50001": PageNode("buttons.html", "192.168.1.52, Safari", "tablet")}
-    graph = node_graph(replace(facts((*NODES, *pages)), pages=known), GraphOptions(group_by=group_by))
+    graph = node_graph(with_changes(facts((*NODES, *pages)), pages=known), GraphOptions(group_by=group_by))
     drawn = [(each.name, each.page) for each in graph.nodes if each.kind == "page"]
     assert drawn == [("buttons.html", known["web_lab:8080_50001"]), ("lab:8080_50002", None)]
     (group,) = [each for each in graph.groups if each.key == WEB_GROUP]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from app.core.network.nodes import GONE_DISPLAY_S, Nodes
 from nep.protocol.graph_view import (

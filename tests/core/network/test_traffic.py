@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import ValuesView
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from app.core.network.mailbox import Batch
 from app.core.network.topics import MAX_TOPICS_PER_UPDATE, Topics

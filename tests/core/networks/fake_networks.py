@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.network.source import Sink
 from app.core.networks.kinds import NetworkKind
 from app.core.networks.networks import NetworkEvent, Networks

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 import nep
 from nep.backends.zenoh.keys import data_key, hello_key, pattern_data_key, pattern_hellos_key, topic_of

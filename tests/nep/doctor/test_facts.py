@@ -16,7 +16,7 @@ import pytest
 import typer
 
 import nep
-from nep.cli.doctor import doctor
+from nep.cli.programs.doctor import doctor
 from nep.programs.doctor import collect_facts, installs, processes, start_blocker
 from nep.programs.doctor.collect import loopback_problem
 from tests.nep.programs import running

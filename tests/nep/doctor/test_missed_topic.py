@@ -12,7 +12,7 @@ import pytest
 import typer
 
 import nep
-from nep.cli.doctor import doctor
+from nep.cli.programs.doctor import doctor
 from nep.programs.doctor import TopicFacts, closest_topic, collect_topic, diagnose, topic_findings
 from nep.programs.doctor.facts import PublisherFact
 from nep.programs.doctor.listen import probe_endpoint

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import pytest
 import zmq
+from msgspec.structs import replace
 
 import nep
 from nep.masters.master import Master

@@ -1,28 +1,27 @@
-"""Tests of the master's fast paths for many nodes: their results must equal those of the normal paths."""
+"""Tests of renewals, and of views that reuse unchanged topics."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
+from nep.errors import WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import encode_renewed, parse_renewal
 from nep.masters.master import Master
 from nep.masters.snapshot import GraphSnapshotBuilder
 from nep.messages.packing import pack
 from nep.protocol import encoding
-from nep.protocol.encoding import ReplyEncoder, to_plain
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import (
     GraphReply,
     Join,
     Leave,
     NodeRecord,
-    Ping,
     PublisherCount,
     PublisherRecord,
     QueryGraph,
@@ -67,13 +66,15 @@ def renewal(n: int, graph: Graph, count: int = 10, problem: str = "", **more: An
     )
 
 
-def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
-    """Renew by the master's fast path; return the encoded reply, or None if the path does not apply."""
-    said = parse_renewal(encoding.encode_request(request, 7))
-    if said is None:
-        return None
-    last_seqs = graph.renew_fast(said, now, said.node_id)
-    return None if last_seqs is None else encode_renewed(said.call, EPOCH, graph.revision, last_seqs, ())
+def renew(graph: Graph, request: Renew, now: float) -> RenewedReply:
+    """Send a renewal over the wire; return the reply."""
+    received = encoding.decode_request(encoding.encode_request(request, 7))
+    assert isinstance(received.request, Renew)
+    (answer,) = graph.apply(received.request, 7, now, request.node_id, is_foreign=True)
+    call, reply = encoding.decode_reply(encoding.encode_reply(answer.body, 7))
+    assert isinstance(reply, RenewedReply)
+    assert (call, reply) == (7, answer.body)
+    return reply
 
 
 def view(graph: Graph) -> GraphView:
@@ -81,24 +82,22 @@ def view(graph: Graph) -> GraphView:
     return GraphSnapshotBuilder(graph._registry).view(EPOCH)
 
 
-def test_fast_renewal_matches_the_normal_path() -> None:
-    quick, long = graph_of(5), graph_of(5)
+def test_renewal_stores_statistics_and_returns_the_sequence_numbers_of_other_publishers() -> None:
+    graph = graph_of(5)
     for now in (1.0, 2.0, 3.0):
         for n in range(5):
-            request = renewal(n, quick, int(now) * 7 + n, "bad" if n == 2 else "", cpu_ratio=0.25)
-            body = renew(quick, request, now)
-            assert body is not None
-            (answer,) = long.apply(request, 7, now, f"n{n}")
-            assert encoding.decode_reply(body) == (7, answer.body)
-            assert isinstance(answer.body, RenewedReply)
-            assert set(answer.body.last_seqs) == {100 + (n + 1) % 5}
-    assert view(quick) == view(long)
-    assert view(quick).topics["t0"].rate_hz is not None
+            counts = int(now) * 7 + n
+            reply = renew(graph, renewal(n, graph, counts, "bad" if n == 2 else "", cpu_ratio=0.25), now)
+            assert set(reply.last_seqs) == {100 + (n + 1) % 5}
+            assert graph.view().nodes[f"n{n}"].cpu_ratio == 0.25
+            assert graph.view().topics[f"t{n}"].publishers[0].last_seq == counts
+    assert graph.view().topics["t0"].rate_hz is not None
+    assert [alert.id for alert in graph.view().alerts] == ["message:t3"]
 
 
 def test_renewal_restarts_the_lease() -> None:
     graph = graph_of(2)
-    assert renew(graph, renewal(0, graph), 2.9) is not None
+    renew(graph, renewal(0, graph), 2.9)
     graph.tick(3.0)
     assert list(graph.members) == ["n0"]
 
@@ -107,42 +106,52 @@ def test_renewal_restarts_the_lease() -> None:
     "change",
     [
         {"epoch": EPOCH + 1},
-        {"revision": 0},
-        {"publishers": ()},
+        {"publishers": []},
         {"publishers": [{"id": 999, "count": 1, "bytes": 1, "last_seq": 1}]},
-        {"publishers": [{"id": 100, "count": "1", "bytes": 1, "last_seq": 1}]},
-        {"publishers": [{"id": 100, "count": True, "bytes": 1, "last_seq": 1}]},
-        {"publishers": [{"id": 100, "count": 1, "bytes": 1, "last_seq": 1, "last_stamp_ns": "x"}]},
-        {"publishers": [{"id": 100}]},
-        {"publishers": [[100]]},
-        {"publishers": ["x"]},
-        {"publishers": {"id": 100}},
-        {"subscribers": [{"id": 200, "received": 1.5, "lost": 0}]},
-        {"subscribers": [{"id": 200, "received": 1, "lost": 0, "problem": 5}]},
-        {"subscribers": [{"id": [], "received": 1, "lost": 0}]},
+        {"subscribers": [{"id": 999, "received": 1, "lost": 1}]},
         {"node_id": "n9"},
-        {"node_id": 5},
-        {"cpu_ratio": "much"},
     ],
 )
-def test_unusual_renewal_falls_back_to_the_normal_path(change: dict[str, object]) -> None:
+def test_node_whose_renewal_does_not_match_its_registration_must_join_again(
+    change: dict[str, object],
+) -> None:
     graph = graph_of(2)
-    what = to_plain(renewal(0, graph))
-    assert isinstance(what, dict)
-    said = parse_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
-    assert said is None or graph.renew_fast(said, 1.0, said.node_id) is None
+    fields = msgspec.to_builtins(renewal(0, graph))
+    received = encoding.decode_request(pack({"do": "renew", "call": 7, "what": fields | change}))
+    assert isinstance(received.request, Renew)
+    (answer,) = graph.apply(received.request, 7, 1.0, "n0", is_foreign=True)
+    assert isinstance(answer.body, RenewedReply)
+    assert answer.body.again
 
 
-@settings(deadline=None, max_examples=60)
-@given(st.binary(max_size=60) | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(to_plain))
-def test_invalid_renewal_is_not_parsed_by_the_fast_path(junk: object) -> None:
-    bodies_of_junk = [junk] if isinstance(junk, bytes) else []
-    begins = encoding.encode_request(Renew("n0", 1, 1), 7)
-    bodies_of_junk += [begins[:14] + (junk if isinstance(junk, bytes) else b""), begins[:-1], begins + b"x"]
-    for body in bodies_of_junk:
-        assert parse_renewal(body) is None
-    assert parse_renewal(encoding.encode_request(Ping(), 7)) is None
-    assert parse_renewal(begins) is not None
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"publishers": [{"id": 100, "count": "1", "bytes": 1, "last_seq": 1}]}, "publishers[0].count"),
+        ({"publishers": [{"id": 100, "count": True, "bytes": 1, "last_seq": 1}]}, "publishers[0].count"),
+        (
+            {"publishers": [{"id": 100, "count": 1, "bytes": 1, "last_seq": 1, "last_stamp_ns": "x"}]},
+            "publishers[0].last_stamp_ns",
+        ),
+        ({"publishers": [{"id": 100}]}, "publishers[0].count"),
+        ({"publishers": [[100]]}, "publishers[0]"),
+        ({"publishers": ["x"]}, "publishers[0]"),
+        ({"publishers": {"id": 100}}, "publishers"),
+        ({"subscribers": [{"id": 200, "received": 1.5, "lost": 0}]}, "subscribers[0].received"),
+        ({"subscribers": [{"id": 200, "received": 1, "lost": 0, "problem": 5}]}, "subscribers[0].problem"),
+        ({"subscribers": [{"id": [], "received": 1, "lost": 0}]}, "subscribers[0].id"),
+        ({"node_id": 5}, "node_id"),
+        ({"cpu_ratio": "much"}, "cpu_ratio"),
+    ],
+)
+def test_malformed_renewal_is_rejected_with_the_name_of_the_field(
+    change: dict[str, object], field: str
+) -> None:
+    fields = msgspec.to_builtins(renewal(0, graph_of(2)))
+    received = encoding.decode_request(pack({"do": "renew", "call": 7, "what": fields | change}))
+    assert received.call == 7
+    assert isinstance(received.request, WireError)
+    assert f"'Renew.{field}'" in received.request.reason
 
 
 KINDS = st.sampled_from(["join", "leave", "renew", "remove", "alert", "retype"])
@@ -152,7 +161,7 @@ CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 @settings(deadline=None, max_examples=60)
 @given(CHANGES)
 def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) -> None:
-    graph, packer = graph_of(3), ReplyEncoder()
+    graph = graph_of(3)
     for now, (what, n) in enumerate(changes):
         if what == "join":
             graph.apply(joining(n, 5), 1, float(now), f"n{n}")
@@ -169,7 +178,7 @@ def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) ->
         (answer,) = graph.apply(QueryGraph(), 3, float(now), "somebody")
         assert isinstance(answer.body, GraphReply)
         assert answer.body.view == view(graph)
-        assert encoding.decode_reply(packer.encode(answer.body, 3)) == (3, answer.body)
+        assert encoding.decode_reply(encoding.encode_reply(answer.body, 3)) == (3, answer.body)
 
 
 def test_unchanged_topics_are_reused_in_the_next_view() -> None:

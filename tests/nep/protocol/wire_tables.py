@@ -1,11 +1,13 @@
-"""Tables of fields in docs/wire.md, generated from the dataclasses of the protocol."""
+"""Tables of fields in docs/wire.md, generated from the protocol's classes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
 from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin
+
+from msgspec import NODEFAULT
+from msgspec.structs import FieldInfo, fields
 
 from nep.protocol import graph_view, requests
 
@@ -53,10 +55,10 @@ _OF_ALL = {"epoch", "revision"}
 def rows(name: str) -> list[tuple[str, str, str]]:
     """Return field, type and default of each field, without `epoch` and `revision` of replies and pushes."""
     kind = TABLES[name]
-    hints = get_type_hints(kind)
-    is_answer = {"epoch", "revision"} <= hints.keys() and name not in {"renew", "view"}
+    names = {each.name for each in fields(kind)}
+    is_answer = names >= {"epoch", "revision"} and name not in {"renew", "view"}
     return [
-        (each.name, _type(hints[each.name]), _default(each))
+        (each.name, _type(each.type), _default(each))
         for each in fields(kind)
         if not (is_answer and each.name in _OF_ALL)
     ]
@@ -76,10 +78,10 @@ def _type(hint: Any) -> str:
     return f"map: {_type(args[0])} → {_type(args[1])}"
 
 
-def _default(field: Any) -> str:
-    if field.default_factory is not MISSING:
+def _default(field: FieldInfo) -> str:
+    if field.default_factory is not NODEFAULT:
         return "empty"
-    if field.default is MISSING:
+    if field.default is NODEFAULT:
         return "required"
     if field.default is None:
         return "nil"

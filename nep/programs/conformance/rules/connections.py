@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from nep.i18n import lazy
 from nep.programs.conformance.bench import Bench
