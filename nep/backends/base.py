@@ -184,22 +184,6 @@ class SupportsSubscriberIds(Protocol):
         """Ids of the connected subscribers, the same as in the graph."""
 
 
-@runtime_checkable
-class SupportsPayloads(Protocol):
-    """Optional interface of a `SubscriberTransport` for decoded payloads without `Message` objects.
-
-    While `payloads` is not empty, call `restore` before reading `ready`.
-    """
-
-    payloads: deque[Any]
-    """Decoded payloads, all older than the messages in `ready`. Pop from the left, in any thread."""
-    wants_payloads: bool
-    """True to prefer `payloads` over `ready` where that is faster. Set by the reader."""
-
-    def restore(self) -> None:
-        """Convert the remaining payloads back to messages and insert them at the front of `ready`."""
-
-
 class SubscriberTransport(Protocol):
     """Receiving end of a subscriber."""
 

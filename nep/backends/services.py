@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import threading
 import time
@@ -10,10 +9,10 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol
 
 from nep.backends.connection import Configuration
-from nep.errors import ClosedError, NepError
+from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, CallKind, Reply, error_reply
@@ -217,65 +216,6 @@ class OpenCall(Protocol):
     @property
     def number(self) -> int:
         """Number of the call, unique within its client."""
-
-
-class InFlightCall(OpenCall, Protocol):
-    """Interface of a call in flight for the client that stores it."""
-
-    @property
-    def callback(self) -> Callable[[Outcome], None]:
-        """Callback that receives the outcome."""
-
-    @property
-    def size(self) -> int:
-        """Size of the request in bytes."""
-
-
-C = TypeVar("C", bound=InFlightCall)
-
-
-class ClientCalls(Generic[C]):
-    """Base class for clients that stores the calls in flight, guarded by `_lock`."""
-
-    def __init__(self, spec: ClientSpec) -> None:
-        self.spec = spec
-        self.is_closed = False
-        self.late = 0
-        """Number of replies that arrived after their call had timed out or was cancelled."""
-        self._lock = threading.Lock()
-        self._calls: dict[int, C] = {}
-        self._bytes = 0
-        self._numbers = itertools.count(1)
-        self._answered = self._failed = 0
-
-    def _run_callback(self, call: C, outcome: Outcome) -> None:
-        # Call without the lock: the callback may use the client.
-        try:
-            call.callback(outcome)
-        except Exception:  # a failing callback must not affect other calls
-            _logger.exception("result callback for '%s' raised", self.spec.service)
-
-    def _remove_locked(self, call: C) -> bool:
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= call.size
-        return True
-
-    def cancel(self, call: OpenCall) -> None:
-        """Cancel a call; its callback isn't called."""
-        with self._lock:
-            existing = self._calls.get(call.number)
-            if existing is not None:
-                self._remove_locked(existing)
-
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process, without acquiring the lock."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
 
 
 class ServerTransport(Protocol):

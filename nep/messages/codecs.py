@@ -82,6 +82,9 @@ class Codec:
         decode: Decodes bytes and extension to a payload. Raises `DecodeError`.
         empty: Returns the payload that `listen` returns if there is no message.
         check: Raises `EncodeError` for a payload of a wrong type, in constant time.
+        is_small: True if messages are usually small, such as commands, replies and states.
+        queue_length: Maximum number of messages in the queue of a connection, for codecs of large messages;
+            None for the back end's default.
     """
 
     name: str
@@ -90,6 +93,8 @@ class Codec:
     decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
     empty: Callable[[], object]
     check: Callable[[object], object]
+    is_small: bool = False
+    queue_length: int | None = None
 
 
 def _plain_value(value: object) -> object:
@@ -252,19 +257,21 @@ def _empty_image() -> object:
     return None
 
 
-JSON = Codec("json", 1, _encode_json, _decode_json, dict, _accept_any)
+JSON = Codec("json", 1, _encode_json, _decode_json, dict, _accept_any, is_small=True)
 
 
-STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string)
+STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string, is_small=True)
 
 
-BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes)
+BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes, queue_length=1000)
 
 
-MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any)
+MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any, is_small=True)
 
 
-IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _empty_image, image_codec.check_image)
+IMAGE = Codec(
+    "image", 5, image_codec.encode, _decode_image, _empty_image, image_codec.check_image, queue_length=64
+)
 
 
 CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}

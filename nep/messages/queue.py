@@ -1,4 +1,4 @@
-"""Bounded queue of received messages, and the adaptive batch size of its reader."""
+"""Bounded queue of received messages."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ QueuePolicy = Literal["all", "latest"]
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
-_FAST_READ_INTERVAL_S = 10e-6
-"""Maximum time in seconds between two reads of a fast reader, whose batch size is doubled."""
 MAX_READ_AHEAD = 64
+"""Maximum number of messages that a reader takes from the socket at once."""
 
 
 class Inbox:
@@ -91,28 +90,3 @@ class Inbox:
 
     def __len__(self) -> int:
         return len(self.messages)
-
-
-class ReadAhead:
-    """Adaptive number of messages that a reader reads at once.
-
-    Polling an empty queue costs time, so only fast readers read ahead.
-    """
-
-    def __init__(self, max_messages: int) -> None:
-        self._max_messages = max(1, min(MAX_READ_AHEAD, max_messages))
-        self.message_count = 1
-        """Current number of messages per read."""
-        self.max_interval_s = _FAST_READ_INTERVAL_S
-        """Maximum time in seconds between two reads for the reader to count as fast."""
-
-    def increase(self) -> int:
-        """Increase the number of messages for a fast reader, and return it."""
-        self.message_count = min(2 * self.message_count, self._max_messages)
-        self.max_interval_s = self.message_count * _FAST_READ_INTERVAL_S
-        return self.message_count
-
-    def reset(self) -> None:
-        """Reset to one message, because the reader is slow or fewer messages were available."""
-        self.message_count = 1
-        self.max_interval_s = _FAST_READ_INTERVAL_S

@@ -61,7 +61,7 @@ async def _run_once(work: Work) -> bool:
     for callback in work.callbacks:
         if not work.is_running:
             break
-        item = work.next_item(callback)
+        item = work.next_item(callback.subscriber, with_message=callback.with_message)
         if item is not NO_MESSAGE:
             has_worked = True
             await _await_result(callback.call(item))

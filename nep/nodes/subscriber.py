@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from nep.backends.base import SubscriberSpec, SubscriberTransport, SupportsPayloads
+from nep.backends.base import SubscriberSpec, SubscriberTransport
 from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 WAIT_SLICE_S = 0.1
 """Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""
 
-_NO_PAYLOADS: deque[Any] = deque()
 _logger = logging.getLogger("nep")
 
 
@@ -52,11 +50,8 @@ class Subscriber:
         self._transport = transport
         self._spec = spec
         self._ready = transport.ready
-        self._payload_source = transport if isinstance(transport, SupportsPayloads) else None
-        self.payloads = _NO_PAYLOADS if self._payload_source is None else self._payload_source.payloads
-        """Decoded payloads to be read next, for callers that don't need the messages."""
         self._empty = codec_for(spec.msg_type).empty
-        self._async_reader = AsyncReader(transport, self._poll_first)
+        self._async_reader = AsyncReader(transport, self._take_typed)
         self._problem = ""
         self._undecodable_count = 0
 
@@ -114,36 +109,24 @@ class Subscriber:
             is_invalid = True
         if is_invalid:
             check_optional_time_limit("timeout_s", timeout_s)
-        payloads, ready = self.payloads, self._ready
-        if payloads:
+        while self._ready:  # already read
             try:
-                return True, payloads.popleft()
-            except IndexError:  # another thread took the last one
-                pass
-        while ready:  # already read
-            try:
-                message = ready.popleft()
+                return True, self.decoded_unshared(self._ready.popleft())
             except IndexError:  # another thread took the last one
                 break
-            try:
-                if self._problem:
-                    return True, self.decoded(message)
-                if message.decoded is UNDECODED:  # not shared: the decoded payload need not be cached
-                    return True, message.kind.decode(message.raw, message.extension)
-                return True, message.decoded
-            except DecodeError as error:
-                self._report_problem(error)
+            except DecodeError:
+                continue  # already logged and reported
         return self._wait_and_listen(block_mode, timeout_s)
 
     def _wait_and_listen(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
         limit_s = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit_s if limit_s else None
         while True:
-            message = self._receive_for_listen(limit_s)
+            message = self._receive(limit_s)
             if message is None:
                 return False, self._empty()
             try:
-                return True, self.decoded(message)
+                return True, self.decoded_unshared(message)
             except DecodeError:
                 if deadline is not None:
                     limit_s = max(0.0, deadline - time.monotonic())
@@ -192,36 +175,12 @@ class Subscriber:
             is_invalid = True
         if is_invalid:
             check_optional_time_limit("timeout_s", timeout_s)
-        self.want_messages()
-        return self._receive(timeout_s)
-
-    def _receive_for_listen(self, timeout_s: float | None) -> Message | None:
-        self.want_payloads()
-        return self._receive(timeout_s)
-
-    def want_payloads(self) -> None:
-        """Make the transport deliver bare payloads, which is faster than `Message` objects.
-
-        Has no effect while a problem is reported, or if the payloads are typed.
-        """
-        if self._payload_source is not None:
-            self._payload_source.wants_payloads = not (self._problem or self.is_typed)
-
-    def want_messages(self) -> None:
-        """Make the transport deliver `Message` objects again, also for data that was already read."""
-        if self._payload_source is not None:
-            self._payload_source.wants_payloads = False
-            if self.payloads:
-                self._payload_source.restore()
+        message = self._receive(timeout_s)
+        return None if message is None else self.typed(message)
 
     def _receive(self, timeout_s: float | None) -> Message | None:
-        if self._ready:  # already read
-            try:
-                return self._ready.popleft()
-            except IndexError:  # another thread took it
-                pass
-        if self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
-            return self._poll()
+        if self._ready or self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
+            return self._take_or_raise()
         wait_s = WAIT_SLICE_S if timeout_s is None or timeout_s > WAIT_SLICE_S else timeout_s
         message = self._transport.receive(wait_s)
         return message or self._receive_after_slice(None if timeout_s is None else timeout_s - wait_s)
@@ -261,17 +220,25 @@ class Subscriber:
             except DecodeError:
                 limit_s = None if deadline is None else max(0.0, deadline - time.monotonic())
 
-    def _poll_first(self) -> Message | None:
-        self.want_messages()
+    def take(self) -> Message | None:
+        """Return the next message without waiting, not yet decoded or converted to the declared type.
+
+        Returns None if there is none or the subscriber is closed.
+        """
         try:
             return self._ready.popleft()
-        except IndexError:
-            return self._poll()
+        except IndexError:  # also if another thread took the last one
+            return None if self._transport.is_closed else self._transport.poll()
 
-    def _poll(self) -> Message | None:
-        if self._transport.is_closed:
+    def _take_or_raise(self) -> Message | None:
+        message = self.take()
+        if message is None and self._transport.is_closed:
             raise self._closed_error()
-        return self._transport.poll()
+        return message
+
+    def _take_typed(self) -> Message | None:
+        message = self._take_or_raise()
+        return None if message is None else self.typed(message)
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from nep.backends.base import Backend, Sink, SubscriberSpec, SubscriberTransport
 from nep.messages.codecs import Codec
 from nep.messages.message import Message
-from nep.nodes.arguments import check_function, check_optional_time_limit
+from nep.nodes.arguments import check_function
 from nep.nodes.subscriber import Subscriber
 from nep.system.arguments import check_type_name
 from nep.system.lazy_import import lazy_module
@@ -84,23 +84,6 @@ class TypedSubscriber(Subscriber):
     def decoded_unshared(self, message: Message) -> object:
         """Return the typed payload of a message that no other reader shares."""
         return self.decoded(self._reader.convert(message))
-
-    def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """Return (True, payload) for the next message, or (False, None) if there is none."""
-        check_optional_time_limit("timeout_s", timeout_s)
-        return self._wait_and_listen(block_mode, timeout_s)
-
-    def receive(self, timeout_s: float | None = None) -> Message | None:
-        """Return the next message with a typed payload, or None after the time limit."""
-        message = super().receive(timeout_s)
-        return None if message is None else self._reader.convert(message)
-
-    def _receive_for_listen(self, timeout_s: float | None) -> Message | None:
-        return self.receive(timeout_s)
-
-    def _poll_first(self) -> Message | None:
-        message = super()._poll_first()
-        return None if message is None else self._reader.convert(message)
 
 
 def _empty_payload() -> object:

@@ -201,23 +201,17 @@ class Work:
         # Returns True if there may be more.
         subscriber, transport, call, _with_message = callbacks[0]
         ready, clock, is_stopped = transport.ready, self.clock, self._is_stopped.is_set
-        decoded_unshared, payloads, is_burst = subscriber.decoded_unshared, subscriber.payloads, False
-        subscriber.want_payloads()
+        decoded_unshared, is_burst = subscriber.decoded_unshared, False
         while not is_stopped() and callbacks is self.callbacks:
+            message = subscriber.take()
+            if message is None:
+                return is_burst
             try:
-                if payloads:
-                    payload = payloads.popleft()
-                elif ready:
-                    payload = decoded_unshared(ready.popleft())
-                else:
-                    polled = None if transport.is_closed else transport.poll()
-                    if polled is None:
-                        return is_burst
-                    payload = decoded_unshared(polled)
-            except (DecodeError, IndexError):
-                continue  # already logged and reported; or another thread took the last one
+                payload = decoded_unshared(message)
+            except DecodeError:
+                continue  # already logged and reported
             call(payload)
-            if not (payloads or ready):
+            if not ready:
                 return is_burst
             is_burst = True  # several were received together: there may be more
             if clock() >= until:
@@ -242,48 +236,29 @@ class Work:
         for subscriber, transport, call, with_message in self.callbacks:
             if is_stopped() or self.is_closed:
                 break
-            if subscriber.payloads:
-                subscriber.want_messages()
-            try:  # inlined from `next_item`, which takes a third longer per message
-                message = transport.ready.popleft()
-            except IndexError:
-                polled = None if transport.is_closed else transport.poll()
-                if polled is None:
-                    continue
-                message = polled
-            if transport.ready or subscriber.payloads:
+            item = self.next_item(subscriber, with_message=with_message)
+            if transport.ready:
                 has_more = True
-            if subscriber.is_typed:
-                message = subscriber.typed(message)
-            try:
-                payload = subscriber.decoded(message)
-            except DecodeError:
-                continue  # already logged and reported
-            call(message if with_message else payload)
+            if item is not NO_MESSAGE:
+                call(item)
         return has_more
 
-    def next_item(self, callback: Callback) -> object:
-        """Return the next message or payload for a callback.
+    @staticmethod
+    def next_item(subscriber: Subscriber, *, with_message: bool) -> object:
+        """Return the next message or payload of a subscriber.
 
         Returns `NO_MESSAGE` if there is none, or if the next message can't be decoded.
         """
-        subscriber, transport = callback.subscriber, callback.transport
-        if subscriber.payloads:
-            subscriber.want_messages()
-        try:
-            message = transport.ready.popleft()
-        except IndexError:
-            polled = None if transport.is_closed else transport.poll()
-            if polled is None:
-                return NO_MESSAGE
-            message = polled
+        message = subscriber.take()
+        if message is None:
+            return NO_MESSAGE
         if subscriber.is_typed:
             message = subscriber.typed(message)
         try:
             payload = subscriber.decoded(message)
         except DecodeError:
             return NO_MESSAGE  # already logged and reported
-        return message if callback.with_message else payload
+        return message if with_message else payload
 
     # ---- waiting
 

@@ -25,6 +25,9 @@ else:
 
 _logger = logging.getLogger("nep")
 
+LOOPBACK = "127.0.0.1"
+ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
+"""Ports that have a fixed meaning for programs of the original NEP."""
 MASTER_VARIABLE = "NEP_MASTER"
 DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780

@@ -13,7 +13,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from nep.backends.zeromq.loss import PublisherTracker
+from nep.backends.bases.loss import PublisherTracker
 from nep.errors import WireError
 from nep.messages import image_codec
 from nep.protocol.clock_samples import ClockSamples

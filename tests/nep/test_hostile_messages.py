@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 import nep
-from nep.cli import log as log_command
+from nep.cli.graph import log as log_command
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE, LogRecord
 from nep.patterns.parameters.node_parameters import parameters_topic

@@ -6,30 +6,26 @@ the inboxes of the subscribers, a call to the queue of its server.
 
 from __future__ import annotations
 
-import logging
 import threading
-import time
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
-from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import Backend, PublisherSpec, SubscriberSpec
+from nep.backends.bases.inbox import Inboxes, InboxSubscriber
+from nep.backends.bases.publisher import BasePublisher
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
-from nep.backends.waking import WakingSubscriber
+from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.messages.message import Message, message_kind, received_message
-from nep.messages.queue import Inbox
 from nep.protocol import requests
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     NodeRecord,
-    PublisherCount,
     PublisherRecord,
     SubscriberCount,
     SubscriberRecord,
@@ -38,15 +34,6 @@ from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import extension_part
 from nep.system import forks
 from nep.system.cpu import CpuLoad
-
-_logger = logging.getLogger("nep")
-
-_BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
-
-The inbox and a batch together thus stay within the subscriber's `max_bytes`.
-"""
-_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 class _Hub(ServiceHub):
@@ -99,22 +86,18 @@ def _get_hub(configuration: Configuration) -> _Hub:
         return _hubs.setdefault(configuration.master, _Hub())
 
 
-class MemoryPublisher:
+class MemoryPublisher(BasePublisher):
     """Publisher that appends each message to the inboxes of the topic's subscribers."""
 
     def __init__(self, transport: MemoryTransport, hub: _Hub, spec: PublisherSpec) -> None:
+        super().__init__(spec, hub.lock)
+        self.missing: tuple[str, ...] = ()
         self._transport = transport
         self.hub = hub
-        self.spec = spec
-        self.count = 0
-        self.bytes = 0
         self._kind = message_kind(
             spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched, clock=OWN_CLOCK
         )
-        self.last_stamp_ns: int | None = None
-        self.problem = ""
         self.history: History[Message] = History(spec.history)
-        self.missing: tuple[str, ...] = ()
         self.is_closed = False
 
     @property
@@ -127,26 +110,6 @@ class MemoryPublisher:
         """True if the topic has subscribers."""
         return self.subscribers > 0
 
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because messages stay in the memory of the process."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self.hub.lock:
-            self.count += 1
-            self.last_stamp_ns = time.time_ns()
-
-    def counts(self) -> PublisherCount:
-        """Return the statistics that a renewal reports."""
-        return PublisherCount(
-            self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
-        )
-
-    def report(self, problem: str) -> None:
-        """Set the reason why payloads can't be encoded, which the graph shows as an alert; "" clears it."""
-        self.problem = problem
-
     def send(self, encoded: Encoded) -> None:
         """Append a message to the inboxes. Mutable data is copied.
 
@@ -156,10 +119,9 @@ class MemoryPublisher:
             extension_part(encoded.extension)
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         with self.hub.lock:
-            self.skip()
-            self.bytes += len(data)
+            stamp_ns = self._count_locked(len(data))
             message = received_message(
-                self._kind, data, self.last_stamp_ns, self.count, self.spec.id, encoded.extension or {}
+                self._kind, data, stamp_ns, self.count, self.spec.id, encoded.extension or {}
             )
             self.history.add(message, len(data))
             for subscriber in self.hub.subscribers_of(self.spec.topic):
@@ -178,65 +140,32 @@ class MemoryPublisher:
                 self.hub.apply(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))
 
 
-class MemorySubscriber(WakingSubscriber):
-    """Subscriber with an inbox or a sink."""
+class MemorySubscriber(InboxSubscriber):
+    """Subscriber to whose inbox publishers append their messages."""
 
-    def __init__(self, transport: MemoryTransport, hub: _Hub, spec: SubscriberSpec) -> None:
-        super().__init__(transport.changed)
+    def __init__(self, transport: MemoryTransport, hub: _Hub, spec: SubscriberSpec, inboxes: Inboxes) -> None:
+        super().__init__(spec, inboxes)
         self._transport = transport
         self.hub = hub
-        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
-        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
-        self.ready: deque[Message] = deque()
-        self.spec = spec
         self.received = self.lost = self.refused = 0
-        self.problem = ""
-        self.is_closed = False
 
     def enqueue(self, message: Message) -> None:
         """Append a message to the inbox. Called by publishers."""
-        with self._transport.changed:
-            if self.is_closed:
-                return
-            dropped = self.inbox.put(message)
-            self.received += 1 - dropped
-            self.lost += dropped
-            self.notify_waiting()
+        with self._changed:
+            if not self.is_closed:
+                dropped = self._put_locked(message)
+                self.received += 1 - dropped
+                self.lost += dropped
 
-    @property
-    def has_input(self) -> bool:
-        """True if input is available or the subscriber is closed."""
-        return self.is_closed or len(self.inbox) > 0
-
-    def poll(self) -> Message | None:
-        """Return the next message, or None."""
-        with self._transport.changed:
-            return None if self.is_closed else self.inbox.pop()
-
-    def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier."""
-        self._transport.wait((self,), timeout_s)
-        return self.poll()
-
-    def take_batch(self) -> list[Message]:
-        """Remove and return the messages for one call of the sink."""
-        with self._transport.changed:
-            return self.inbox.pop_all(_BATCH_BYTES)
-
-    def report(self, problem: str) -> None:
-        """Set the reason why messages can't be decoded, which the graph shows as an alert; "" clears it."""
-        self.problem = problem
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True
+    def counts(self) -> SubscriberCount:
+        """Return the statistics that a renewal reports."""
+        return SubscriberCount(self.spec.id, self.received, self.lost, self.problem)
 
     def close(self) -> None:
         """Unregister the subscriber and discard its unread messages."""
+        if not self._close_inbox():
+            return
         with self.hub.lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
             self.hub.patterns = tuple(each for each in self.hub.patterns if each is not self)
             subscribers = self.hub.subscribers.pop(self.spec.topic, ())
             remaining = tuple(each for each in subscribers if each is not self)
@@ -244,10 +173,6 @@ class MemorySubscriber(WakingSubscriber):
                 self.hub.subscribers[self.spec.topic] = remaining
             self._transport.discard(self)
             self.hub.apply(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
-        self._transport.wake()
-        with self._changed:
-            self.inbox.pop_all()
-            self.notify_waiting()
 
 
 class MemoryTransport:
@@ -255,13 +180,12 @@ class MemoryTransport:
 
     def __init__(self, node: NodeRecord) -> None:
         self.node = node
-        self.changed = threading.Condition()
-        self._wake_count = 0
+        self._inboxes = Inboxes(node.name)
+        self.wait = self._inboxes.wait
+        self.wake = self._inboxes.wake
         self._load = CpuLoad()
         self._publishers: tuple[MemoryPublisher, ...] = ()
         self._subscribers: tuple[MemorySubscriber, ...] = ()
-        self._sinks: list[MemorySubscriber] = []
-        self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._services = MemoryServices(node, self._joined_hub)
 
@@ -288,7 +212,7 @@ class MemoryTransport:
         with self._joined_hub(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
             hub.apply(requests.AddSubscriber(self.node, record))
-            subscriber = MemorySubscriber(self, hub, spec)
+            subscriber = MemorySubscriber(self, hub, spec, self._inboxes)
             for topic, publishers in hub.publishers.items():
                 if topic == spec.topic or (spec.is_pattern and matches(spec.topic, topic)):
                     for message in (each for publisher in publishers for each in publisher.history):
@@ -299,15 +223,13 @@ class MemoryTransport:
                 hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
             self._subscribers = (*self._subscribers, subscriber)
         if spec.sink is not None:
-            self._add_sink(subscriber)
+            self._inboxes.add_sink(subscriber)
         return subscriber
 
     def discard(self, closed: MemoryPublisher | MemorySubscriber) -> None:
         """Remove a closed publisher or subscriber. Call with the hub's lock held."""
         self._publishers = tuple(each for each in self._publishers if each is not closed)
         self._subscribers = tuple(each for each in self._subscribers if each is not closed)
-        with self.changed:
-            self._sinks = [each for each in self._sinks if each is not closed]
 
     def create_server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server."""
@@ -318,31 +240,6 @@ class MemoryTransport:
         return self._services.create_client(spec)
 
     create_surveyor = create_client
-
-    def wait(
-        self,
-        subscribers: Sequence[SubscriberTransport],
-        timeout_s: float,
-        calls: Sequence[CallQueue] = (),
-    ) -> None:
-        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
-        own_subscribers = [each for each in subscribers if isinstance(each, MemorySubscriber)]
-        before = self._wake_count
-        with wake_on_call(calls, self.wake) as is_empty:
-            if is_empty:
-                with self.changed:
-                    self.changed.wait_for(
-                        lambda: (
-                            self._wake_count != before or any(len(each.inbox) for each in own_subscribers)
-                        ),
-                        timeout_s,
-                    )
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-        with self.changed:
-            self._wake_count += 1
-            self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
         """Return the current graph."""
@@ -361,10 +258,7 @@ class MemoryTransport:
             hub.graph.revision,
             (*(each.counts() for each in publishers), *self._services.server_counts(hub)),
             (
-                *(
-                    SubscriberCount(each.spec.id, each.received, each.lost, each.problem)
-                    for each in subscribers
-                ),
+                *(each.counts() for each in subscribers),
                 *self._services.client_counts(hub),
             ),
             self._load.ratio(),
@@ -380,16 +274,13 @@ class MemoryTransport:
         self._services.close(timeout_s)
         for subscriber in self._subscribers:
             subscriber.close()
-        self._sinks = []
         for publisher in self._publishers:
             publisher.close(timeout_s)
         with _hubs_lock:
             hubs = tuple(_hubs.values())
         for hub in hubs:
             hub.remove_node(self.node.id)
-        self.wake()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout_s)
+        self._inboxes.close(timeout_s)
 
     @contextmanager
     def _joined_hub(self, configuration: Configuration) -> Iterator[_Hub]:
@@ -400,26 +291,6 @@ class MemoryTransport:
                 raise ClosedError(f"node '{self.node.name}'")
             hub.transports[self.node.id] = self
             yield hub
-
-    def _add_sink(self, subscriber: MemorySubscriber) -> None:
-        with self.changed:  # a concurrent close finds either no thread or a started one
-            self._sinks = [*self._sinks, subscriber]
-            if self._thread is None and not self._closing.is_set():
-                name = f"nep-sinks-{self.node.name}"
-                self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-                self._thread.start()
-
-    def _run(self) -> None:
-        while not self._closing.is_set():
-            self.wait(self._sinks, 0.1)
-            for subscriber in self._sinks:
-                messages = subscriber.take_batch()
-                if messages and subscriber.spec.sink is not None:
-                    try:
-                        subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sink thread continues with the next batch
-                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_INTERVAL_S)
 
 
 def _master_name(master: str | None) -> str:

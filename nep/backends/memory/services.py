@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
 import threading
@@ -11,22 +10,21 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
+from nep.backends.bases.deadlines import Deadlines
+from nep.backends.bases.open_services import OpenServices
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.connection import Configuration
-from nep.backends.deadlines import Deadlines
 from nep.backends.services import (
     CallQueue,
     ClientSpec,
     IncomingCall,
     OpenCall,
-    Outcome,
     ServerSpec,
     ServerStats,
-    check_call_limits,
     limit_reply_size,
     rejection_reply,
 )
-from nep.errors import ClosedError, NoServerError, RequestRefusedError, ServerGoneError, ServiceTimeoutError
-from nep.i18n import _
+from nep.errors import RequestRefusedError, ServerGoneError
 from nep.masters.graph import Graph
 from nep.protocol import requests
 from nep.protocol.requests import (
@@ -39,8 +37,6 @@ from nep.protocol.requests import (
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
-
-OutcomeCallback = Callable[[Outcome], None]
 
 
 class ServiceHub:
@@ -61,29 +57,19 @@ class ServiceHub:
 
 
 @dataclass(eq=False)
-class _Call:
+class _Call(PendingCall):
     # Call in flight. `server` is None until one is available.
-    number: int
-    client: MemoryClient
-    data: bytes
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
     server: MemoryServer | None = None
-
-    def run_callback(self, outcome: Outcome) -> None:
-        # Call without locks.
-        try:
-            self.callback(outcome)
-        except Exception:  # a failing callback must not affect other calls
-            _logger.exception("result callback for '%s' raised", self.client.spec.service)
 
 
 class MemoryServer:
     """Server with a call queue."""
 
-    def __init__(self, node_id: str, hub: ServiceHub, spec: ServerSpec) -> None:
+    def __init__(
+        self, node_id: str, hub: ServiceHub, spec: ServerSpec, on_close: Callable[[MemoryServer], None]
+    ) -> None:
         self._node_id = node_id
+        self._on_close = on_close
         self.hub = hub
         self.spec = spec
         self.calls = CallQueue()
@@ -91,29 +77,22 @@ class MemoryServer:
         self.endpoints = ("memory",)
         self.is_closed = False
 
-    def enqueue(self, call: _Call) -> None:
+    def enqueue(self, call: _Call, client: MemoryClient) -> None:
         """Queue a call, or reject it if the queue is full or closed. Call with the hub's lock held."""
-        call.server = self
+        call.server, call.is_sent = self, True
         incoming = IncomingCall(
             call.data,
-            call.client.spec.codec.number,
+            client.spec.codec.number,
             None if call.deadline == math.inf else call.deadline,
-            lambda reply: self._reply(call, reply),
+            lambda reply: self._reply(call, client, reply),
         )
         if not self.calls.put(incoming):
             incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _reply(self, call: _Call, reply: Reply) -> bool:
+    def _reply(self, call: _Call, client: MemoryClient, reply: Reply) -> bool:
         reply = limit_reply_size(reply)
         self.stats.add(reply)
-        with self.hub.lock:
-            is_pending = call.client.remove_locked(call)
-            call.client.replied += is_pending
-            call.client.late += not is_pending
-        if is_pending:
-            data = reply.data if isinstance(reply.data, bytes) else bytes(reply.data)
-            call.run_callback(reply._replace(data=data))
-        return is_pending
+        return client.handle_reply(call, reply._replace(data=bytes(reply.data)))
 
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports."""
@@ -140,16 +119,10 @@ class MemoryServer:
         self.begin_close()
         with self.hub.lock:
             self.is_closed = True
-            in_flight = [
-                call
-                for client in self.hub.clients.get(self.spec.service, ())
-                for call in client.calls
-                if call.server is self and client.remove_locked(call)
-            ]
-            for call in in_flight:
-                call.client.failed += 1
-        for call in in_flight:
-            call.run_callback(ServerGoneError(self.spec.service))
+            clients = self.hub.clients.get(self.spec.service, ())
+        for client in clients:
+            client.handle_server_closed(self)
+        self._on_close(self)
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process."""
@@ -157,29 +130,27 @@ class MemoryServer:
         self.calls.forked()
 
 
-class MemoryClient:
-    """Client with its calls in flight. The hub's lock guards its statistics."""
+class MemoryClient(PendingCalls[_Call]):
+    """Client with its calls in flight, which the hub's lock guards."""
 
-    def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: Deadlines) -> None:
+    def __init__(
+        self,
+        node_id: str,
+        hub: ServiceHub,
+        spec: ClientSpec,
+        deadlines: Deadlines,
+        on_close: Callable[[MemoryClient], None],
+    ) -> None:
+        super().__init__(spec, _Call, hub.lock)
+        self._on_close = on_close
         self._node_id = node_id
         self._deadlines = deadlines
         self.hub = hub
-        self.spec = spec
-        self.replied = self.failed = self.late = 0
-        self.is_closed = False
-        self._calls: dict[int, _Call] = {}
-        self._bytes = 0
-        self._numbers = itertools.count(1)
 
     @property
     def is_connected(self) -> bool:
         """True if the service has a server."""
         return not self.is_closed and self.spec.service in self.hub.servers
-
-    @property
-    def calls(self) -> list[_Call]:
-        """Calls in flight. Call with the hub's lock held."""
-        return list(self._calls.values())
 
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
@@ -194,19 +165,12 @@ class MemoryClient:
         callback: OutcomeCallback,
         server: MemoryServer | None,
     ) -> OpenCall:
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        request = data if isinstance(data, bytes) else bytes(data)
         with self.hub.lock:
-            if self.is_closed:
-                raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(request))
-            call = _Call(next(self._numbers), self, request, timeout_s, deadline, callback)
-            self._calls[call.number] = call
-            self._bytes += len(request)
+            call = self._add_locked(bytes(data), timeout_s, callback)
             server = server or next(iter(self.hub.servers.get(self.spec.service, ())), None)
             if server is not None:
-                server.enqueue(call)
-        self._deadlines.add(deadline)
+                server.enqueue(call, self)
+        self._deadlines.add(call.deadline)
         return call
 
     @property
@@ -227,75 +191,48 @@ class MemoryClient:
         for call in calls:
             self.cancel(call)
 
-    def remove_locked(self, call: _Call) -> bool:
-        """Remove a call from the calls in flight; return False if it has already ended.
-
-        Call with the hub's lock held.
-        """
-        if self._calls.pop(call.number, None) is None:
-            return False
-        self._bytes -= len(call.data)
-        return True
-
-    def cancel(self, call: OpenCall) -> None:
-        """Cancel a call; its callback isn't called."""
-        with self.hub.lock:
-            existing = self._calls.get(call.number)
-            if existing is not None:
-                self.remove_locked(existing)
-
     def send_waiting_calls(self, server: MemoryServer) -> None:
         """Send the calls that are waiting for a server to `server`. Call with the hub's lock held."""
-        for call in self.calls:
+        for call in list(self._calls.values()):
             if call.server is None:
-                server.enqueue(call)
+                server.enqueue(call, self)
 
-    def expire(self, now: float) -> float:
-        """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
+    def handle_reply(self, call: _Call, reply: Reply) -> bool:
+        """Handle a server's reply; return False if the call is no longer in flight."""
+        is_pending = self._finish(call, reply)
         with self.hub.lock:
-            expired = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
-            self.failed += len(expired)
-            next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
-        for call in expired:
-            error_class = NoServerError if call.server is None else ServiceTimeoutError
-            call.run_callback(error_class(self.spec.service, call.timeout_s or 0.0))
-        return next_deadline
+            self.late += not is_pending
+        return is_pending
+
+    def handle_server_closed(self, server: MemoryServer) -> None:
+        """Fail the calls that a closed server hasn't answered."""
+        with self.hub.lock:
+            unanswered = self._fail_locked([each for each in self._calls.values() if each.server is server])
+        for call in unanswered:
+            self._run_callback(call, ServerGoneError(self.spec.service))
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
         with self.hub.lock:
             return tuple(sorted(self.hub.servers))
 
-    def counts(self) -> SubscriberCount:
-        """Return the statistics that a renewal reports."""
-        return SubscriberCount(self.spec.id, self.replied, self.failed)
-
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`."""
+        in_flight = self._begin_close()
+        if in_flight is None:
+            return
         with self.hub.lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
             remaining = tuple(each for each in self.hub.clients[self.spec.service] if each is not self)
             self.hub.clients[self.spec.service] = remaining
             if not remaining:
                 del self.hub.clients[self.spec.service]
             self._deadlines.remove_client(self)
-            in_flight, self._calls = self.calls, {}
+            self._on_close(self)
             self.hub.apply(requests.RemoveSubscriber(self._node_id, self.spec.id))
-        for call in in_flight:
-            call.run_callback(self._closed_error())
-
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process."""
-        self.is_closed = True
-        self._calls = {}
-
-    def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.spec.service))
+        self._fail_closed(in_flight)
 
 
-class MemoryServices:
+class MemoryServices(OpenServices[MemoryServer, MemoryClient]):
     """Servers and clients of one node. Part of `MemoryTransport`.
 
     Args:
@@ -306,11 +243,9 @@ class MemoryServices:
     def __init__(
         self, node: NodeRecord, joined_hub: Callable[[Configuration], AbstractContextManager[ServiceHub]]
     ) -> None:
+        super().__init__(node.name)
         self._node = node
         self._joined_hub = joined_hub
-        self._deadlines = Deadlines(node.name)
-        self._servers: tuple[MemoryServer, ...] = ()
-        self._clients: tuple[MemoryClient, ...] = ()
 
     def create_server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server and send it the calls that are waiting for one."""
@@ -319,9 +254,9 @@ class MemoryServices:
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
             )
             hub.apply(requests.AddPublisher(self._node, record))
-            server = MemoryServer(self._node.id, hub, spec)
+            server = MemoryServer(self._node.id, hub, spec, self.discard)
             hub.servers[spec.service] = (*hub.servers.get(spec.service, ()), server)
-            self._servers = (*(each for each in self._servers if not each.is_closed), server)
+            self.add_server(server)
             for client in hub.clients.get(spec.service, ()):
                 client.send_waiting_calls(server)
         return server
@@ -331,33 +266,20 @@ class MemoryServices:
         with self._joined_hub(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             hub.apply(requests.AddSubscriber(self._node, record))
-            client = MemoryClient(self._node.id, hub, spec, self._deadlines)
+            client = MemoryClient(self._node.id, hub, spec, self.deadlines, self.discard)
             hub.clients[spec.service] = (*hub.clients.get(spec.service, ()), client)
-            self._clients = (*(each for each in self._clients if not each.is_closed), client)
-            self._deadlines.add_client(client)
+            self.add_client(client)
+            self.deadlines.add_client(client)
         return client
 
     def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:
         """Return the statistics of this node's servers at `hub`. Call with the hub's lock held."""
         return [
             each.counts()
-            for each in self._servers
+            for each in self.servers
             if each.hub is hub and each in hub.servers.get(each.spec.service, ())
         ]
 
     def client_counts(self, hub: ServiceHub) -> Iterable[SubscriberCount]:
         """Return the statistics of this node's clients at `hub`. Call with the hub's lock held."""
-        return [each.counts() for each in self._clients if each.hub is hub and not each.is_closed]
-
-    def begin_close(self) -> None:
-        """Reject queued and new calls."""
-        for server in self._servers:
-            server.begin_close()
-
-    def close(self, timeout_s: float) -> None:
-        """Close all servers and clients and stop the timeout thread."""
-        for client in self._clients:
-            client.close()
-        for server in self._servers:
-            server.close(timeout_s)
-        self._deadlines.close(timeout_s)
+        return [each.counts() for each in self.clients if each.hub is hub and not each.is_closed]

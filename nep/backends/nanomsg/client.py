@@ -8,18 +8,19 @@ it.
 from __future__ import annotations
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from nep.backends.deadlines import Deadlines
-from nep.backends.nanomsg.library import load_pynng, prevent_finalization
+from nep.backends.bases.deadlines import Deadlines
+from nep.backends.bases.optional_library import prevent_finalization
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
+from nep.backends.nanomsg.library import load_pynng
 from nep.backends.nanomsg.server import close_context, join_parts, split_parts
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
-from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.backends.services import ClientSpec, OpenCall, Outcome
+from nep.errors import NepError, ServerGoneError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL, Framing
 
@@ -29,26 +30,14 @@ _JOIN_TIMEOUT_S = 2.0
 _MAX_LATE_CALLS = 100
 """Maximum number of timed-out or cancelled calls whose late replies are still received and counted."""
 
-OutcomeCallback = Callable[[Outcome], None]
-
 
 @dataclass(eq=False)
-class _Call:
-    number: int
-    data: bytes | memoryview
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
-    context: Any
-    is_sent: bool = False
-    thread: threading.Thread | None = field(default=None)
-    size: int = 0
-
-    def __post_init__(self) -> None:
-        self.size = len(self.data)
+class _Call(PendingCall):
+    context: Any = None
+    thread: threading.Thread | None = None
 
 
-class NanomsgClient(ClientCalls[_Call]):
+class NanomsgClient(PendingCalls[_Call]):
     """Client on a REQ socket. Implements `ClientTransport`."""
 
     def __init__(
@@ -61,7 +50,7 @@ class NanomsgClient(ClientCalls[_Call]):
     ) -> None:
         if framing is ORIGINAL and spec.codec.number != _JSON_CODEC:
             raise NepError(_("calls without a master use JSON; omit msg_type, or use wire='native'"))
-        super().__init__(spec)
+        super().__init__(spec, _Call)
         self._socket = socket
         self._framing = framing
         self._deadlines = deadlines
@@ -90,20 +79,15 @@ class NanomsgClient(ClientCalls[_Call]):
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
-            if self.is_closed:
-                raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, callback, self._socket.new_context())
+            call = self._add_locked(data, timeout_s, callback)
+            call.context = self._socket.new_context()
             call.thread = threading.Thread(
                 target=self._run, args=(call,), name=f"nep-call-{self.spec.service}", daemon=True
             )
-            self._calls[call.number] = call
-            self._bytes += len(data)
             self._threads.add(call.thread)
             call.thread.start()
-        self._deadlines.add(deadline)
+        self._deadlines.add(call.deadline)
         return call
 
     def _run(self, call: _Call) -> None:
@@ -114,15 +98,14 @@ class NanomsgClient(ClientCalls[_Call]):
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
         close_context(call.context)
         if outcome is not None:
-            self._finish(call, outcome)
+            self._finish_or_count_late(call, outcome)
         with self._lock:
             self._threads.discard(threading.current_thread())
 
     def _send_and_receive(self, call: _Call) -> Outcome | None:
         # Returns None if the context was closed; the call already has its outcome then.
         nng = load_pynng()
-        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
-        parts = self._framing.encode_call(call.number, self.spec.codec.number, remaining_s, call.data)
+        parts = self._framing.encode_call(call.number, self.spec.codec.number, call.remaining_s, call.data)
         try:
             call.context.send(join_parts(self._framing, parts))  # blocks until a server is connected
             call.is_sent, call.data = True, b""  # the context outlives the timeout: release the payload
@@ -137,24 +120,18 @@ class NanomsgClient(ClientCalls[_Call]):
         except WireError as error:
             return error
 
-    def _finish(self, call: _Call, outcome: Outcome) -> None:
+    def _finish_or_count_late(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
-            is_pending = self._remove_locked(call)
-            is_late = self._late_calls.pop(call.number, None) is not None and not isinstance(
-                outcome, NepError
-            )
-            self.late += is_late
-        if is_pending:
-            self._run_callback(call, outcome)
+            is_abandoned = self._late_calls.pop(call.number, None) is not None
+            self.late += is_abandoned and not isinstance(outcome, NepError)
+        self._finish(call, outcome)
 
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            existing = self._calls.get(call.number)
-            if existing is not None:
-                self._remove_locked(existing)
-        if existing is not None:
-            self._abandon(existing)
+            cancelled = self._remove_locked(call.number)
+        if cancelled is not None:
+            self._abandon(cancelled)
 
     def _abandon(self, call: _Call) -> None:
         # Keeps the context of a sent call to count its late reply, within `_MAX_LATE_CALLS`; closes other
@@ -176,16 +153,11 @@ class NanomsgClient(ClientCalls[_Call]):
     def expire(self, now: float) -> float:
         """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
         with self._lock:
-            expired = [
-                each
-                for each in tuple(self._calls.values())
-                if each.deadline <= now and self._remove_locked(each)
-            ]
-            next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
-        for call in expired:
+            expired_calls = self._fail_locked(self._expired_locked(now))
+            next_deadline = self._next_deadline_locked()
+        for call in expired_calls:
             self._abandon(call)
-            error_class = ServiceTimeoutError if call.is_sent else NoServerError
-            self._run_callback(call, error_class(self.spec.service, call.timeout_s or 0.0))
+            self._run_callback(call, self._timeout_error(call))
         return next_deadline
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
@@ -196,20 +168,17 @@ class NanomsgClient(ClientCalls[_Call]):
 
     def close(self) -> None:
         """Close the client; calls in flight fail with `ClosedError`. Idempotent."""
+        in_flight = self._begin_close()
+        if in_flight is None:
+            return
         with self._lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            in_flight, self._calls = list(self._calls.values()), {}
             abandoned_calls, self._late_calls = list(self._late_calls.values()), {}
             threads = tuple(self._threads)
         self._deadlines.remove_client(self)
         self._on_close(self)
-        for call in abandoned_calls:
+        for call in (*abandoned_calls, *in_flight):
             close_context(call.context)
-        for call in in_flight:
-            close_context(call.context)
-            self._run_callback(call, self._closed_error())
+        self._fail_closed(in_flight)
         deadline = time.monotonic() + _JOIN_TIMEOUT_S
         for thread in threads:
             if thread is not threading.current_thread():
@@ -218,8 +187,6 @@ class NanomsgClient(ClientCalls[_Call]):
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process, without touching nng."""
-        self.is_closed = True
-        self._lock = threading.Lock()
         for call in (*self._calls.values(), *self._late_calls.values()):
             prevent_finalization(call.context)
-        self._calls = {}
+        super().forked()

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from typing import Any
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.bases.publisher import BasePublisher
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.library import listen, load_pynng, new_socket, queue_length
 from nep.backends.nanomsg.sub_socket import PollableSub
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
-from nep.backends.zeromq.sockets import RejectionCounter, wait_until
-from nep.backends.zeromq.sub_socket import MessageBuffer
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import ClosedError, NepError, WireError
 from nep.i18n import _
@@ -23,6 +23,7 @@ from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.addresses import resolve_address
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -85,15 +86,15 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
     return f"tcp://{address}"
 
 
-class DirectPublisher:
+class DirectPublisher(BasePublisher):
     """Publisher on a PUB socket. Each connection counts as a subscriber, because nng hides subscriptions."""
 
     def __init__(
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
     ) -> None:
         check_direct(direct)
-        self.spec = spec
-        self.count = 0
+        self._changed = threading.Condition(threading.RLock())
+        super().__init__(spec, self._changed)
         self.missing: tuple[str, ...] = ()
         self._on_close = on_close
         self._generation = direct.generation
@@ -101,10 +102,9 @@ class DirectPublisher:
         self._is_closed = False
         self._has_warned = False
         self._sent_at = 0.0
-        self._changed = threading.Condition(threading.RLock())
         self.fd = -1
         """-1, because the socket receives nothing."""
-        self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec.name))
+        self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec))
         self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
         self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         try:
@@ -140,18 +140,6 @@ class DirectPublisher:
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
-    def report(self, problem: str) -> None:
-        """Ignore the problem, because a direct connection has no graph to report it in."""
-
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because nanomsg has no shared memory."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._changed:
-            self.count += 1
-
     def send(self, encoded: Encoded) -> None:
         """Publish one frame. Drops in full queues can't be detected; a large message is logged once."""
         frame = to_frame(
@@ -160,7 +148,7 @@ class DirectPublisher:
         with self._changed:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count += 1
+            self._count_locked(len(frame))
             should_warn = len(frame) > _MAX_LIBNANOMSG_BYTES and not self._has_warned
             self._has_warned = self._has_warned or should_warn
             self._sent_at = time.monotonic()
@@ -213,7 +201,7 @@ class DirectSubSocket(UnbatchedReader):
         self.problem = ""
         self._spec = spec
         self._codec = codec_for(spec.msg_type).name
-        self._sub = PollableSub(self._codec)
+        self._sub = PollableSub(codec_for(self._codec))
         self.fd = self._sub.fd
         self._sub.socket.subscribe(b"")  # frames of generation B don't start with the topic
         try:
@@ -229,8 +217,8 @@ class DirectSubSocket(UnbatchedReader):
         """True if a message can be read."""
         return self._sub.has_input
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of the topic, or None if there is none. See `Readable.read`."""
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """Return the next message of the topic, or None if there is none. See `UnbatchedReader.read`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)

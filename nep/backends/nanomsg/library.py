@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import ctypes
 import importlib
 import sys
 from collections.abc import Callable
@@ -11,28 +10,24 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakSet
 
-from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
-from nep.errors import AddressInUseError, BackendUnavailableError, NepError
+from nep.backends.bases.optional_library import OptionalLibrary, prevent_finalization
+from nep.errors import AddressInUseError
 from nep.i18n import _
-from nep.system.addresses import host_of
+from nep.messages.codecs import Codec
+from nep.system.addresses import LOOPBACK, ORIGINAL_PORTS, host_of
 from nep.system.descriptors import check_free_descriptors
 from nep.system.exits import call_after_nodes, cancel_after_nodes
 from nep.system.forks import call_in_child
 
 MAX_QUEUE_LENGTH = 8192
 """Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
-_QUEUE_LENGTHS = {"image": 64, "bytes": 1000}
 FDS_PER_SOCKET = 6
 """Number of file descriptors that a socket needs, including its port and a connection."""
 _PORT_ATTEMPTS = 100
 _MODULE_NAME = "pynng.nng"
 _exit_handler: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
-_inherited_libraries: set[str] = set()
-"""Names of libraries that were in use in the parent process before a fork.
-
-They can't be used in the child process, because nng would wait for threads that don't exist there.
-"""
+_library = OptionalLibrary("nanomsg", lambda: _("install it with 'pip install nep-studio[nanomsg]'"))
 
 
 def load_pynng(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not typed
@@ -42,19 +37,7 @@ def load_pynng(load: Callable[[str], ModuleType] = importlib.import_module) -> A
         BackendUnavailableError: pynng is not installed or can't be loaded.
         NepError: The process was forked from one that uses pynng.
     """
-    if _inherited_libraries:
-        raise NepError(
-            _(
-                "'nanomsg' doesn't work in a process forked from a program that uses it; start the process "
-                "with multiprocessing's start method 'spawn'"
-            )
-        )
-    try:
-        pynng = load("pynng")
-    except (ImportError, OSError) as error:
-        raise BackendUnavailableError(
-            "nanomsg", _("install it with 'pip install nep-studio[nanomsg]'")
-        ) from error
+    pynng = _library.load(lambda: load("pynng"))
     _defer_exit_handler()
     return pynng
 
@@ -80,16 +63,11 @@ def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
     return socket
 
 
-def prevent_finalization(instance: Any) -> None:  # noqa: ANN401 - pynng is not typed
-    """Prevent an object from ever being finalized, even at exit."""
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))
-
-
 def _forked() -> None:
     # Closing a socket in a forked child would block forever, even at exit.
     if _MODULE_NAME not in sys.modules:
         return
-    _inherited_libraries.add("pynng")
+    _library.has_forked = True
     for socket in _sockets:
         prevent_finalization(socket)  # the finalizer would close it
     exit_handler = getattr(sys.modules[_MODULE_NAME], "_pynng_atexit", None)
@@ -101,9 +79,9 @@ def _forked() -> None:
 call_in_child(_forked)
 
 
-def queue_length(codec: str) -> int:
+def queue_length(codec: Codec) -> int:
     """Return the queue length per connection in messages for a codec. pynng has no limit in bytes."""
-    return _QUEUE_LENGTHS.get(codec, MAX_QUEUE_LENGTH)
+    return codec.queue_length or MAX_QUEUE_LENGTH
 
 
 def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed

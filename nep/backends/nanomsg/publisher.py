@@ -16,15 +16,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import PublisherSpec
+from nep.backends.bases.publisher import BasePublisher
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.nanomsg.endpoints import format_endpoint, subscriber_topic_part
 from nep.backends.nanomsg.library import bound_port, listen, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import HandshakePublisher
-from nep.backends.zeromq.sockets import LOOPBACK, RejectionCounter, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
-from nep.protocol.requests import PublisherCount
 from nep.protocol.wire import (
     BYE,
     EXTENSION,
@@ -36,6 +36,8 @@ from nep.protocol.wire import (
     parse_hello,
     topic_part,
 )
+from nep.system.addresses import LOOPBACK
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 _MAX_HELLOS = 10_000
@@ -43,7 +45,7 @@ _HELLO_QUEUE_LENGTH = 1000
 _BYE_RETRY_S = 0.05
 
 
-class NanomsgPublisher(HandshakePublisher):
+class NanomsgPublisher(HandshakePublisher, BasePublisher):
     """Publisher with a PUB socket for messages and a PULL socket for hellos.
 
     Never close pynng objects with the lock held: closing waits for callbacks in other threads, which
@@ -58,22 +60,17 @@ class NanomsgPublisher(HandshakePublisher):
     ) -> None:
         nng = load_pynng()
         self._try_again_error = nng.TryAgain
-        self.spec = spec
-        self.count = 0
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
         # the history is sent in one burst
-        send_queue_length = max(queue_length(spec.codec.name), 2 * spec.history)
+        send_queue_length = max(queue_length(spec.codec), 2 * spec.history)
         self._message_socket: Any = new_socket("Pub0", send_buffer_size=send_queue_length)
         self._hello_socket: Any = new_socket(
             "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=MAX_SUBSCRIPTION_BYTES
         )
         self.fd = int(self._hello_socket.recv_fd)
         self._endpoint = ""
-        self._bytes = 0
-        self._last_stamp_ns: int | None = None
-        self._problem = ""
         self._history: History[bytes] = History(spec.history)
         self._topic = topic_part(spec.topic)
         self._is_closed = False
@@ -84,7 +81,9 @@ class NanomsgPublisher(HandshakePublisher):
         """Subscriber id by the address of its connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
         self._rejections = RejectionCounter()
-        super().__init__(threading.Condition(threading.Lock()), {})
+        changed = threading.Condition(threading.Lock())
+        BasePublisher.__init__(self, spec, changed)
+        HandshakePublisher.__init__(self, changed, {})
         self._message_socket.add_post_pipe_connect_cb(self._handle_pipe_added)
         self._message_socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
 
@@ -99,13 +98,6 @@ class NanomsgPublisher(HandshakePublisher):
     def has_subscribers(self) -> bool:
         """True if any subscriber is connected, with or without a hello."""
         return bool(self._pipes)
-
-    def counts(self) -> PublisherCount:
-        """Return the statistics that a renewal reports."""
-        with self._changed:
-            return PublisherCount(
-                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
-            )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - loopback only
         """Listen on the loopback interface on the first call, and return the endpoint.
@@ -128,20 +120,6 @@ class NanomsgPublisher(HandshakePublisher):
 
     # ---- sending
 
-    def report(self, problem: str) -> None:
-        """Set the reason why payloads can't be encoded; the next renewal reports it."""
-        self._problem = problem
-
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because nanomsg has no shared memory."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._changed:
-            self.count += 1
-            self._last_stamp_ns = time.time_ns()
-
     def send(self, encoded: Encoded) -> None:
         """Publish one message.
 
@@ -154,13 +132,9 @@ class NanomsgPublisher(HandshakePublisher):
         with self._changed:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count += 1
-            self._bytes += size
-            self._last_stamp_ns = time.time_ns()
+            stamp_ns = self._count_locked(size)
             size_field = size if size <= MAX_SIZE else 0
-            header = Header(
-                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size_field
-            )
+            header = Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id, size_field)
             tail = b"".join((header.pack(), data, extension))
             self._history.add(tail, size)
             self._message_socket.send(self._topic + tail, block=False)

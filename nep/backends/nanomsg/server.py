@@ -13,7 +13,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.nanomsg.library import load_pynng, prevent_finalization
+from nep.backends.bases.optional_library import prevent_finalization
+from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.nanomsg.library import load_pynng
 from nep.backends.services import (
     CallQueue,
     IncomingCall,
@@ -22,7 +24,6 @@ from nep.backends.services import (
     limit_reply_size,
     rejection_reply,
 )
-from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import WireError
 from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
 

@@ -12,15 +12,16 @@ from typing import Any
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.bases.loss import PublisherTracker
+from nep.backends.bases.message_parser import MessageParser
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.nanomsg.endpoints import parse_endpoint, split_message, subscriber_topic_part
 from nep.backends.nanomsg.library import FDS_PER_SOCKET, load_pynng, new_socket, queue_length
-from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionCounter
-from nep.backends.zeromq.sub_socket import MessageBuffer, MessageParser
+from nep.backends.zeromq.sockets import SHORT_WAIT_S
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
-from nep.messages.codecs import codec_for
+from nep.messages.codecs import Codec, codec_for
 from nep.messages.history import MAX_HISTORY
 from nep.messages.message import Message
 from nep.protocol.requests import RemotePublisher
@@ -34,7 +35,7 @@ _HELLO_QUEUE_LENGTH = 8
 class PollableSub:
     """SUB socket with a file descriptor for polling."""
 
-    def __init__(self, codec: str) -> None:
+    def __init__(self, codec: Codec) -> None:
         nng = load_pynng()
         self._empty_errors = (nng.TryAgain, nng.Timeout, nng.Closed)
         self.socket: Any = new_socket(
@@ -91,7 +92,7 @@ class NanomsgSubSocket(UnbatchedReader):
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
         self.rejections = RejectionCounter()
-        self._sub = PollableSub(codec_for(spec.msg_type).name)
+        self._sub = PollableSub(codec_for(spec.msg_type))
         self.fd = self._sub.fd
         self._topic_name = spec.topic
         self._topic = topic_part(spec.topic)
@@ -204,7 +205,7 @@ class NanomsgSubSocket(UnbatchedReader):
             self._hello_sockets.pop(link.address, None)
             link.close()
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, *, may_wait: bool = False) -> Message | None:
         """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = frame.startswith(self._own_topic)

@@ -12,15 +12,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from nep.backends.bases.optional_library import prevent_finalization
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.direct import attach
-from nep.backends.nanomsg.library import load_pynng, new_socket, prevent_finalization
+from nep.backends.nanomsg.library import load_pynng, new_socket
 from nep.backends.nanomsg.server import close_context, receive
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
-from nep.backends.zeromq.sockets import wait_until
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
+from nep.system.waits import wait_until
 
 _JSON_CODEC = 1
 _MAX_SURVEY_TIMEOUT_MS = 2**31 - 1

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from nep.errors import BackendUnavailableError, NepError
+from nep.backends.bases.optional_library import OptionalLibrary
 from nep.i18n import _
 from nep.system.forks import call_in_child
 
@@ -31,7 +31,9 @@ _MODULE_NAMES = frozenset({
 })  # fmt: skip
 _PACKAGE_SUFFIXES = ("_msgs", "_srvs")
 _DEPRECATED_MODULES = r"(rospy|rosgraph|roslib|rospkg|genpy|genmsg|catkin_pkg)(\..*)?"
-_inherited_libraries: set[str] = set()
+_library = OptionalLibrary(
+    "ros", lambda: _("install it with 'sudo apt install python3-rospy python3-std-msgs python3-sensor-msgs'")
+)
 
 
 class RosFinder(MetaPathFinder):
@@ -70,7 +72,7 @@ def _forked() -> None:
     core = sys.modules.get("rospy.core")
     if core is None or not core.is_initialized():
         return
-    _inherited_libraries.add("rospy")
+    _library.has_forked = True
     exit_handler = getattr(core, "_ros_atexit", None)
     if exit_handler is not None:
         atexit.unregister(exit_handler)  # it would unregister the parent's publishers and subscribers
@@ -91,34 +93,26 @@ def get_rospy() -> Any:  # noqa: ANN401 - not typed
         BackendUnavailableError: rospy is not installed.
         NepError: The process was forked from one that uses rospy.
     """
-    if _inherited_libraries:
-        raise NepError(
-            _(
-                "'ros' doesn't work in a process forked from a program that uses it; start the process "
-                "with multiprocessing's start method 'spawn'"
-            )
-        )
-    return sys.modules.get("rospy") or load_rospy()
+    return load_rospy() if _library.has_forked else sys.modules.get("rospy") or load_rospy()
 
 
 def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> ModuleType:
     """Import rospy and undo the side effects of the import on the program.
 
-    Raises `BackendUnavailableError` if rospy is not installed.
+    Raises the same errors as `get_rospy`.
     """
     if _finder not in sys.meta_path:
         sys.meta_path.append(_finder)
     logger_class = logging.getLoggerClass()
-    try:
+
+    def import_modules() -> ModuleType:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            module = load("rospy")
             load("std_msgs.msg")
-    except ImportError as error:
-        raise BackendUnavailableError(
-            "ros",
-            _("install it with 'sudo apt install python3-rospy python3-std-msgs python3-sensor-msgs'"),
-        ) from error
+            return load("rospy")
+
+    try:
+        module = _library.load(import_modules)
     finally:
         logging.setLoggerClass(logger_class)  # rospy replaces the logger class for the whole program
     warnings.filterwarnings("ignore", category=DeprecationWarning, module=_DEPRECATED_MODULES)

@@ -9,15 +9,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.ros.master import RosMasterUnreachable
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_connection import ServiceConnection
 from nep.backends.ros.service_types import NEP_CALL, ServiceType, installed_service
 from nep.backends.ros.type_mapping import version_error
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
+from nep.backends.services import ClientSpec, OpenCall, Outcome
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
-from nep.protocol.requests import SubscriberCount
 from nep.protocol.service_wire import CallKind, error_reply
 
 _logger = logging.getLogger("nep")
@@ -25,28 +25,17 @@ _REQUEST_TIMEOUT_S = 0.5
 _RETRY_S = 0.1
 _LOOKUP_TIMEOUT_S = 0.2
 
-OutcomeCallback = Callable[[Outcome], None]
-
 
 @dataclass(eq=False)
-class _Call:
-    number: int
-    data: bytes
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
+class _Call(PendingCall):
     connection: ServiceConnection | None = None
 
-    @property
-    def size(self) -> int:
-        return len(self.data)
 
-
-class RosClient(ClientCalls[_Call]):
+class RosClient(PendingCalls[_Call]):
     """Client with its calls in flight."""
 
     def __init__(self, process: RosProcess, spec: ClientSpec, on_close: Callable[[RosClient], None]) -> None:
-        super().__init__(spec)
+        super().__init__(spec, _Call)
         self.process = process
         self.service = process.resolve_name(spec.service)
         self._on_close = on_close
@@ -64,14 +53,8 @@ class RosClient(ClientCalls[_Call]):
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
-            if self.is_closed:
-                raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, callback)
-            self._calls[call.number] = call
-            self._bytes += len(call.data)
+            call = self._add_locked(bytes(data), timeout_s, callback)
             self._queue_for_discovery_locked(call)
         return call
 
@@ -146,15 +129,6 @@ class RosClient(ClientCalls[_Call]):
             if call.number in self._calls:
                 self._queue_for_discovery_locked(call)
 
-    def _finish(self, call: _Call, outcome: Outcome) -> None:
-        is_answered = not isinstance(outcome, NepError)
-        with self._lock:
-            is_pending = self._remove_locked(call)
-            self._answered += is_pending and is_answered
-            self._failed += is_pending and not is_answered
-        if is_pending:
-            self._run_callback(call, outcome)
-
     def _call_server(self, call: _Call, connection: ServiceConnection) -> Outcome:
         service_type = self._type_of(connection)
         with self._lock:
@@ -184,10 +158,9 @@ class RosClient(ClientCalls[_Call]):
     def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            existing = self._calls.get(call.number)
-            if existing is not None:
-                self._remove_locked(existing)
-                self._interrupt_locked(existing)
+            cancelled = self._remove_locked(call.number)
+            if cancelled is not None:
+                self._interrupt_locked(cancelled)
 
     def _interrupt_locked(self, call: _Call) -> None:
         # Ends the call's thread. Call with the lock held.
@@ -201,24 +174,18 @@ class RosClient(ClientCalls[_Call]):
         except RosMasterUnreachable:
             return ()
 
-    def counts(self) -> SubscriberCount:
-        """Return the statistics shown in the graph."""
-        return SubscriberCount(self.spec.id, self._answered, self._failed)
-
     def close(self, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`. Waits up to `timeout_s` seconds."""
+        in_flight = self._begin_close()
+        if in_flight is None:
+            return
         with self._lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            in_flight, self._calls = list(self._calls.values()), {}
             for call in in_flight:
                 self._interrupt_locked(call)
             threads = tuple(self._threads)
         self._closed.set()
         self._on_close(self)
-        for call in in_flight:
-            self._run_callback(call, self._closed_error())
+        self._fail_closed(in_flight)
         deadline = time.monotonic() + timeout_s
         for thread in threads:
             if thread is not threading.current_thread():

@@ -5,43 +5,25 @@ from __future__ import annotations
 import io
 import logging
 import struct
-import threading
-from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.bases.inbox import Inboxes, InboxSubscriber
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.ros.type_mapping import STAMP, Unpacker, installed_definition, is_ros_type, unpacker_for
-from nep.backends.waking import WakingSubscriber
-from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
 from nep.messages.message import NO_EXTENSION, Message, MessageKind, received_message
-from nep.messages.queue import Inbox
 from nep.text import escaped, shortened
 
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
 """Receive buffer size in bytes; rospy's default of 64 KiB is slow for images."""
 _MAX_SOURCES = 1_000
-
-
-class RospyOwner(Protocol):
-    """Interface of the transport to its subscribers."""
-
-    changed: threading.Condition
-
-    def wait(self, subscribers: Any, timeout_s: float) -> None:  # noqa: ANN401 - see `Transport.wait`
-        """Wait up to `timeout_s` seconds for a message in `subscribers`."""
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-
-    def discard(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
-        """Remove a closed publisher or subscriber."""
 
 
 @dataclass
@@ -68,30 +50,38 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
     return stream.getvalue()
 
 
-class RospySubscriber(WakingSubscriber):
-    """Subscriber that accepts messages of any ROS type, so that it can report a wrong type."""
+class RospySubscriber(InboxSubscriber):
+    """Subscriber that accepts messages of any ROS type, so that it can report a wrong type.
 
-    def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
+    Args:
+        process: ROS node of this process.
+        spec: Settings of the subscriber.
+        inboxes: Shared state of the node's inboxes.
+        on_close: Removes the closed subscriber from its transport.
+    """
+
+    def __init__(
+        self,
+        process: RosProcess,
+        spec: SubscriberSpec,
+        inboxes: Inboxes,
+        on_close: Callable[[RospySubscriber], None],
+    ) -> None:
         if is_ros_type(spec.msg_type):
             installed_definition(spec.msg_type)
-        super().__init__(owner.changed)
-        self.spec = spec
+        super().__init__(spec, inboxes)
         self.process = process
         self.topic = process.resolve_name(spec.topic)
-        self.inbox = Inbox(spec.keep, spec.max_messages, max_bytes)
-        self.ready: deque[Message] = deque()
         self.received = 0
         self.lost: int | None = None
         self.rejections = RejectionCounter()
-        self.is_closed = False
-        self._owner = owner
-        self._reader_problem = ""
+        self._on_close = on_close
         self._sources: dict[tuple[str, ...], _Source] = {}
         self._subscriber: Any = None
 
     def subscribe(self) -> None:
         """Subscribe at the ROS master."""
-        with self._owner.changed:
+        with self._changed:
             self.process.subscriber_counts[self.topic] += 1
         self.process.shutdown_callbacks.add(self._on_rospy_shutdown)
         self._subscriber = self.process.rospy.Subscriber(
@@ -106,14 +96,14 @@ class RospySubscriber(WakingSubscriber):
     @property
     def problem(self) -> str:
         """Reason why messages can't be decoded or were rejected in the last seconds; "" if there is none."""
-        return self._reader_problem or self.rejections.recent_message()
+        return super().problem or self.rejections.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
 
     def _receive(self, raw: Any) -> None:  # noqa: ANN401 - rospy is not typed
         header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it
         body = memoryview(_bytes_of(raw))
-        with self._owner.changed:
+        with self._changed:
             if self.is_closed:
                 return
             source = self._source_of(header)
@@ -125,17 +115,16 @@ class RospySubscriber(WakingSubscriber):
             except (WireError, struct.error) as error:
                 self._reject(error.reason if isinstance(error, WireError) else _("the data is truncated"))
                 return
-            dropped = self.inbox.put(message)
+            dropped = self._put_locked(message)
             self.received += 1 - dropped
             if dropped:
                 self.lost = (self.lost or 0) + dropped
-            self.notify_waiting()
 
     def _on_rospy_shutdown(self) -> None:
         # `poll` raises from now on.
-        with self._owner.changed:
+        with self._changed:
             self.notify_waiting()
-        self._owner.wake()
+        self._inboxes.wake()
 
     def _source_of(self, header: Mapping[str, str]) -> _Source:
         key = tuple(header.get(each, "") for each in ("callerid", "type", "md5sum", "latching"))
@@ -200,51 +189,25 @@ class RospySubscriber(WakingSubscriber):
     @property
     def has_input(self) -> bool:
         """True if input is available or the subscriber is closed."""
-        return self.is_closed or self.process.is_shut_down or len(self.inbox) > 0
+        return super().has_input or self.process.is_shut_down
 
     def poll(self) -> Message | None:
         """Return the next message, or None if there is none.
 
         Raises `RosShutdownError` after rospy was shut down.
         """
-        with self._owner.changed:
-            message = None if self.is_closed else self.inbox.pop()
+        message = super().poll()
         if message is None and self.process.is_shut_down and not self.is_closed:
             raise RosShutdownError
         return message
 
-    def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier.
-
-        Raises `RosShutdownError` after rospy was shut down.
-        """
-        self._owner.wait((self,), timeout_s)
-        return self.poll()
-
-    def take_batch(self, max_bytes: int) -> list[Message]:
-        """Remove and return up to `max_bytes` of messages for one call of the sink."""
-        with self._owner.changed:
-            return self.inbox.pop_all(max_bytes)
-
-    def report(self, problem: str) -> None:
-        """Set the reason why messages can't be decoded, shown in the graph of this process."""
-        self._reader_problem = problem
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True
-
     def close(self, timeout_s: float = 2.0) -> None:
         """Unregister within `timeout_s` seconds and discard unread messages."""
-        with self._owner.changed:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            self.inbox.pop_all()
-            self.notify_waiting()
+        if not self._close_inbox():
+            return
+        with self._changed:
             self.process.subscriber_counts[self.topic] -= 1
         self.process.shutdown_callbacks.discard(self._on_rospy_shutdown)
-        self._owner.discard(self)
+        self._on_close(self)
         if self._subscriber is not None:
             self.process.unsubscribe(self._subscriber, timeout_s)
-        self._owner.wake()

@@ -8,7 +8,13 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+from msgspec.structs import replace
+
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.bases.inbox import Inboxes
+from nep.backends.bases.open_services import OpenServices
+from nep.backends.bases.publisher import BasePublisher
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.ros.graph import LocalRosNode, graph_view
 from nep.backends.ros.library import get_rospy
@@ -19,8 +25,7 @@ from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
 from nep.backends.ros.type_mapping import installed_definition, ros_type_of, to_ros_body
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
-from nep.backends.zeromq.sockets import RejectionCounter
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
@@ -28,15 +33,8 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
 
 _logger = logging.getLogger("nep")
-_QUEUE_LENGTHS = {"image": 64, "bytes": 1000, "ros": 1000}
 _DEFAULT_QUEUE_LENGTH = 10_000
 """Queue length per connection in messages. A full queue silently drops its oldest message."""
-_BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
-
-The inbox and a batch together thus stay within the subscriber's `max_bytes`.
-"""
-_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 def _master_address(configuration: Configuration) -> str:
@@ -45,7 +43,7 @@ def _master_address(configuration: Configuration) -> str:
     return configuration.master
 
 
-class RospyPublisher:
+class RospyPublisher(BasePublisher):
     """Publisher over rospy.
 
     `count` counts the messages of this publisher. seq in a ROS header counts all messages that the process
@@ -53,20 +51,15 @@ class RospyPublisher:
     """
 
     def __init__(self, transport: RospyTransport, process: RosProcess, spec: PublisherSpec) -> None:
-        self.spec = spec
-        self.count = 0
-        self.bytes = 0
-        self.last_stamp_ns: int | None = None
-        self.problem = ""
+        super().__init__(spec, threading.RLock())
         self.process = process
         self._transport = transport
         self._definition = installed_definition(ros_type_of(spec.msg_type))
         self.topic = process.resolve_name(spec.topic)
-        self._lock = threading.RLock()
         self._is_closed = False
         self._queue_limit = QueueLimit()
         self._drops = RejectionCounter()
-        queue_length = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
+        queue_length = spec.codec.queue_length or _DEFAULT_QUEUE_LENGTH
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue_length=queue_length
         )
@@ -106,34 +99,18 @@ class RospyPublisher:
         connected_nodes = self.process.connected_nodes(self._publisher)
         return tuple(each.lstrip("/") for each in registered_names if each not in connected_nodes)
 
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because rospy has no shared memory."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._lock:
-            self.count += 1
-            self.last_stamp_ns = time.time_ns()
-
-    def report(self, problem: str) -> None:
-        """Set the reason why payloads can't be encoded, shown in the graph of this process."""
-        self.problem = problem
-
     def send(self, encoded: Encoded) -> None:
         """Add a message to the queue of each connection. Full queues drop their oldest messages.
 
         Raises `ClosedError`, and the same errors as `to_ros_body`.
         """
         body = to_ros_body(self._definition.name, self.spec.codec.name, encoded)
-        with self._lock:
+        with self._stats_lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             if self.process.is_shut_down:
                 raise RosShutdownError
-            self.count += 1
-            self.bytes += len(body)
-            self.last_stamp_ns = time.time_ns()
+            self._count_locked(len(body))
             dropped = self.process.send(
                 self._publisher, self._definition, self.topic, body, self._queue_limit
             )
@@ -149,13 +126,13 @@ class RospyPublisher:
 
     def counts(self) -> PublisherCount:
         """Return the statistics shown in the graph."""
-        problem = self.problem or self._drops.recent_message()
-        return PublisherCount(self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, problem)
+        counts = super().counts()
+        return replace(counts, problem=counts.problem or self._drops.recent_message())
 
     def close(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds until rospy has sent its queues, then unregister."""
         deadline = time.monotonic() + timeout_s
-        with self._lock:
+        with self._stats_lock:
             if self._is_closed:
                 return
             self._is_closed = True
@@ -175,16 +152,13 @@ class RospyTransport:
     def __init__(self, node: NodeRecord) -> None:
         get_rospy()
         self.node = node
-        self.changed = threading.Condition()
-        self._wake_count = 0
+        self._inboxes = Inboxes(node.name)
+        self.wake = self._inboxes.wake
         self._publishers: tuple[RospyPublisher, ...] = ()
         self._subscribers: tuple[RospySubscriber, ...] = ()
-        self._servers: tuple[RosServer, ...] = ()
-        self._clients: tuple[RosClient, ...] = ()
+        self._services: OpenServices[RosServer, RosClient] = OpenServices(node.name)
         self._lock = threading.RLock()
         self._is_closed = False
-        self._thread: threading.Thread | None = None
-        self._closing = threading.Event()
         _transports.add(self)
 
     def create_publisher(self, spec: PublisherSpec) -> RospyPublisher:
@@ -204,8 +178,7 @@ class RospyTransport:
     def create_subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
         """Create a subscriber; wait up to `HANDSHAKE_TIMEOUT_S` for registered publishers to connect."""
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
-        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
-        subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch_bytes)
+        subscriber = RospySubscriber(process, spec, self._inboxes, self.discard)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
         try:
@@ -213,7 +186,7 @@ class RospyTransport:
             self._check_open()
             process.wait_for_publishers(subscriber.topic, HANDSHAKE_TIMEOUT_S)
             if spec.sink is not None:
-                self._start_sink_thread()
+                self._inboxes.add_sink(subscriber)
         except BaseException:
             subscriber.close()
             raise
@@ -223,11 +196,9 @@ class RospyTransport:
         if self._is_closed:
             raise ClosedError(f"node '{self.node.name}'")
 
-    def discard(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
-        """Remove a closed publisher, subscriber, server or client."""
+    def discard(self, closed: RospyPublisher | RospySubscriber) -> None:
+        """Remove a closed publisher or subscriber."""
         with self._lock:
-            self._servers = tuple(each for each in self._servers if each is not closed)
-            self._clients = tuple(each for each in self._clients if each is not closed)
             self._publishers = tuple(each for each in self._publishers if each is not closed)
             self._subscribers = tuple(each for each in self._subscribers if each is not closed)
 
@@ -239,25 +210,24 @@ class RospyTransport:
         Raises the same errors as `create_publisher`, and `NepError` for a type that isn't installed.
         """
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
-        server = RosServer(process, spec, self.discard)
-        with self._lock:
-            self._servers = (*self._servers, server)
-        self._close_if_closed(server)
+        server = RosServer(process, spec, self._services.discard)
+        try:
+            self._services.add_server(server)
+        except ClosedError:
+            server.close(0.0)
+            raise
         return server
 
     def create_client(self, spec: ClientSpec) -> RosClient:
         """Create a client."""
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
-        client = RosClient(process, spec, self.discard)
-        with self._lock:
-            self._clients = (*self._clients, client)
-        self._close_if_closed(client)
+        client = RosClient(process, spec, self._services.discard)
+        try:
+            self._services.add_client(client)
+        except ClosedError:
+            client.close(0.0)
+            raise
         return client
-
-    def _close_if_closed(self, owner: RosServer | RosClient) -> None:
-        if self._is_closed:
-            owner.close(0.0)
-            self._check_open()
 
     def wait(
         self,
@@ -269,24 +239,9 @@ class RospyTransport:
 
         Raises `RosShutdownError` if the node has servers and rospy was shut down.
         """
-        own_subscribers = [each for each in subscribers if isinstance(each, RospySubscriber)]
-        before = self._wake_count
-        with wake_on_call(calls, self.wake) as is_empty:
-            if not is_empty:
-                return
-            with self.changed:
-                self.changed.wait_for(
-                    lambda: self._wake_count != before or any(len(each.inbox) for each in own_subscribers),
-                    timeout_s,
-                )
-        if any(each.process.is_shut_down for each in self._servers):
+        self._inboxes.wait(subscribers, timeout_s, calls)
+        if any(each.process.is_shut_down for each in self._services.servers):
             raise RosShutdownError
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-        with self.changed:
-            self._wake_count += 1
-            self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the graph of the ROS network.
@@ -309,8 +264,8 @@ class RospyTransport:
         subscribers: list[RospySubscriber] = [
             each for each in self._subscribers if each.process.master.address == address
         ]
-        servers = [each for each in self._servers if each.process.master.address == address]
-        clients = [each for each in self._clients if each.process.master.address == address]
+        servers = [each for each in self._services.servers if each.process.master.address == address]
+        clients = [each for each in self._services.clients if each.process.master.address == address]
         names = [each.process.name for part in (publishers, subscribers, servers, clients) for each in part]
         return LocalRosNode(
             self.node,
@@ -330,49 +285,20 @@ class RospyTransport:
 
     def begin_close(self) -> None:
         """Reject queued calls. `close` flushes the messages."""
-        for server in self._servers:
-            server.begin_close()
+        self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:
         """Unregister everything and join the threads. The process's ROS node stays running."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._is_closed = True
-        self._closing.set()
-        for client in self._clients:
-            client.close(max(0.0, deadline - time.monotonic()))
-        for server in self._servers:
-            server.close(max(0.0, deadline - time.monotonic()))
+        self._services.close(max(0.0, deadline - time.monotonic()))
         for subscriber in self._subscribers:
             subscriber.close(deadline - time.monotonic())
         for publisher in self._publishers:
             publisher.close(max(0.0, deadline - time.monotonic()))
         _transports.discard(self)
-        self.wake()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout_s)
-
-    # ---- sinks
-
-    def _start_sink_thread(self) -> None:
-        with self._lock:
-            if self._thread is None:
-                name = f"nep-sinks-{self.node.name}"
-                self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-                self._thread.start()
-
-    def _run(self) -> None:
-        while not self._closing.is_set():
-            sinks = [each for each in self._subscribers if each.spec.sink is not None]
-            self.wait(sinks, 0.1)
-            for subscriber in sinks:
-                messages = subscriber.take_batch(_BATCH_BYTES)
-                if messages and subscriber.spec.sink is not None:
-                    try:
-                        subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sink thread continues
-                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_INTERVAL_S)
+        self._inboxes.close(timeout_s)
 
 
 _transports: set[RospyTransport] = set()

@@ -131,7 +131,7 @@ def ros_codec(definition: Definition) -> Codec:
     def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
         return definition.decode(data)
 
-    return Codec("ros", _CODEC_NUMBER, encode, decode, dict, definition.check)
+    return Codec("ros", _CODEC_NUMBER, encode, decode, dict, definition.check, queue_length=1000)
 
 
 def _with_stamp(payload: object) -> object:

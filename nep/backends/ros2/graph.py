@@ -134,8 +134,8 @@ def _add_local(graph: Graph, local_node: LocalNode, names: _NameCache) -> None:
     for subscriber_record in (*(each.record for each in subscribers), *(each.record for each in clients)):
         graph.apply(AddSubscriber(node, subscriber_record), 0, 0.0, node.id)
     counts = (
-        (*(each.counts for each in publishers), *(each.counts for each in servers)),
-        (*(each.counts for each in subscribers), *(each.counts for each in clients)),
+        (*(each.counts() for each in publishers), *(each.counts() for each in servers)),
+        (*(each.counts() for each in subscribers), *(each.counts() for each in clients)),
     )
     graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local_node.load()), 0, 0.0, node.id)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from nep.errors import BackendUnavailableError, NepError
+from nep.backends.bases.optional_library import OptionalLibrary
 from nep.i18n import _
 from nep.system.forks import call_in_child
 
@@ -21,11 +21,6 @@ _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _FD_FOLDER = "/proc/self/fd"
 _FIRST_PORT, _PORTS_PER_DOMAIN = 7400, 250
 """Base port of domain 0, and number of ports per domain, as the DDS wire protocol (RTPS) specifies."""
-_inherited_libraries: set[str] = set()
-"""Names of libraries that were in use in the parent process before a fork.
-
-They can't be used in the child process, because their threads don't exist there.
-"""
 
 
 class Dds(NamedTuple):
@@ -41,6 +36,18 @@ class Dds(NamedTuple):
     builtin: Any
 
 
+def _install_hint() -> str:
+    if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
+        return _(
+            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on this computer and "
+            "install 'rosbags'"
+        ).format(machine=platform.machine())
+    return _("install it with 'pip install nep-studio[ros2]'")
+
+
+_library = OptionalLibrary("ros2", _install_hint)
+
+
 def load_dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
     """Load and return the modules of Cyclone DDS.
 
@@ -48,35 +55,12 @@ def load_dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds
         BackendUnavailableError: cyclonedds is not installed or can't be loaded.
         NepError: The process was forked from one that uses cyclonedds.
     """
-    if _inherited_libraries:
-        raise NepError(
-            _(
-                "'ros2' doesn't work in a process forked from a program that uses it; start the process "
-                "with multiprocessing's start method 'spawn'"
-            )
-        )
-    try:
-        return Dds(*(load(f"cyclonedds.{part}") for part in _MODULE_NAMES))
-    except Exception as error:  # its loader raises its own exception class
-        raise _unavailable_error() from error
+    return _library.load(lambda: Dds(*(load(f"cyclonedds.{part}") for part in _MODULE_NAMES)))
 
 
 def load_typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
     """Load and return `rosbags.typesys`. Raises `BackendUnavailableError` if rosbags is not installed."""
-    try:
-        return load("rosbags.typesys")
-    except (ImportError, OSError) as error:
-        raise _unavailable_error() from error
-
-
-def _unavailable_error() -> BackendUnavailableError:
-    if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
-        needs = _(
-            "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on this computer and "
-            "install 'rosbags'"
-        )
-        return BackendUnavailableError("ros2", needs.format(machine=platform.machine()))
-    return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))
+    return _library.load(lambda: load("rosbags.typesys"))
 
 
 def restrict_to_loopback(domain: int) -> None:
@@ -105,7 +89,7 @@ def restrict_to_loopback(domain: int) -> None:
 
 def has_forked() -> bool:
     """Return True in a forked child process, where DDS must not be used."""
-    return bool(_inherited_libraries)
+    return _library.has_forked
 
 
 def _forked() -> None:
@@ -113,7 +97,7 @@ def _forked() -> None:
     core = sys.modules.get("cyclonedds.core")
     if core is None:
         return
-    _inherited_libraries.add("cyclonedds")
+    _library.has_forked = True
     # keeps the finalizers from deleting anything
     for entity in list(core.Entity._entities.values()):  # noqa: SLF001
         if isinstance(entity, core.WaitSet):

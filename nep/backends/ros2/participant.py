@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
 from nep.backends.ros2.environment import MAX_PARTICIPANTS, cyclonedds_config, is_loopback_only
@@ -89,25 +89,45 @@ class DdsEndpoint:
         return self.type == kind and self.user_data.get("typehash", type_hash) == type_hash
 
 
+Spec_co = TypeVar("Spec_co", covariant=True)
+Record_co = TypeVar("Record_co", covariant=True)
+Count_co = TypeVar("Count_co", covariant=True)
+
+
+class LocalEndpoint(Protocol[Spec_co, Record_co, Count_co]):
+    """Interface of a publisher, subscriber, server or client of this process to the graph."""
+
+    @property
+    def spec(self) -> Spec_co:
+        """Settings."""
+
+    @property
+    def record(self) -> Record_co:
+        """Registration record."""
+
+    def counts(self) -> Count_co:
+        """Return the statistics shown in the graph."""
+
+
 class LocalNode(Protocol):
     """Interface of a node of this process to its participant."""
 
     node: NodeRecord
 
     @property
-    def publishers(self) -> Sequence[LocalPublisher]:
+    def publishers(self) -> Sequence[LocalEndpoint[PublisherSpec, PublisherRecord, PublisherCount]]:
         """Open publishers."""
 
     @property
-    def subscribers(self) -> Sequence[LocalSubscriber]:
+    def subscribers(self) -> Sequence[LocalEndpoint[SubscriberSpec, SubscriberRecord, SubscriberCount]]:
         """Open subscribers."""
 
     @property
-    def servers(self) -> Sequence[LocalServer]:
+    def servers(self) -> Sequence[LocalEndpoint[ServerSpec, PublisherRecord, PublisherCount]]:
         """Open servers."""
 
     @property
-    def clients(self) -> Sequence[LocalClient]:
+    def clients(self) -> Sequence[LocalEndpoint[ClientSpec, SubscriberRecord, SubscriberCount]]:
         """Open clients."""
 
     def load(self) -> float | None:
@@ -115,62 +135,6 @@ class LocalNode(Protocol):
 
     def handle_endpoints_changed(self) -> None:
         """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
-
-
-class LocalPublisher(Protocol):
-    """Interface of a publisher of this process to its participant."""
-
-    spec: PublisherSpec
-
-    @property
-    def record(self) -> PublisherRecord:
-        """Registration record of the publisher, for the graph."""
-
-    @property
-    def counts(self) -> PublisherCount:
-        """Statistics shown in the graph."""
-
-
-class LocalSubscriber(Protocol):
-    """Interface of a subscriber of this process to its participant."""
-
-    spec: SubscriberSpec
-
-    @property
-    def record(self) -> SubscriberRecord:
-        """Registration record of the subscriber, for the graph."""
-
-    @property
-    def counts(self) -> SubscriberCount:
-        """Statistics shown in the graph."""
-
-
-class LocalServer(Protocol):
-    """Interface of a server of this process to its participant."""
-
-    spec: ServerSpec
-
-    @property
-    def record(self) -> PublisherRecord:
-        """Registration record of the server, for the graph."""
-
-    @property
-    def counts(self) -> PublisherCount:
-        """Statistics shown in the graph."""
-
-
-class LocalClient(Protocol):
-    """Interface of a client of this process to its participant."""
-
-    spec: ClientSpec
-
-    @property
-    def record(self) -> SubscriberRecord:
-        """Registration record of the client, for the graph."""
-
-    @property
-    def counts(self) -> SubscriberCount:
-        """Statistics shown in the graph."""
 
 
 @dataclass

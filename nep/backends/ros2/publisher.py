@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
+from nep.backends.bases.publisher import BasePublisher
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type, encode_user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant
@@ -18,7 +19,7 @@ from nep.backends.ros2.type_mapping import mapping_for
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
-from nep.protocol.requests import PublisherCount, PublisherRecord
+from nep.protocol.requests import PublisherRecord
 
 _logger = logging.getLogger("nep")
 _PLAIN_TYPE = re.compile(r"[\w./-]{1,100}", re.ASCII)
@@ -70,7 +71,7 @@ def endpoint_user_data(type_hash: str, node_id: str, spec: PublisherSpec | Subsc
     return encode_user_data(entries)
 
 
-class Ros2Publisher:
+class Ros2Publisher(BasePublisher):
     """Publisher over a DDS writer. The constructor raises `BadTopicError` or `NepError`."""
 
     def __init__(
@@ -80,11 +81,7 @@ class Ros2Publisher:
         spec: PublisherSpec,
         on_close: Callable[[Ros2Publisher, float], None],
     ) -> None:
-        self.spec = spec
-        self.count = 0
-        self.problem = ""
-        self._bytes = 0
-        self._last_stamp_ns: int | None = None
+        super().__init__(spec, participant.changed)
         self._participant = participant
         self._node_id = node_id
         self._on_close = on_close
@@ -95,7 +92,7 @@ class Ros2Publisher:
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
         type_hash = participant.types.type_hash(ros_type)
         user_data = endpoint_user_data(type_hash, node_id, spec)
-        depth = queue_depth(spec.qos, spec.codec.name)
+        depth = queue_depth(spec.qos, spec.codec)
         with participant.changed:
             self._sample_class = participant.topics.sample_class(ros_type)
             self._writer: Any = library.pub.DataWriter(
@@ -136,13 +133,6 @@ class Ros2Publisher:
         )
 
     @property
-    def counts(self) -> PublisherCount:
-        """Statistics shown in the graph."""
-        return PublisherCount(
-            self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self.problem
-        )
-
-    @property
     def subscribers(self) -> int:
         """Number of matched subscribers; 0 once closed.
 
@@ -168,20 +158,6 @@ class Ros2Publisher:
         with self._participant.changed:
             return not self._is_closed and bool(self._writer.get_matched_subscriptions())
 
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._participant.changed:
-            self.count += 1
-            self._last_stamp_ns = time.time_ns()
-
-    def report(self, problem: str) -> None:
-        """Set the reason why payloads can't be encoded, shown in the graph of this program."""
-        self.problem = problem
-
-    def borrow_memory(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - no shared memory
-        """Return None, because payloads are copied."""
-        return None
-
     def send(self, encoded: Encoded) -> None:
         """Publish a message. Blocks for up to 0.1 s while the queue of a slow reader is full.
 
@@ -191,9 +167,8 @@ class Ros2Publisher:
         sample = create_sample(self._sample_class, cdr)
         if self._is_closed:
             raise ClosedError(f"publisher '{self.spec.topic}'")
-        self._last_stamp_ns = time.time_ns()
         try:
-            self._writer.write(sample, self._last_stamp_ns)
+            self._writer.write(sample, time.time_ns())
         except self._participant.dds.core.DDSException as error:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'") from error
@@ -206,8 +181,7 @@ class Ros2Publisher:
             if error.code != dds_exception.DDS_RETCODE_TIMEOUT:
                 raise
         with self._participant.changed:
-            self.count += 1
-            self._bytes += len(encoded.data)
+            self._count_locked(len(encoded.data))
 
     def close(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds for acknowledgements and close. Must be called only once."""

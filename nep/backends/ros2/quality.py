@@ -16,7 +16,7 @@ from typing import Any
 
 from nep.backends.ros2.library import Dds
 from nep.backends.ros2.participant import policy_classes
-from nep.backends.ros2.type_mapping import CDR
+from nep.messages.codecs import Codec
 
 QOS_PROFILES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
@@ -25,15 +25,18 @@ _MAX_BLOCKING_NS = 100_000_000
 
 This is the default of DDS.
 """
-_DEPTH_BY_CODEC = {"image": 16, "bytes": 200, CDR: 200}
+_LARGE_MESSAGE_DIVISOR = 4
+"""Divisor of the queue length for codecs of large messages, because DDS queues them at both ends."""
 _DEFAULT_DEPTH = 8192
 """Default queue depth in messages. The default of ROS 2 is 10, which would lose bursts of messages."""
 _UNLIMITED = -1
 
 
-def queue_depth(profile: str, codec: str) -> int:
+def queue_depth(profile: str, codec: Codec) -> int:
     """Return the queue depth in messages for a QoS profile and a codec."""
-    return _SENSOR_DEPTH if profile == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
+    if profile == "sensor":
+        return _SENSOR_DEPTH
+    return codec.queue_length // _LARGE_MESSAGE_DIVISOR if codec.queue_length else _DEFAULT_DEPTH
 
 
 def qos_policies(

@@ -9,30 +9,26 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import threading
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
-from nep.backends.base import SubscriberSpec, SubscriberTransport
+from nep.backends.base import SubscriberSpec
+from nep.backends.bases.inbox import Inboxes, InboxSubscriber
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import endpoint_user_data, wait_for_matches
 from nep.backends.ros2.quality import qos_policies, queue_depth
 from nep.backends.ros2.type_mapping import mapping_for
-from nep.backends.waking import WakingSubscriber
 from nep.errors import WireError
 from nep.messages.history import MAX_HISTORY
 from nep.messages.message import Message, MessageKind, received_message
-from nep.messages.queue import Inbox
-from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
+from nep.protocol.requests import SubscriberCount, SubscriberRecord
 from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
 _BATCH_SIZE = 256
-_MAX_BATCH_BYTES = 64 * 2**20
 _MAX_SOURCES = 4096
 """Maximum number of publishers that are tracked."""
 
@@ -53,22 +49,6 @@ def endpoint_id(gid: bytes, announced_id: str | None) -> int:
     return int.from_bytes(hashlib.sha256(gid).digest()[:8], "little") >> 1 or 1
 
 
-class ReaderOwner(Protocol):
-    """Interface of the transport to its subscribers."""
-
-    node: NodeRecord
-    changed: threading.Condition
-
-    def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait up to `timeout_s` seconds for a message in `subscribers`, or for `wake`."""
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-
-    def discard(self, subscriber: Ros2Subscriber) -> None:
-        """Remove a closed subscriber."""
-
-
 @dataclass
 class _Source:
     # Publisher whose messages were received.
@@ -80,20 +60,30 @@ class _Source:
     """Messages with their time stamps that arrived before the publisher's history and wait for it."""
 
 
-class Ros2Subscriber(WakingSubscriber):
-    """Subscriber over DDS readers. The constructor raises `BadTopicError` or `NepError`."""
+class Ros2Subscriber(InboxSubscriber):
+    """Subscriber over DDS readers. The constructor raises `BadTopicError` or `NepError`.
 
-    def __init__(self, transport: ReaderOwner, participant: Participant, spec: SubscriberSpec) -> None:
-        super().__init__(transport.changed)
-        self.spec = spec
-        self.ready: deque[Message] = deque()
+    Args:
+        participant: Participant of the domain. Its lock is acquired before that of the inboxes.
+        node_id: Id of the node.
+        spec: Settings of the subscriber.
+        inboxes: Shared state of the node's inboxes.
+        on_close: Removes the closed subscriber from its transport.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        node_id: str,
+        spec: SubscriberSpec,
+        inboxes: Inboxes,
+        on_close: Callable[[Ros2Subscriber], None],
+    ) -> None:
+        super().__init__(spec, inboxes)
         self.received = self.refused = 0
-        self.problem = ""
-        self.is_closed = False
-        batch_bytes = 0 if spec.sink is None else _MAX_BATCH_BYTES
-        self.inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
         self._dropped_count = 0
-        self._transport = transport
+        self._node_id = node_id
+        self._on_close = on_close
         self._participant = participant
         self._mapping = mapping_for(spec.msg_type)
         self._type_hash = participant.types.type_hash(self._mapping.ros_type)
@@ -123,8 +113,8 @@ class Ros2Subscriber(WakingSubscriber):
         participant, spec = self._participant, self.spec
         self._has_latched_reader = self._has_latched_reader or is_latched
         library, core = participant.dds, participant.dds.core
-        user_data = endpoint_user_data(self._type_hash, self._transport.node.id, spec)
-        depth = max(queue_depth(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
+        user_data = endpoint_user_data(self._type_hash, self._node_id, spec)
+        depth = max(queue_depth(spec.qos, self._mapping.codec), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,
             participant.topics.topic(self._dds_name, self._mapping.ros_type),
@@ -133,7 +123,7 @@ class Ros2Subscriber(WakingSubscriber):
             ),
         )
         self._readers.append(reader)
-        participant.assign(self._transport.node.id, "reader", reader)
+        participant.assign(self._node_id, "reader", reader)
         condition = core.ReadCondition(
             reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any
         )
@@ -168,7 +158,7 @@ class Ros2Subscriber(WakingSubscriber):
             data = self._mapping.unpack(cdr)
         except WireError as error:
             self.refused += 1
-            self.problem = error.reason
+            self.report(error.reason)
             if is_logged(self.refused):
                 _logger.warning(
                     "malformed message on '%s' (%d so far): %s", self.spec.topic, self.refused, error
@@ -235,36 +225,14 @@ class Ros2Subscriber(WakingSubscriber):
         return source
 
     def _enqueue(self, messages: list[Message]) -> None:
-        with self._transport.changed:
+        with self._changed:
             if self.is_closed:
                 return
-            for message in messages:
-                dropped = self.inbox.put(message)
-                self.received += 1 - dropped
-                self._dropped_count += dropped
-            self.notify_waiting()
+            dropped = self._put_locked(*messages)
+            self.received += len(messages) - dropped
+            self._dropped_count += dropped
 
-    # ---- reading
-
-    @property
-    def has_input(self) -> bool:
-        """True if input is available or the subscriber is closed."""
-        return self.is_closed or len(self.inbox) > 0
-
-    def poll(self) -> Message | None:
-        """Return the next message, or None."""
-        with self._transport.changed:
-            return None if self.is_closed else self.inbox.pop()
-
-    def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier."""
-        self._transport.wait((self,), timeout_s)
-        return self.poll()
-
-    def take_batch(self) -> list[Message]:
-        """Remove and return the messages for one call of the sink."""
-        with self._transport.changed:
-            return self.inbox.pop_all(_MAX_BATCH_BYTES)
+    # ---- statistics
 
     @property
     def lost(self) -> int | None:
@@ -282,9 +250,8 @@ class Ros2Subscriber(WakingSubscriber):
         """Registration record of the subscriber, for the graph."""
         return SubscriberRecord(self.spec.id, self.spec.topic, self.spec.msg_type)
 
-    @property
     def counts(self) -> SubscriberCount:
-        """Statistics shown in the graph."""
+        """Return the statistics shown in the graph."""
         return SubscriberCount(self.spec.id, self.received, self.lost, self.problem)
 
     @property
@@ -293,31 +260,18 @@ class Ros2Subscriber(WakingSubscriber):
         with self._participant.changed:
             return frozenset() if self.is_closed else frozenset(each.guid.bytes for each in self._readers)
 
-    def report(self, problem: str) -> None:
-        """Set the reason why messages can't be decoded, shown in the graph of this program."""
-        self.problem = problem
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True
-
     def close(self) -> None:
         """Close the readers and discard unread messages."""
         if has_forked():
             return
         with self._participant.changed:
-            if self.is_closed:
+            self._lost_before_close += self._lost_in_transit_count()
+            if not self._close_inbox():
                 return
-            self._lost_before_close = self._lost_in_transit_count()
-            self.is_closed = True
             if self._participant.has_closed():
                 self._readers.clear()
             for reader in self._readers:
                 self._participant.unwatch(reader)
-                self._participant.remove_endpoint(self._transport.node.id, "reader", reader)
+                self._participant.remove_endpoint(self._node_id, "reader", reader)
             self._readers.clear()
-        with self._transport.changed:
-            self.inbox.pop_all()
-            self.notify_waiting()
-        self._transport.discard(self)
-        self._transport.wake()
+        self._on_close(self)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
-from nep.backends.base import PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.bases.inbox import Inboxes
+from nep.backends.bases.open_services import OpenServices
 from nep.backends.connection import Configuration, Hybrid
-from nep.backends.deadlines import Deadlines
 from nep.backends.ros2.graph import current_graph
 from nep.backends.ros2.library import has_forked, load_dds, load_typesys
 from nep.backends.ros2.participant import Participant, join_domain, leave_domain
@@ -18,7 +19,7 @@ from nep.backends.ros2.publisher import Ros2Publisher
 from nep.backends.ros2.services.client import Ros2Client
 from nep.backends.ros2.services.server import Ros2Server
 from nep.backends.ros2.subscriber import Ros2Subscriber
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
+from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
@@ -26,7 +27,6 @@ from nep.protocol.requests import NodeRecord
 from nep.system.cpu import CpuLoad
 
 _logger = logging.getLogger("nep")
-_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 class Ros2Transport:
@@ -39,19 +39,15 @@ class Ros2Transport:
         load_dds()
         load_typesys()
         self.node = node
-        self.changed = threading.Condition()
-        """Guards inboxes. Lock order: the participant's lock before this one."""
-        self._wake_count = 0
+        self._inboxes = Inboxes(node.name)
+        self.wait = self._inboxes.wait
+        self.wake = self._inboxes.wake
         self._load = CpuLoad()
         self._participant: Participant | None = None
         self._lock = threading.RLock()
         self._publishers: tuple[Ros2Publisher, ...] = ()
         self._subscribers: tuple[Ros2Subscriber, ...] = ()
-        self._servers: tuple[Ros2Server, ...] = ()
-        self._clients: tuple[Ros2Client, ...] = ()
-        self._deadlines = Deadlines(node.name)
-        self._is_closing = False
-        self._thread: threading.Thread | None = None
+        self._services: OpenServices[Ros2Server, Ros2Client] = OpenServices(node.name)
         self._closing = threading.Event()
 
     def _join_domain(self, configuration: Configuration) -> Participant:
@@ -111,15 +107,14 @@ class Ros2Transport:
         """Create a subscriber; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered writers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
-            subscriber = Ros2Subscriber(self, participant, spec)
+            subscriber = Ros2Subscriber(
+                participant, self.node.id, spec, self._inboxes, self._discard_subscriber
+            )
         with self._lock:
             if not self._closing.is_set():
                 self._subscribers = (*self._subscribers, subscriber)
-                if spec.sink is not None and self._thread is None:
-                    self._thread = threading.Thread(
-                        target=self._run, name=f"nep-sinks-{self.node.name}", daemon=True
-                    )
-                    self._thread.start()
+                if spec.sink is not None:
+                    self._inboxes.add_sink(subscriber)
                 return subscriber
         subscriber.close()
         raise ClosedError(f"node '{self.node.name}'")
@@ -128,68 +123,37 @@ class Ros2Transport:
         """Create a server; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered clients."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
-            server = Ros2Server(participant, self.node.id, spec, self._discard_service)
-        with self._lock:
-            if not self._closing.is_set() and not self._is_closing:
-                self._servers = (*self._servers, server)
-                return server
-        server.close(0.0)
-        raise ClosedError(f"node '{self.node.name}'")
+            server = Ros2Server(participant, self.node.id, spec, self._services.discard)
+        try:
+            self._services.add_server(server)
+        except ClosedError:
+            server.close(0.0)
+            raise
+        return server
 
     def create_client(self, spec: ClientSpec) -> Ros2Client:
         """Create a client; wait up to `HANDSHAKE_TIMEOUT_S` for matches with the discovered servers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
-            client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._discard_service)
-        with self._lock:
-            if not self._closing.is_set() and not self._is_closing:
-                self._clients = (*self._clients, client)
-                self._deadlines.add_client(client)
-                return client
-        client.close()
-        raise ClosedError(f"node '{self.node.name}'")
-
-    def _discard_service(self, closed: Ros2Server | Ros2Client) -> None:
-        with self._lock:
-            self._servers = tuple(each for each in self._servers if each is not closed)
-            self._clients = tuple(each for each in self._clients if each is not closed)
+            client = Ros2Client(
+                participant, self.node.id, spec, self._services.deadlines, self._services.discard
+            )
+        try:
+            self._services.add_client(client)
+            self._services.deadlines.add_client(client)
+        except ClosedError:
+            client.close()
+            raise
+        return client
 
     def _close_publisher(self, publisher: Ros2Publisher, timeout_s: float) -> None:
         publisher.finish(timeout_s)
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not publisher)
 
-    def discard(self, subscriber: Ros2Subscriber) -> None:
-        """Remove a closed subscriber."""
+    def _discard_subscriber(self, subscriber: Ros2Subscriber) -> None:
         with self._lock:
             self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
-
-    def wait(
-        self,
-        subscribers: Sequence[SubscriberTransport],
-        timeout_s: float,
-        calls: Sequence[CallQueue] = (),
-    ) -> None:
-        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
-        own_subscribers = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
-        before = self._wake_count
-        with wake_on_call(calls, self.wake) as is_empty:
-            if not is_empty:
-                return
-            with self.changed:
-                self.changed.wait_for(
-                    lambda: (
-                        self._wake_count != before
-                        or any(len(each.inbox) or each.is_closed for each in own_subscribers)
-                    ),
-                    timeout_s,
-                )
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-        with self.changed:
-            self._wake_count += 1
-            self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
         """Return the graph of the domain, built from discovered endpoints."""
@@ -209,12 +173,12 @@ class Ros2Transport:
     @property
     def servers(self) -> tuple[Ros2Server, ...]:
         """Open servers."""
-        return self._servers
+        return self._services.servers
 
     @property
     def clients(self) -> tuple[Ros2Client, ...]:
         """Open clients."""
-        return self._clients
+        return self._services.clients
 
     def load(self) -> float | None:
         """Return the CPU load of the process as a share of one core; None if not measured yet."""
@@ -222,10 +186,7 @@ class Ros2Transport:
 
     def begin_close(self) -> None:
         """Reject queued and new calls. `close` waits until messages are acknowledged."""
-        with self._lock:
-            self._is_closing = True
-        for server in self._servers:
-            server.begin_close()
+        self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:
         """Close all writers and readers, leave the domain and join the threads."""
@@ -239,29 +200,10 @@ class Ros2Transport:
                 subscriber.close()
             for publisher in self._publishers:
                 publisher.close(max(0.0, deadline - time.monotonic()))
-            for client in self._clients:
-                client.close()
-            for server in self._servers:
-                server.close(max(0.0, deadline - time.monotonic()))
+            self._services.close(max(0.0, deadline - time.monotonic()))
         finally:
             with self._lock:
                 participant, self._participant = self._participant, None
             if participant is not None:
                 leave_domain(participant, self.node.id)
-        self._deadlines.close(timeout_s)
-        self.wake()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout_s)
-
-    def _run(self) -> None:
-        while not self._closing.is_set():
-            sinks = [each for each in self._subscribers if each.spec.sink is not None]
-            self.wait(sinks, 0.1)
-            for subscriber in sinks:
-                messages = subscriber.take_batch()
-                if messages and subscriber.spec.sink is not None:
-                    try:
-                        subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit: the sink thread continues
-                        _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_INTERVAL_S)
+        self._inboxes.close(timeout_s)

@@ -93,7 +93,12 @@ def _ros_mapping(name: str) -> TypeMapping:
     def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
         return types.decode(name, data)
 
-    return TypeMapping(name, Codec(CDR, 0, encode, decode, dict, partial(_check_map, name)), _pack_cdr, bytes)
+    return TypeMapping(
+        name,
+        Codec(CDR, 0, encode, decode, dict, partial(_check_map, name), queue_length=1000),
+        _pack_cdr,
+        bytes,
+    )
 
 
 def _check_map(name: str, payload: object) -> None:

@@ -20,9 +20,9 @@ from typing import Any
 
 from nep.backends.zenoh.library import load_zenoh, open_session
 from nep.backends.zenoh.rendezvous import Rendezvous, SessionEntry, free_port
-from nep.backends.zeromq.sockets import LOOPBACK
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
+from nep.system.addresses import LOOPBACK
 from nep.system.descriptors import check_free_descriptors
 
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"

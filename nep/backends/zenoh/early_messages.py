@@ -11,7 +11,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Generic, TypeVar
 
-from nep.backends.zeromq.loss import PublisherTracker
+from nep.backends.bases.loss import PublisherTracker
 from nep.messages.history import MAX_HISTORY_BYTES
 from nep.protocol.wire import Header
 

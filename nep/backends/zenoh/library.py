@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import logging
 import sys
@@ -10,17 +9,13 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from nep.errors import BackendUnavailableError, NepError
+from nep.backends.bases.optional_library import OptionalLibrary, prevent_finalization
 from nep.i18n import _
 from nep.system.forks import call_in_child
 
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
-_inherited_libraries: set[str] = set()
-"""Names of libraries that were in use in the parent process before a fork.
-
-They can't be used in the child process, because zenoh would wait for threads that don't exist there.
-"""
+_library = OptionalLibrary("zenoh", lambda: _("install it with 'pip install nep-studio[zenoh]'"))
 
 
 # zenoh is only partly typed
@@ -31,19 +26,7 @@ def load_zenoh(load: Callable[[str], ModuleType] = importlib.import_module) -> A
         BackendUnavailableError: zenoh is not installed or can't be loaded.
         NepError: The process was forked from one that uses zenoh.
     """
-    if _inherited_libraries:
-        raise NepError(
-            _(
-                "'zenoh' doesn't work in a process forked from a program that uses it; start the process "
-                "with multiprocessing's start method 'spawn'"
-            )
-        )
-    try:
-        return load("zenoh")
-    except (ImportError, OSError) as error:
-        raise BackendUnavailableError(
-            "zenoh", _("install it with 'pip install nep-studio[zenoh]'")
-        ) from error
+    return _library.load(lambda: load("zenoh"))
 
 
 def create_handler(callback: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
@@ -77,19 +60,11 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             _sessions.remove(session)
 
 
-def prevent_finalization(instance: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-    """Prevent an object from ever being finalized.
-
-    In a forked child process, finalizing an object of zenoh would notify the network.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))
-
-
 def _forked() -> None:
     # In a forked child sessions must never be closed, not even by their finalizers: that would block forever.
     if "zenoh" not in sys.modules or not _sessions:
         return
-    _inherited_libraries.add("zenoh")
+    _library.has_forked = True
     for session in _sessions:
         prevent_finalization(session)
 

@@ -9,16 +9,17 @@ from contextlib import suppress
 from typing import Any
 
 from nep.backends.base import PublisherSpec
+from nep.backends.bases.publisher import BasePublisher
 from nep.backends.zenoh.keys import data_key, hello_key
 from nep.backends.zenoh.library import create_handler, load_zenoh
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
-from nep.protocol.requests import PublisherCount, PublisherRecord
+from nep.protocol.requests import PublisherRecord
 from nep.protocol.wire import EXTENSION, LATCHED, MAX_SIZE, Header, extension_part
 
 
-class ZenohPublisher:
+class ZenohPublisher(BasePublisher):
     """Publisher of a session.
 
     zenoh drops messages for subscribers whose queues are full; the subscribers count the losses.
@@ -37,23 +38,18 @@ class ZenohPublisher:
         count_subscribers: Callable[[str], int],
         on_close: Callable[[ZenohPublisher, float], None],
     ) -> None:
+        super().__init__(spec, threading.Lock())
+        self.missing: tuple[str, ...] = ()
         zenoh = load_zenoh()
-        self.spec = spec
         self.record = PublisherRecord(
             spec.id, spec.topic, spec.msg_type, spec.codec.name, (data_key(spec.topic),), spec.is_latched
         )
-        self.count = 0
-        self.missing: tuple[str, ...] = ()
         self.missing_ids: tuple[int, ...] = ()
         self._count_subscribers = count_subscribers
         self._on_close = on_close
-        self._bytes = 0
-        self._last_stamp_ns: int | None = None
-        self._problem = ""
         self._history: History[tuple[bytes, bytes]] = History(spec.history)
         self._is_closed = False
         self._has_matching_subscribers = False
-        self._lock = threading.Lock()
         self._zenoh_publisher: Any = session.declare_publisher(
             data_key(spec.topic), congestion_control=zenoh.CongestionControl.DROP
         )
@@ -82,7 +78,7 @@ class ZenohPublisher:
 
     def _handle_hello(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread. Replies with the history and the number of the last message.
-        with self._lock:
+        with self._stats_lock:
             history = () if self._is_closed else tuple(self._history)
             header = Header(self.spec.codec.number, 0, self.count, time.time_ns(), self.spec.id)
             is_closed = self._is_closed
@@ -96,28 +92,7 @@ class ZenohPublisher:
     def _key(self) -> str:
         return hello_key(self.spec.topic, self.spec.id)
 
-    def counts(self) -> PublisherCount:
-        """Return the statistics shown in the graph."""
-        with self._lock:
-            return PublisherCount(
-                self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
-            )
-
-    def report(self, problem: str) -> None:
-        """Set the reason why payloads can't be encoded, shown in the graph."""
-        self._problem = problem
-
     # ---- sending
-
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because this back end has no shared memory."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._lock:
-            self.count += 1
-            self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
         """Publish a message.
@@ -128,15 +103,11 @@ class ZenohPublisher:
         extension = extension_part(encoded.extension) if encoded.extension else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)
         size = len(data) if len(data) <= MAX_SIZE else 0
-        with self._lock:
+        with self._stats_lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count += 1
-            self._bytes += len(data)
-            self._last_stamp_ns = time.time_ns()
-            header = Header(
-                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size
-            )
+            stamp_ns = self._count_locked(len(data))
+            header = Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id, size)
             attachment = header.pack() + extension
             self._history.add((data, attachment), len(data))
             self._zenoh_publisher.put(data, attachment=attachment)
@@ -149,7 +120,7 @@ class ZenohPublisher:
 
     def mark_closed(self) -> bool:
         """Stop accepting messages; return False if the publisher is already closed."""
-        with self._lock:
+        with self._stats_lock:
             was_closed, self._is_closed = self._is_closed, True
             return not was_closed
 

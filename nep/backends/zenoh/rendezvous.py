@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import psutil
 
-from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
+from nep.system.addresses import LOOPBACK, ORIGINAL_PORTS
 
 _logger = logging.getLogger("nep")
 _LOCK_TIMEOUT_S = 5.0

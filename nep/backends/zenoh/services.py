@@ -15,33 +15,30 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from nep.backends.deadlines import Deadlines
+from nep.backends.bases.deadlines import Deadlines
+from nep.backends.bases.optional_library import prevent_finalization
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.services import (
     CallQueue,
-    ClientCalls,
     ClientSpec,
     IncomingCall,
     OpenCall,
-    Outcome,
     ServerSpec,
     ServerStats,
-    check_call_limits,
     limit_reply_size,
     rejection_reply,
     size_error_text,
 )
 from nep.backends.zenoh.keys import service_key
-from nep.backends.zenoh.library import load_zenoh, prevent_finalization
+from nep.backends.zenoh.library import load_zenoh
 from nep.backends.zenoh.session import ZenohSession
-from nep.backends.zeromq.sockets import RejectionCounter
-from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
+from nep.errors import NepError, ServerGoneError, WireError
 from nep.i18n import _
 from nep.protocol.requests import (
     PublisherCount,
     PublisherRecord,
-    SubscriberCount,
     SubscriberRecord,
-    clamp_count,
 )
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, NATIVE, SERVICE_TYPE, Reply, topic_of
 
@@ -51,8 +48,6 @@ _LATE_REPLY_WINDOW_S = 30.0
 _MAX_QUERY_TIMEOUT_S = 1e9
 _TOKEN_DELAY_S = 0.5
 """Maximum time in seconds from the end of a server's queries to the removal of its liveliness token."""
-
-OutcomeCallback = Callable[[Outcome], None]
 
 
 class ZenohServer:
@@ -157,23 +152,14 @@ class ZenohServer:
 
 
 @dataclass(eq=False)
-class _Call:
+class _Call(PendingCall):
     # Call in flight at the server `key`; "" while there is no server. After zenoh has finished the query,
     # the server's token should be removed by `token_deadline`.
-    number: int
-    data: bytes | memoryview
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
     key: str = ""
     token_deadline: float = math.inf
-    size: int = 0
-
-    def __post_init__(self) -> None:
-        self.size = len(self.data)
 
 
-class ZenohClient(ClientCalls[_Call]):
+class ZenohClient(PendingCalls[_Call]):
     """Client or surveyor, with its calls in flight."""
 
     def __init__(
@@ -183,7 +169,7 @@ class ZenohClient(ClientCalls[_Call]):
         deadlines: Deadlines,
         on_close: Callable[[ZenohClient], object],
     ) -> None:
-        super().__init__(spec)
+        super().__init__(spec, _Call)
         self.record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE)
         self._session = session
         self._deadlines = deadlines
@@ -211,7 +197,8 @@ class ZenohClient(ClientCalls[_Call]):
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        call = self._new_call(data, timeout_s, callback)
+        with self._lock:
+            call = self._add_locked(data, timeout_s, callback)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
         return call
@@ -223,7 +210,8 @@ class ZenohClient(ClientCalls[_Call]):
         calls: list[OpenCall] = []
         try:
             for key in self._servers:
-                call = self._new_call(data, timeout_s, callback)
+                with self._lock:
+                    call = self._add_locked(data, timeout_s, callback)
                 calls.append(call)
                 self._send(call, key)
                 self._deadlines.add(call.deadline)
@@ -232,26 +220,13 @@ class ZenohClient(ClientCalls[_Call]):
             raise
         return calls
 
-    def _new_call(
-        self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
-    ) -> _Call:
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        with self._lock:
-            if self.is_closed:
-                raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, callback)
-            self._calls[call.number] = call
-            self._bytes += len(data)
-        return call
-
     def _send(self, call: _Call, key: str) -> None:
         # Call without the lock. Does nothing if the call was already sent.
         with self._lock:
             if not key or call.key or call.number not in self._calls:
                 return
-            call.key = key
-        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
+            call.key, call.is_sent = key, True
+        remaining_s = call.remaining_s
         parts = NATIVE.encode_call(call.number, self.spec.codec.number, remaining_s, call.data)
         call.data = b""  # the query outlives its timeout: release the payload
         query_timeout_s = (
@@ -309,16 +284,6 @@ class ZenohClient(ClientCalls[_Call]):
             )
             self._finish(call, NepError(template.format(service=self.spec.service, key=call.key)))
 
-    def _finish(self, call: _Call, outcome: Outcome) -> bool:
-        # Returns False if the call is no longer in flight.
-        with self._lock:
-            if not self._remove_locked(call):
-                return False
-            self._answered += not isinstance(outcome, NepError)
-            self._failed += isinstance(outcome, NepError)
-        self._run_callback(call, outcome)
-        return True
-
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
         for call in calls:
@@ -341,34 +306,24 @@ class ZenohClient(ClientCalls[_Call]):
             finished_calls = [each for each in self._calls.values() if each.token_deadline < math.inf]
         for call in finished_calls:
             self._fail_without_reply(call, now)
-        with self._lock:
-            expired_calls = [each for each in self._calls.values() if each.deadline <= now]
-        for call in expired_calls:
-            error_class = ServiceTimeoutError if call.key else NoServerError
-            self._finish(call, error_class(self.spec.service, call.timeout_s or 0.0))
-        with self._lock:
-            deadlines = [min(each.deadline, each.token_deadline) for each in self._calls.values()]
-        return min(deadlines, default=math.inf)
+        return super().expire(now)
+
+    def _next_deadline_locked(self) -> float:
+        token_deadlines = (each.token_deadline for each in self._calls.values())
+        return min(super()._next_deadline_locked(), *token_deadlines, math.inf)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
         return tuple(sorted(self._session.roster.service_names))
 
-    def counts(self) -> SubscriberCount:
-        """Return the statistics shown in the graph."""
-        return SubscriberCount(self.spec.id, clamp_count(self._answered), clamp_count(self._failed))
-
     # ---- closing
 
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`."""
-        with self._lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            in_flight, self._calls = list(self._calls.values()), {}
+        in_flight = self._begin_close()
+        if in_flight is None:
+            return
         self._session.discard_service(self)
         self._deadlines.remove_client(self)
         self._on_close(self)
-        for call in in_flight:
-            self._run_callback(call, self._closed_error())
+        self._fail_closed(in_flight)

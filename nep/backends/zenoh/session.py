@@ -30,7 +30,6 @@ from nep.backends.zenoh.library import close_session, create_handler, load_zenoh
 from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.roster import Roster
 from nep.backends.zenoh.subscriber import ZenohSubscriber
-from nep.backends.zeromq.sockets import wait_until
 from nep.errors import NepError, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.masters.graph import Graph
@@ -50,6 +49,7 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import service_of
 from nep.system.cpu import CpuLoad
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 _TIMEOUT_GRACE_S = 1.0

@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import logging
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from nep.backends.base import Sink, SubscriberSpec
-from nep.backends.waking import WakingSubscriber
+from nep.backends.base import SubscriberSpec
+from nep.backends.bases.inbox import Inboxes, InboxSubscriber
+from nep.backends.bases.loss import PublisherTracker
+from nep.backends.bases.message_parser import MessageParser
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zenoh.early_messages import EarlyMessages
-from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
-from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import RejectionCounter
-from nep.backends.zeromq.sub_socket import MessageParser
 from nep.errors import WireError
 from nep.i18n import _
 from nep.messages.message import Message
-from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
 from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
 _logger = logging.getLogger("nep")
 _MAX_TOPIC_PARSERS = 10_000
-_BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
-
-The inbox and a batch together thus stay within the subscriber's `max_bytes`.
-"""
 
 
 class _TopicParser(NamedTuple):
@@ -41,7 +34,7 @@ class _TopicParser(NamedTuple):
     parser: MessageParser
 
 
-class ZenohSubscriber(WakingSubscriber):
+class ZenohSubscriber(InboxSubscriber):
     """Subscriber with an inbox or a sink.
 
     Args:
@@ -53,20 +46,13 @@ class ZenohSubscriber(WakingSubscriber):
     def __init__(
         self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
     ) -> None:
-        super().__init__(inboxes.changed)
-        batch_bytes = 0 if spec.sink is None else _BATCH_BYTES
-        self.spec = spec
-        self.ready: deque[Message] = deque()
-        self.is_closed = False
-        self._inboxes = inboxes
+        super().__init__(spec, inboxes)
         self._on_close = on_close
-        self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch_bytes)
         self._sources = PublisherTracker()
         self._rejections = RejectionCounter()
         self._early_messages = EarlyMessages[tuple[_TopicParser, list[bytes]]](
             self._sources, spec.max_messages
         )
-        self._problem = ""
         self._own_parser = self._new_topic_parser(spec.topic)
         self._topic_parsers: OrderedDict[str, _TopicParser] = OrderedDict()
         """Parsers of recently received topics of a pattern, the most recent last."""
@@ -88,7 +74,7 @@ class ZenohSubscriber(WakingSubscriber):
         if not self.spec.is_pattern:
             return self._own_parser
         topic = topic_of(str(sample.key_expr))
-        with self._inboxes.changed:
+        with self._changed:
             topic_parser = self._topic_parsers.pop(topic, None)
             if topic_parser is None and not self.matches_topic(topic):
                 return None
@@ -97,32 +83,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._topic_parsers.popitem(last=False)
             return topic_parser
 
-    # ---- reading
-
-    def poll(self) -> Message | None:
-        """Return the next message, or None if there is none or the subscriber is closed."""
-        with self._inboxes.changed:
-            return None if self.is_closed else self._inbox.pop()
-
-    def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
-        self._inboxes.wait((self,), timeout_s)
-        return self.poll()
-
-    @property
-    def has_input(self) -> bool:
-        """True if input is available or the subscriber is closed."""
-        return self.is_closed or len(self._inbox) > 0
-
-    @property
-    def sink(self) -> Sink | None:
-        """Callback that receives the messages; None if they are read with `poll` or `receive`."""
-        return self.spec.sink
-
-    def take_batch(self) -> list[Message]:
-        """Remove and return the messages for one call of the sink."""
-        with self._inboxes.changed:
-            return self._inbox.pop_all(_BATCH_BYTES)
+    # ---- statistics
 
     @property
     def received(self) -> int:
@@ -139,13 +100,9 @@ class ZenohSubscriber(WakingSubscriber):
         """Number of received frames rejected because they are not valid messages."""
         return self._rejections.count
 
-    def report(self, problem: str) -> None:
-        """Set the reason why messages can't be decoded, shown in the graph."""
-        self._problem = problem
-
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
-        problem = self._problem or self._rejections.recent_message()
+        problem = self.problem or self._rejections.recent_message()
         return SubscriberCount(self.spec.id, clamp_count(self.received), clamp_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
@@ -175,7 +132,7 @@ class ZenohSubscriber(WakingSubscriber):
             tail.append(payload)
         if len(attachment) > HEADER_BYTES:
             tail.append(attachment[HEADER_BYTES:])
-        with self._inboxes.changed:
+        with self._changed:
             if not self.is_closed:
                 self._process_parts_locked(topic_parser, first_part, tail)
 
@@ -208,8 +165,7 @@ class ZenohSubscriber(WakingSubscriber):
 
     def _enqueue(self, message: Message | None) -> None:
         if message is not None:
-            self._sources.count_dropped(self._inbox.put(message))
-            self.notify_waiting()
+            self._sources.count_dropped(self._put_locked(message))
 
     def _deliver_early_messages(self, publisher: int) -> None:
         for topic_parser, tail in self._early_messages.pop(publisher):
@@ -217,13 +173,13 @@ class ZenohSubscriber(WakingSubscriber):
 
     def end_handshake(self, publishers: Iterable[int]) -> None:
         """Stop waiting for the replies of these publishers to a hello, and deliver their queued messages."""
-        with self._inboxes.changed:
+        with self._changed:
             for publisher in publishers:
                 self._deliver_early_messages(publisher)
 
     def add_publisher(self, remote: RemotePublisher) -> None:
         """Add a publisher or update its record; silent publishers that it replaces are removed."""
-        with self._inboxes.changed:
+        with self._changed:
             for replaced in self._sources.replaced_publishers(remote):
                 self._sources.pop(replaced)
             self._sources.add_listed(remote).is_silent = False
@@ -233,7 +189,7 @@ class ZenohSubscriber(WakingSubscriber):
 
         The oldest silent publishers beyond `MAX_UNLISTED_PUBLISHERS` are removed.
         """
-        with self._inboxes.changed:
+        with self._changed:
             source = self._sources.find(publisher)
             if source is not None:
                 source.is_silent = True
@@ -242,7 +198,7 @@ class ZenohSubscriber(WakingSubscriber):
 
     def handle_bye(self, publisher: int, last_seq: int) -> None:
         """Remove a publisher that has closed, and count its missing messages up to `last_seq` as lost."""
-        with self._inboxes.changed:
+        with self._changed:
             source = self._sources.find(publisher)
             if source is not None:
                 if source.last is not None:
@@ -256,18 +212,8 @@ class ZenohSubscriber(WakingSubscriber):
 
     def close(self) -> None:
         """Unregister the subscriber and discard its unread messages."""
-        with self._inboxes.changed:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            self._inbox.pop_all()
-            self.notify_waiting()
-        self._inboxes.remove_sink(self)
-        self._on_close(self)
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True
+        if self._close_inbox():
+            self._on_close(self)
 
 
 def _is_latched(attachment: bytes) -> bool:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
+from nep.backends.bases.inbox import Inboxes
 from nep.backends.connection import Configuration, Direct
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
-from nep.backends.zenoh.inboxes import Inboxes
+from nep.backends.services import ClientSpec, ServerSpec
 from nep.backends.zenoh.keys import ALL_CALLS_KEY, call_key
 from nep.backends.zenoh.library import load_zenoh
 from nep.backends.zenoh.node_services import ZenohServices
@@ -47,6 +47,8 @@ class ZenohTransport:
         load_zenoh()
         self._node = node
         self._inboxes = Inboxes(node.name)
+        self.wait = self._inboxes.wait
+        self.wake = self._inboxes.wake
         self._lock = threading.Lock()
         self._open_lock = threading.Lock()
         self._sessions: dict[str, ZenohSession] = {}
@@ -221,25 +223,6 @@ class ZenohTransport:
         publisher.release()
         if session is not None:
             session.discard(publisher)
-
-    # ---- waiting
-
-    def wait(
-        self,
-        subscribers: Sequence[SubscriberTransport],
-        timeout_s: float,
-        calls: Sequence[CallQueue] = (),
-    ) -> None:
-        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
-        own_subscribers = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
-        before = self._inboxes.wake_count
-        with wake_on_call(calls, self.wake) as is_empty:
-            if is_empty:
-                self._inboxes.wait(own_subscribers, timeout_s, before)
-
-    def wake(self) -> None:
-        """End all waits in progress."""
-        self._inboxes.wake()
 
     # ---- graph and closing
 

@@ -18,31 +18,24 @@ from collections.abc import Callable
 import zmq
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
+from nep.backends.bases.publisher import BasePublisher
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.connection import Direct
 from nep.backends.zeromq.byte_window import TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import (
-    RejectionCounter,
-    Socket,
-    bind,
-    connect,
-    receive_high_water_mark,
-    set_receive_timeout,
-    wait_until,
-)
-from nep.backends.zeromq.sub_socket import MessageBuffer
+from nep.backends.zeromq.sockets import Socket, bind, connect, receive_high_water_mark, set_receive_timeout
 from nep.backends.zeromq.subscriber import SocketSubscriber, UnbatchedReader
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
+from nep.system.waits import wait_until
 
 _PREFIXED_TYPES = frozenset({"dictionary", "image"})
 _UNPREFIXED_TYPES = frozenset({"bytes", "msgpack", "images"})
 _JSON_FIRST_BYTES = frozenset(b'{["-0123456789tfnNI')
 
-_HIGH_WATER_MARKS = {"image": 64, "bytes": 1000}
 _DEFAULT_HIGH_WATER_MARK = 10_000
 """High-water mark in messages per connection.
 
@@ -121,7 +114,7 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
     return bind(socket, address) if should_bind else connect(socket, address)
 
 
-class OriginalPublisher:
+class OriginalPublisher(BasePublisher):
     """Publisher on the wire of the original NEP.
 
     Owns its socket, an XPUB, which programs of the original NEP can't distinguish from a PUB.
@@ -134,19 +127,18 @@ class OriginalPublisher:
         direct: Direct,
         on_close: Callable[[OriginalPublisher, float], None],
     ) -> None:
-        self.spec = spec
-        self.count = 0
-        self._on_close = on_close
+        self._changed = threading.Condition(threading.Lock())
+        super().__init__(spec, self._changed)
         self.missing: tuple[str, ...] = ()
+        self._on_close = on_close
         self._socket = socket
         self._generation = direct.generation
         self._subscription_count = 0
         self._is_closed = False
         self._backlog = Backlog()
         self._untracked_bytes = 0
-        socket.setsockopt(zmq.SNDHWM, _HIGH_WATER_MARKS.get(spec.codec.name, _DEFAULT_HIGH_WATER_MARK))
+        socket.setsockopt(zmq.SNDHWM, spec.codec.queue_length or _DEFAULT_HIGH_WATER_MARK)
         self._deadline = 0.0
-        self._changed = threading.Condition(threading.Lock())
         # report every unsubscribe, so that filters can be counted: one per subscriber
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -172,18 +164,6 @@ class OriginalPublisher:
         with self._changed:
             wait_until(self._changed, lambda: self._subscription_count > 0, timeout_s)
 
-    def report(self, problem: str) -> None:
-        """Ignore the problem, because a direct connection has no graph to report it in."""
-
-    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None, because the original wire has no shared memory."""
-        return None
-
-    def skip(self) -> None:
-        """Count a message that is not sent because the topic has no subscribers."""
-        with self._changed:
-            self.count += 1
-
     def send(self, encoded: Encoded) -> None:
         """Publish one frame; drop the frame if the backlog is full.
 
@@ -195,7 +175,7 @@ class OriginalPublisher:
         with self._changed:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.count += 1
+            self._count_locked(len(frame))
             if self._backlog.has_room(len(frame)):
                 self._send(frame)
             self._read_subscriptions()
@@ -286,7 +266,7 @@ class OriginalSubSocket(UnbatchedReader):
         self._spec = spec
         self._codec = codec_for(spec.msg_type)
         set_receive_timeout(socket)
-        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(self._codec.name))
+        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(self._codec))
         socket.setsockopt(zmq.SUBSCRIBE, b"")
 
     @property
@@ -294,8 +274,8 @@ class OriginalSubSocket(UnbatchedReader):
         """True if a message can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of the topic, or None if there is none. See `Readable.read`."""
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """Return the next message of the topic, or None if there is none. See `UnbatchedReader.read`."""
         while True:
             try:
                 parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.waking import WakingSubscriber
+from nep.backends.bases.waking import WakingSubscriber
 from nep.backends.zeromq.io_thread import IoThread
 from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber
 from nep.errors import NepError

@@ -17,21 +17,14 @@ from typing import NoReturn, cast
 import zmq
 
 from nep.backends.base import PublisherSpec, PublishHooks
-from nep.backends.zeromq.bindings import SMALL_CODECS, Bindings
+from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.byte_window import ACK_INTERVAL_BYTES, TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.pending_batch import MAX_BATCHED_BYTES, PendingBatch
 from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, can_share, start_sharing
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import (
-    Part,
-    RejectionCounter,
-    RemoteConnection,
-    Socket,
-    set_send_high_water_mark,
-    to_sendable,
-    wait_until,
-)
+from nep.backends.zeromq.sockets import Part, RemoteConnection, Socket, set_send_high_water_mark, to_sendable
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
@@ -51,6 +44,7 @@ from nep.protocol.wire import (
     topic_part,
 )
 from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 _SNDMORE = int(zmq.SNDMORE)  # plain ints: looking up pyzmq's enum members costs as much as the call
@@ -148,7 +142,7 @@ class NativePublisher(HandshakePublisher):
         set_send_high_water_mark(socket)
         self._bindings = Bindings(
             socket,
-            may_bind_unix_sockets=spec.codec.name in SMALL_CODECS,
+            may_bind_unix_sockets=spec.codec.is_small,
             has_silence_check=RemoteConnection.can_detect_silence,
         )
         # bypasses pyzmq's handling of routing ids and groups, which takes half of the time

@@ -8,9 +8,6 @@ import os
 import socket
 import struct
 import sys
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,27 +15,32 @@ import zmq
 
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
-from nep.system.addresses import endpoint_of, host_of, is_endpoint, is_loopback, resolve_address
+from nep.messages.codecs import Codec
+from nep.system.addresses import (
+    LOOPBACK,
+    ORIGINAL_PORTS,
+    endpoint_of,
+    host_of,
+    is_endpoint,
+    is_loopback,
+    resolve_address,
+)
 from nep.system.descriptors import check_free_descriptors
-from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
-_REPORT_DURATION_S = 5.0
 
 Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
-LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
 """Maximum time in seconds that a reader waits in a socket while holding its lock.
 
 Shorter waits are no faster, because a timer that ends before the kernel's next tick costs more than the
 rest of the wait.
 """
-_WAIT_SLICE_S = 0.1
 _IN_USE_ERRORS = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
 """Error numbers of bind which mean that the address is valid but can't be used now."""
 _SEND_HIGH_WATER_MARK = 50_000
-_IMAGE_HIGH_WATER_MARK = 32
+_RECEIVE_HIGH_WATER_MARK = 1000
 _FDS_PER_PORT = 2
 SILENCE_TIMEOUT_MS = 15_000
 """Time in milliseconds without acknowledgement after which a connection to another computer is closed."""
@@ -47,8 +49,6 @@ CONNECT_TIMEOUT_MS = 3000
 
 Needed because the system's own retries take place at growing intervals.
 """
-ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
-"""Ports that have a fixed meaning for programs of the original NEP."""
 
 _TCP_INFO = struct.Struct("=2xBB52xI")
 """Layout of Linux's `tcp_info`: retransmissions, window probes and time since the last acknowledgement.
@@ -59,31 +59,6 @@ _MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
-class RejectionCounter:
-    """Counter of rejected inputs that stores the newest reason.
-
-    Not thread-safe: guarded by the owner's lock.
-    """
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._reason = ""
-        self._rejected_at = 0.0
-
-    def add(self, reason: str) -> bool:
-        """Count a rejected input; return True if it should be logged (the 1st, 10th, 100th, ...)."""
-        self.count += 1
-        self._reason = reason
-        self._rejected_at = time.monotonic()
-        return is_logged(self.count)
-
-    def recent_message(self) -> str:
-        """Return the newest reason with the count; "" if nothing was rejected in the last seconds."""
-        if not self.count or time.monotonic() - self._rejected_at > _REPORT_DURATION_S:
-            return ""
-        return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
-
-
 def set_send_high_water_mark(zmq_socket: Socket) -> None:
     """Set the high-water mark for sending. Call before bind, because it applies only to new connections.
 
@@ -92,12 +67,12 @@ def set_send_high_water_mark(zmq_socket: Socket) -> None:
     zmq_socket.setsockopt(zmq.SNDHWM, _SEND_HIGH_WATER_MARK)
 
 
-def receive_high_water_mark(codec: str) -> int:
+def receive_high_water_mark(codec: Codec) -> int:
     """Return the high-water mark for receiving messages of a codec.
 
     The value can be small, because the I/O thread empties the socket.
     """
-    return _IMAGE_HIGH_WATER_MARK if codec == "image" else 1000
+    return min(_RECEIVE_HIGH_WATER_MARK, codec.queue_length or _RECEIVE_HIGH_WATER_MARK)
 
 
 def set_receive_timeout(zmq_socket: Socket) -> None:
@@ -196,20 +171,6 @@ def enable_keep_alive(zmq_socket: Socket, endpoint: str, *, has_silence_check: b
         zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
         zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         zmq_socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
-
-
-def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait until `is_met()` returns True; return False on timeout. Call with `changed` held.
-
-    Waits in slices, because on Windows Ctrl+C doesn't interrupt a wait.
-    """
-    deadline = time.monotonic() + timeout_s
-    while not is_met():
-        remaining_s = deadline - time.monotonic()
-        if remaining_s <= 0.0:
-            return False
-        changed.wait(min(remaining_s, _WAIT_SLICE_S))
-    return True
 
 
 def to_sendable(data: bytes | memoryview) -> Part:

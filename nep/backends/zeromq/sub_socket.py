@@ -9,81 +9,54 @@ from __future__ import annotations
 import errno
 import logging
 import time
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import zmq
 
 from nep.backends.base import SubscriberSpec
+from nep.backends.bases.loss import PublisherTracker, TrackedPublisher
+from nep.backends.bases.message_parser import MIN_VIEW_BYTES, SHARED_FORM, MessageBuffer, MessageParser
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
-from nep.backends.zeromq.loss import PublisherTracker, TrackedPublisher
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import (
-    RejectionCounter,
     Socket,
     enable_keep_alive,
     is_remote,
     receive_high_water_mark,
     set_receive_timeout,
 )
-from nep.errors import DecodeError, WireError
+from nep.errors import WireError
 from nep.i18n import _, lazy
-from nep.messages.codecs import codec_by_number, codec_for
+from nep.messages.codecs import codec_for
 from nep.messages.message import (
     NO_EXTENSION,
     UNDECODED,
     Message,
-    MessageKind,
-    message_kind,
     new_message,
     received_message,
 )
 from nep.protocol.batch import (
     BATCH_FORM_FLAG,
     MAX_BATCH_MESSAGES,
-    check_batch,
-    parse_entries,
     table_struct,
-    unknown_codec_error,
 )
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
-    BYE,
-    EXTENSION,
     HEADER_BYTES,
-    LATCHED,
-    OFFER,
-    SHARED,
     Acknowledgement,
-    Header,
     OfferAcceptance,
     acceptance_part,
     acknowledgement_part,
-    encode_form,
     hello_part,
-    parse_remaining_parts,
-    read_header,
-    split_single_part,
     topic_part,
     unpack_header,
     unpack_header_at,
 )
 from nep.system.addresses import is_endpoint
 
-MessageBuffer = list[Message] | deque[Message]
-"""Container to which received messages are appended."""
-
-_MIN_ZERO_COPY_BYTES = 8_192
-"""Minimum size in bytes of messages that libzmq receives into separate memory, which views can reference."""
-SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
-_DecodedRun = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
-"""Messages with decoded payloads.
-
-The items are the kind, the publisher's id, the first sequence number, the time stamps and the encoded
-payloads.
-"""
 
 _logger = logging.getLogger("nep")
 _DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members costs as much as the call
@@ -91,149 +64,6 @@ _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
 _INCOMPLETE_MESSAGE_TEXT = lazy("a message must have 3 or 4 parts, but this one is incomplete")
-
-
-class MessageParser:
-    """Parser for messages and notices outside the fast path. Performs no I/O.
-
-    Args:
-        spec: Settings of the subscriber.
-        hello: Hello filter of the subscriber.
-        sources: Publishers; updated by the parser.
-        disconnect: Ends the connection to the publisher with this id.
-        acknowledge: Sends an acknowledgement; called with the publisher id and the newest sequence number.
-        shared: Readers of shared memory, or None.
-    """
-
-    def __init__(
-        self,
-        spec: SubscriberSpec,
-        hello: bytes,
-        sources: PublisherTracker,
-        disconnect: Callable[[int], None],
-        acknowledge: Callable[[int, int], None],
-        shared: SharedSources | None = None,
-    ) -> None:
-        self._topic_name = spec.topic
-        self._msg_type = spec.msg_type
-        self._topic = topic_part(spec.topic)
-        self._hello = hello
-        self._sources = sources
-        self._disconnect = disconnect
-        self._acknowledge = acknowledge
-        self._shared = shared
-
-    def parse(self, first: bytes, tail: Sequence[_Part]) -> Message | None:
-        """Return the message in these parts; None for notices and duplicates.
-
-        Args:
-            first: First part: a topic, a hello, or a whole message of one part.
-            tail: Remaining parts.
-
-        Raises:
-            WireError: The message is malformed.
-        """
-        is_alone = first == self._hello
-        is_one_part = not tail and first.startswith(self._topic)
-        if is_one_part:
-            first, *tail = split_single_part(first)
-        if not is_alone and first != self._topic:
-            raise _topic_error()
-        if is_alone and len(tail) == 1:
-            self._handle_notice(read_header(bytes(tail[0])))
-            return None
-        return self._parse_message(*parse_remaining_parts(tail, is_one_part=is_one_part), is_alone=is_alone)
-
-    def parse_batch(self, first: bytes) -> list[Message]:
-        """Return the messages of a batch, given as one part. Raises `WireError` if the batch is malformed.
-
-        Messages that the subscriber must not deliver are left out, such as those before the handshake.
-        """
-        topic, header_part, body = split_single_part(first)
-        if topic != self._topic:
-            raise _topic_error()
-        header, _payload, _extension = parse_remaining_parts((header_part, body), is_one_part=True)
-        check_batch(header, body)
-        single_header = header._replace(flags=0)
-        messages = (
-            self._parse_message(
-                single_header._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
-                body[each.begin : each.end],
-                NO_EXTENSION,
-                is_alone=False,
-            )
-            for each in parse_entries(body)
-        )
-        return [each for each in messages if each is not None]
-
-    def _handle_notice(self, header: Header) -> None:
-        source = self._sources.get(header.publisher)
-        last = source.last
-        is_gap_accepted = self._sources.advance_to(header.publisher, header.seq)
-        if header.flags & BYE:
-            self._disconnect(header.publisher)
-        elif header.flags & OFFER:
-            if self._shared is not None:
-                self._shared.open(header.publisher, header.size)
-        elif source.has_echoed:
-            self._acknowledge(header.publisher, header.seq)
-        else:
-            source.has_echoed = True
-        if not is_gap_accepted:
-            raise WireError(
-                _("the sequence number jumps from {last} to {seq}").format(last=last, seq=header.seq),
-                code="seq-leap",
-            )
-
-    def _parse_message(
-        self, header: Header, payload: _Part, extension: Mapping[str, object], *, is_alone: bool
-    ) -> Message | None:
-        codec = codec_by_number(header.codec)
-        if codec is None:
-            raise unknown_codec_error(header.codec)
-        if not is_alone and self._sources.is_early(header.publisher):
-            return None
-        if not self._sources.count_message(header.publisher, header.seq, is_alone=is_alone):
-            return None
-        shared_payload: bytes | memoryview | None = None
-        if header.flags & SHARED:
-            if self._shared is None:
-                raise WireError(
-                    _("the payload is in shared memory that no publisher has offered"), code="shared-memory"
-                )
-            shared_payload = self._shared.read(header.publisher, payload, may_copy=codec.name == "bytes")
-            if shared_payload is None:
-                self._sources.count_dropped(1)
-                return None
-        source = self._sources.get(header.publisher)
-        msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
-        source.kind = message_kind(
-            self._topic_name,
-            codec.name,
-            msg_type,
-            is_latched=bool(header.flags & LATCHED),
-            clock=source.clock,
-        )
-        # `kind` depends on both forms: a message with another codec takes the careful path again
-        plain_form = 0 if header.flags & EXTENSION else encode_form(header.codec, header.flags & ~SHARED)
-        if header.flags & SHARED:
-            source.shared_form = plain_form and plain_form | SHARED_FORM
-            source.form = source.form if source.form == plain_form else 0
-        else:
-            source.form = plain_form
-            source.shared_form = source.shared_form if source.shared_form == plain_form | SHARED_FORM else 0
-        if shared_payload is not None:
-            return received_message(
-                source.kind, shared_payload, header.stamp_ns, header.seq, header.publisher, extension
-            )
-        # a small view must not keep a large receive buffer alive
-        is_large = len(payload) >= _MIN_ZERO_COPY_BYTES
-        data = memoryview(payload).toreadonly() if is_large else bytes(payload)
-        return received_message(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
-
-
-def _topic_error() -> WireError:
-    return WireError(_("a message doesn't begin with its topic"), code="first-part")
 
 
 class SubSocket:
@@ -258,16 +88,12 @@ class SubSocket:
             spec, self._hello, self.sources, self.disconnect, self._acknowledge, self._shared
         )
         self._topic_length = len(self._topic)
-        self.payloads: deque[Any] = deque()
-        """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
-        self.wants_payloads = False
-        self._decoded_run: _DecodedRun | None = None
         self._payload_offset = self._topic_length + HEADER_BYTES
         """Offset of the payload in a message of one part."""
         # sizes at which a payload can't be told apart from the first part of the next message
         self._ambiguous_sizes = frozenset({0, len(self._topic), len(self._hello)})
         set_receive_timeout(socket)
-        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(codec_for(spec.msg_type).name))
+        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(codec_for(spec.msg_type)))
         socket.setsockopt(zmq.SNDHWM, 0)  # libzmq otherwise drops filters beyond 1000 silently
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
@@ -391,14 +217,13 @@ class SubSocket:
             if error.errno != errno.ENOENT:  # not connected any more
                 raise
 
-    def read_into(
+    def read_into(  # noqa: PLR0915 - inlined, because it runs for every message
         self,
         buffer: MessageBuffer,
         max_messages: int,
         max_bytes: int,
         *,
         may_wait: bool = False,
-        first: bytes | None = None,
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
@@ -410,14 +235,18 @@ class SubSocket:
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
-            first: First part of the next message, if it was already read.
         """
+        if not may_wait and not self.has_input:
+            return 0  # the common case: raising `zmq.Again` is ten times slower
+        first: bytes | None = None
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, buffer.append
         header_offset, payload_offset = self._topic_length, self._payload_offset
         count, counted_earlier, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
             while count < max_messages and max_bytes > 0:
                 if first is None:
+                    if count == 1 and not self.has_input:
+                        break  # see above; a longer burst seldom ends
                     first = recv(flags)
                     flags = _DONTWAIT  # all parts of a message are available with its first one
                 if len(first) >= payload_offset and first.startswith(topic):
@@ -483,11 +312,6 @@ class SubSocket:
         sizes = numbers[1 : count + 1]
         if offset + sum(sizes) != len(first):
             return self._read_any_batch(first, buffer)
-        if self.wants_payloads and not self.payloads and not buffer:
-            raws = [first[offset : (offset := offset + size)] for size in sizes]
-            if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, buffer):
-                return count, count
-            offset = payload_offset + table.size
         kind, append = source.kind, buffer.append
         for size, stamp_ns in zip(sizes, numbers[count + 1 :], strict=True):
             message = new_message(Message)
@@ -500,43 +324,6 @@ class SubSocket:
             seq += 1
         source.last = seq - 1
         return count, count
-
-    def _read_payloads(
-        self,
-        source: TrackedPublisher,
-        seq: int,
-        publisher: int,
-        stamps_ns: tuple[int, ...],
-        raws: Sequence[bytes],
-        buffer: MessageBuffer,
-    ) -> bool:
-        # Decodes all but the first message of a batch. Returns False if a payload can't be decoded.
-        kind = source.kind
-        decode = kind.decode
-        try:
-            self.payloads.extend([decode(raw, NO_EXTENSION) for raw in raws[1:]])
-        except DecodeError:
-            return False
-        buffer.append(received_message(kind, raws[0], stamps_ns[0], seq, publisher))
-        source.last = seq + len(raws) - 1
-        self._decoded_run = kind, publisher, seq, stamps_ns, raws
-        return True
-
-    def restore(self, buffer: deque[Message]) -> None:
-        """Convert the remaining payloads back to messages and insert them at the front of `buffer`."""
-        if self._decoded_run is None:
-            return
-        kind, publisher, first_seq, stamps_ns, raws = self._decoded_run
-        index = len(raws)
-        while True:
-            try:
-                payload = self.payloads.pop()  # from the right: other threads take from the left
-            except IndexError:
-                return
-            index -= 1
-            message = received_message(kind, raws[index], stamps_ns[index], first_seq + index, publisher)
-            message.decoded = payload
-            buffer.appendleft(message)
 
     def _read_shared(self, first: bytes) -> Message | None:
         # Fast path for shared memory. Returns None to continue on the careful path.
@@ -570,42 +357,6 @@ class SubSocket:
         buffer.extend(messages)
         return len(messages), 0
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None if the socket is empty.
-
-        The fast path of `read_into` is repeated here, because calling it would take a third longer in
-        programs that read single messages.
-
-        Args:
-            overflow: Container to which further messages of the same batch are appended.
-            may_wait: True to wait up to `SHORT_WAIT_S` for a message.
-        """
-        if not may_wait and not int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            return None  # the common case: raising `zmq.Again` is ten times slower
-        try:
-            first = self._recv(0 if may_wait else _DONTWAIT)
-        except zmq.Again:
-            return None
-        if len(first) >= self._payload_offset and first.startswith(self._topic):
-            form, size, seq, stamp_ns, publisher = unpack_header_at(first, self._topic_length)
-            source = self.sources.by_id.get(publisher)
-            raw = first[self._payload_offset :]
-            if source and source.form == form and source.last == seq - 1 and len(raw) == size:
-                self.sources.received += 1
-                message = new_message(Message)
-                message.kind, message.raw = source.kind, raw
-                message.stamp_ns = stamp_ns
-                message.seq = source.last = seq
-                message.publisher, message.extension = publisher, NO_EXTENSION
-                message.decoded = UNDECODED
-                return message
-        buffer: deque[Message] = deque()
-        if not self.read_into(buffer, 1, 1, first=first):
-            return None
-        message = buffer.popleft()
-        overflow.extend(buffer)
-        return message
-
     def _read_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         # Asking pyzmq whether a part is the last takes longer than receiving it, so this assumes three parts,
         # see `_parse_parts`.
@@ -623,11 +374,11 @@ class SubSocket:
                     and source.last == seq - 1
                     and size not in self._ambiguous_sizes
                 ):
-                    data = recv(_DONTWAIT, size < _MIN_ZERO_COPY_BYTES)
+                    data = recv(_DONTWAIT, size < MIN_VIEW_BYTES)
                     if len(data) == size:
                         self.sources.received += 1
                         source.last = seq
-                        raw = data if size < _MIN_ZERO_COPY_BYTES else memoryview(data).toreadonly()
+                        raw = data if size < MIN_VIEW_BYTES else memoryview(data).toreadonly()
                         return None, received_message(source.kind, raw, stamp_ns, seq, publisher)
         except zmq.Again:
             self.rejections.add(_(_INCOMPLETE_MESSAGE_TEXT))

@@ -22,19 +22,21 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import zmq
 
 from nep.backends.base import SubscriberSpec, Wakeable
+from nep.backends.bases.loss import PublisherTracker
+from nep.backends.bases.message_parser import MessageBuffer
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.io_thread import IoThread, PollState
-from nep.backends.zeromq.loss import PublisherTracker
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionCounter, wait_until
-from nep.backends.zeromq.sub_socket import MessageBuffer, SubSocket
+from nep.backends.zeromq.sockets import SHORT_WAIT_S
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
-from nep.messages.queue import MAX_READ_AHEAD, Inbox, ReadAhead
+from nep.messages.queue import MAX_READ_AHEAD, Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
+from nep.system.waits import wait_until
 from nep.system.wakeup import Waker
 
 _READ_AHEAD_BYTES = 2**18
@@ -92,14 +94,6 @@ class Readable(Protocol):
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None if there is none.
-
-        Args:
-            overflow: Container to which further messages of the same batch are appended.
-            may_wait: True to wait up to `SHORT_WAIT_S` for a message.
-        """
-
     def count_dropped(self, count: int) -> None:
         """Add received messages that were dropped from a full queue to the losses."""
 
@@ -110,8 +104,12 @@ class Readable(Protocol):
 class UnbatchedReader:
     """Base class that implements `Readable.read_into` for sockets without batches."""
 
-    def read(self, overflow: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message. See `Readable.read`."""
+    def read(self, *, may_wait: bool = False) -> Message | None:
+        """Return the next message, or None if there is none.
+
+        Args:
+            may_wait: True to wait up to `SHORT_WAIT_S` for a message.
+        """
         raise NotImplementedError
 
     def read_into(
@@ -120,7 +118,7 @@ class UnbatchedReader:
         """Read messages one by one. See `Readable.read_into`."""
         count = 0
         while count < max_messages and max_bytes > 0:
-            message = self.read(buffer, may_wait=may_wait and not count)
+            message = self.read(may_wait=may_wait and not count)
             if message is None:
                 break
             buffer.append(message)
@@ -170,19 +168,12 @@ class SocketSubscriber(Generic[R]):
         self._io = io
         self._on_close = on_close
         self._readable = readable
-        self._read = readable.read
         self._read_into = readable.read_into
         self._is_keeping_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """Messages read ahead, which precede those of the inbox. Pop from the left, without the lock."""
-        self._sub_socket: SubSocket | None = readable if isinstance(readable, SubSocket) else None
-        self.payloads: deque[Any] = deque() if self._sub_socket is None else self._sub_socket.payloads
-        """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
-        self.wants_payloads = False
-        self._read_ahead = ReadAhead(spec.max_messages)
-        self._may_exceed_bound = self._is_keeping_all and spec.max_messages >= 10 * MAX_READ_AHEAD
+        self._reads_ahead = self._is_keeping_all and spec.max_messages >= 10 * MAX_READ_AHEAD
         """True if the queue may exceed its limit by a few messages, because the limit is high."""
-        self._last_read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
         self._io_check_at = _INFINITE
@@ -281,13 +272,7 @@ class SocketSubscriber(Generic[R]):
         self._lock_requests.append(None)  # as `_requested_lock` does, but faster
         try:
             with self._lock:
-                if (
-                    self.is_closed
-                    or self.payloads
-                    or self.ready
-                    or self._inbox.messages
-                    or self._readable.has_input
-                ):
+                if self.is_closed or self.ready or self._inbox.messages or self._readable.has_input:
                     return False
                 self._waiters.append(waker)
                 return True
@@ -376,7 +361,6 @@ class SocketSubscriber(Generic[R]):
             if self.is_closed:
                 return
             self.is_closed = True
-            self.payloads.clear()
             self.ready.clear()
             self._inbox.pop_all()
             self._wake_waiters_locked()
@@ -392,7 +376,6 @@ class SocketSubscriber(Generic[R]):
     def forked(self) -> None:
         """Mark the subscriber as closed and empty in a forked child process."""
         self.is_closed = True
-        self.payloads.clear()
         self.ready.clear()
 
     @contextmanager
@@ -405,26 +388,9 @@ class SocketSubscriber(Generic[R]):
         finally:
             self._lock_requests.pop()
 
-    def restore(self) -> None:
-        """Convert the remaining payloads back to messages. See `SupportsPayloads.restore`."""
-        if self._sub_socket is not None:
-            with self._requested_lock():
-                self._sub_socket.restore(self.ready)
-
     # ---- with the lock held
 
     def _next_locked(self, *, may_wait: bool = False) -> Message | None:
-        if self._sub_socket is not None:
-            if self.payloads:
-                self._sub_socket.restore(self.ready)
-            self._sub_socket.wants_payloads = self.wants_payloads and self._may_exceed_bound
-        try:
-            return self._next_message_locked(may_wait=may_wait)
-        finally:
-            if self._sub_socket is not None:
-                self._sub_socket.wants_payloads = False  # applies to the current reader only
-
-    def _next_message_locked(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_check_at > now + _MAX_IO_DELAY_S:
@@ -432,40 +398,21 @@ class SocketSubscriber(Generic[R]):
             # must check when the lease ends. It is asked once for many reads.
             self._io_check_at = self._leased_until
             self._io.serve_soon(self)
-        if self._is_keeping_all and not self.ready and not self._inbox.messages:
-            interval_s, self._last_read_at = now - self._last_read_at, now
-            if interval_s > self._read_ahead.max_interval_s:
-                if self._read_ahead.message_count > 1:
-                    self._read_ahead.reset()
-                message = self._read(self.ready, may_wait=may_wait)
-                return self._drop_excess_locked(message) if self.ready else message
-            max_messages = self._read_ahead.increase()
-            if self._read_into(self.ready, max_messages, _READ_AHEAD_BYTES, may_wait=may_wait) < max_messages:
-                self._read_ahead.reset()
-        if self.ready:
-            return self._drop_excess_locked(self.ready.popleft())
-        if not self._is_keeping_all:
-            self._fill_locked()
-        elif self._may_exceed_bound and self._inbox.messages:
-            self._inbox.move(self.ready, MAX_READ_AHEAD, _READ_AHEAD_BYTES)
-            return self.ready.popleft()
-        return self._inbox.pop()
+        if not self._reads_ahead:
+            self._fill_locked(may_wait=may_wait)
+            return self._inbox.pop()
+        if not self.ready:
+            if self._inbox.messages:
+                self._inbox.move(self.ready, MAX_READ_AHEAD, _READ_AHEAD_BYTES)
+            else:
+                self._read_into(self.ready, MAX_READ_AHEAD, _READ_AHEAD_BYTES, may_wait=may_wait)
+        return self.ready.popleft() if self.ready else None
 
-    def _drop_excess_locked(self, message: Message | None) -> Message | None:
-        # Drops `message`, and messages from the front of `ready`, until the queue limit is met; returns the
-        # oldest remaining message.
-        dropped = 0
-        while message is not None and len(self.ready) >= self.spec.max_messages:
-            message = self.ready.popleft()
-            dropped += 1
-        if dropped:
-            self._readable.count_dropped(dropped)
-        return message
-
-    def _fill_locked(self, max_messages: int = _BATCH_MESSAGES) -> int:
+    def _fill_locked(self, max_messages: int = _BATCH_MESSAGES, *, may_wait: bool = False) -> int:
         # Reads into the inbox until the socket is empty or a batch is full; returns the number of messages.
         messages: list[Message] = []
-        count = self._read_into(messages, max_messages, _BATCH_BYTES)
+        may_wait = may_wait and not self._inbox.messages
+        count = self._read_into(messages, max_messages, _BATCH_BYTES, may_wait=may_wait)
         dropped = sum(map(self._inbox.put, messages))
         if dropped:
             self._readable.count_dropped(dropped)

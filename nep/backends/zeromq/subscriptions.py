@@ -5,9 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.byte_window import SendWindow
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import RejectionCounter, RemoteConnection
+from nep.backends.zeromq.sockets import RemoteConnection
 from nep.protocol.wire import Hello, parse_acceptance, parse_acknowledgement, parse_hello, topic_part
 
 _logger = logging.getLogger("nep")

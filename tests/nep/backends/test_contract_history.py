@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import nep
+from nep.backends.bases.loss import EARLY_MESSAGE_WINDOW_S, PublisherTracker
 from nep.backends.zenoh.early_messages import EarlyMessages
-from nep.backends.zeromq.loss import EARLY_MESSAGE_WINDOW_S, PublisherTracker
 from nep.masters.master import Master
 from nep.messages.history import MAX_HISTORY_BYTES, History
 from nep.protocol.requests import PublisherRecord, RemotePublisher
@@ -238,7 +238,7 @@ def test_messages_before_the_echo_are_skipped_only_if_the_history_repeats_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = [100.0]
-    monkeypatch.setattr("nep.backends.zeromq.loss.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("nep.backends.bases.loss.time.monotonic", lambda: now[0])
     sources = PublisherTracker()
     assert not sources.is_early(5)
     sources.add_listed(_remote(1))

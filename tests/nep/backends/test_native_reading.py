@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-from collections import deque
 from collections.abc import Iterator
 from time import monotonic
 
@@ -252,7 +251,7 @@ def test_publisher_with_a_changed_port_is_reconnected(context: zmq.Context[zmq.S
             said.append(there.recv())
         assert said[0] == b"\x01t\0"
         there.send_multipart([said[1][1:], wire.Header(3, 0, 0, 0, 7).pack()])
-        eventually(lambda: sub.read([]) is None and sub.sources.get(7).has_echoed)
+        eventually(lambda: sub.read_into([], 1, 1) == 0 and sub.sources.get(7).has_echoed)
     for each in (first, second, sub):
         each.close()
 
@@ -270,9 +269,9 @@ def test_message_after_a_rejected_batch_is_read_immediately(context: zmq.Context
         there.send(b"t\0" + batch)
     there.send_multipart(wire.join("t", wire.Header(3, 0, 1, 1, 7), b"good"))
     assert sub.has_input
-    message = sub.read(deque())
-    assert message is not None
-    assert bytes(message.data) == b"good"
+    messages: list[nep.Message] = []
+    assert sub.read_into(messages, 1, 1_000) == 1
+    assert bytes(messages[0].data) == b"good"
     assert sub.rejections.count == 3
     sub.close()
     there.close(0)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import pytest
 
 import nep
+from nep.backends.bases.loss import PublisherTracker
 from nep.backends.zeromq import master_session
-from nep.backends.zeromq.loss import PublisherTracker
 from nep.masters.clocks import Clocks
 from nep.masters.master import Master
 from nep.messages.clocks import SAME_CLOCK, ClockDifference

@@ -10,9 +10,9 @@ import zmq
 
 import nep
 from nep.backends.base import SubscriberSpec
+from nep.backends.bases.loss import MAX_GAP, PublisherTracker
 from nep.backends.connection import Hybrid
 from nep.backends.zeromq.io_thread import IoThread
-from nep.backends.zeromq.loss import MAX_GAP, PublisherTracker
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master

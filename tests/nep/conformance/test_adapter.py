@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from nep.cli import wire
+from nep.cli.programs import wire
 from nep.programs.conformance import AdapterProcess, check, select_rules
 
 ADAPTER = (sys.executable, str(Path(__file__).parents[3] / "examples" / "conformance_adapter.py"))

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.cli.echo import echo
-from nep.cli.table_file import CsvMessageWriter, FieldExtractor
+from nep.cli.topics.echo import echo
+from nep.cli.topics.table_file import CsvMessageWriter, FieldExtractor
 from nep.errors import NepError
 from nep.messages.fields import MISSING, leaf_paths, parse_path, path_text, value_at
 from nep.messages.message import Message

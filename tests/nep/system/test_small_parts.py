@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 
 import nep
 from nep.backends.base import Backend
+from nep.backends.bases.loss import MAX_UNLISTED_PUBLISHERS, PublisherTracker
 from nep.backends.zeromq.io_thread import IoThread, PollState
-from nep.backends.zeromq.loss import MAX_UNLISTED_PUBLISHERS, PublisherTracker
 from nep.backends.zeromq.subscriptions import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message

@@ -13,42 +13,32 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nep.backends.deadlines import Deadlines
+from nep.backends.bases.deadlines import Deadlines
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.ros2.names import dds_service, ros_service, service_type_name, service_type_of
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
 from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
 from nep.backends.ros2.services.definitions import find_service_type
-from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_call_limits
-from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
+from nep.backends.services import ClientSpec, OpenCall, Outcome
+from nep.errors import NepError, ServerGoneError
 from nep.i18n import _
-from nep.protocol.requests import SubscriberCount, SubscriberRecord, clamp_count
+from nep.protocol.requests import SubscriberRecord
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
 _DISCOVERY_POLL_S, _SERVER_CHECK_S = 0.02, 0.1
 """Intervals in seconds: for discovering a server, and for checking that it still exists."""
 
-OutcomeCallback = Callable[[Outcome], None]
-
 
 @dataclass(eq=False)
-class _Call:
+class _Call(PendingCall):
     # Call in flight. `servers` may respond; None if it isn't sent yet.
-    number: int
-    data: bytes | memoryview
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
     servers: frozenset[bytes] | None = None
     is_server_missing: bool = False
 
-    @property
-    def size(self) -> int:
-        return len(self.data)
 
-
-class Ros2Client(ClientCalls[_Call]):
+class Ros2Client(PendingCalls[_Call]):
     """Client with its calls in flight. The constructor raises `BadTopicError` or `NepError`.
 
     Lock order: the participant's lock before `_lock`.
@@ -62,7 +52,7 @@ class Ros2Client(ClientCalls[_Call]):
         deadlines: Deadlines,
         on_close: Callable[[Ros2Client], object],
     ) -> None:
-        super().__init__(spec)
+        super().__init__(spec, _Call)
         self._participant = participant
         self._node_id = node_id
         self._deadlines = deadlines
@@ -124,11 +114,6 @@ class Ros2Client(ClientCalls[_Call]):
         return SubscriberRecord(self.spec.id, topic_of(self.spec.service), SERVICE_TYPE)
 
     @property
-    def counts(self) -> SubscriberCount:
-        """Statistics shown in the graph."""
-        return SubscriberCount(self.spec.id, clamp_count(self._answered), clamp_count(self._failed))
-
-    @property
     def is_connected(self) -> bool:
         """True if a server is ready for calls."""
         with self._participant.changed:
@@ -145,16 +130,10 @@ class Ros2Client(ClientCalls[_Call]):
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
     ) -> OpenCall:
         """Send a call. See `ClientTransport.start_call`."""
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
-            if self.is_closed:
-                raise self._closed_error()
-            check_call_limits(self.spec.service, len(self._calls), self._bytes, len(data))
-            call = _Call(next(self._numbers), data, timeout_s, deadline, callback)
-            self._calls[call.number] = call
-            self._bytes += len(data)
+            call = self._add_locked(data, timeout_s, callback)
         self._send_waiting_calls()
-        self._deadlines.add(min(deadline, time.monotonic() + _DISCOVERY_POLL_S))
+        self._deadlines.add(min(call.deadline, time.monotonic() + _DISCOVERY_POLL_S))
         return call
 
     def _send_waiting_calls(self) -> None:
@@ -169,7 +148,7 @@ class Ros2Client(ClientCalls[_Call]):
             with self._lock:
                 waiting_calls = [each for each in self._calls.values() if each.servers is None]
                 for call in waiting_calls if servers else ():
-                    call.servers = servers
+                    call.servers, call.is_sent = servers, True
         if type_error is not None:
             for call in waiting_calls:
                 self._finish(call, type_error)
@@ -181,9 +160,8 @@ class Ros2Client(ClientCalls[_Call]):
         return frozenset() if self._channel is None else self._channel.ready_servers()
 
     def _send(self, channel: ServiceChannel, call: _Call) -> None:
-        remaining_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         try:
-            cdr = channel.service_type.encode_call(self.spec.codec, call.data, remaining_s)
+            cdr = channel.service_type.encode_call(self.spec.codec, call.data, call.remaining_s)
             channel.send(CallId(self._guid, call.number), cdr)
         except NepError as error:
             self._finish(call, error)
@@ -216,14 +194,6 @@ class Ros2Client(ClientCalls[_Call]):
         if call is not None:
             self._finish(call, outcome)
 
-    def _finish(self, call: _Call, outcome: Outcome) -> None:
-        with self._lock:
-            if not self._remove_locked(call):
-                return
-            self._answered += not isinstance(outcome, NepError)
-            self._failed += isinstance(outcome, NepError)
-        self._run_callback(call, outcome)
-
     def expire(self, now: float) -> float:
         """Send waiting calls, fail expired ones, and return the next deadline. See `ExpiringClient.expire`.
 
@@ -243,15 +213,14 @@ class Ros2Client(ClientCalls[_Call]):
                 self._finish(call, ServerGoneError(self.spec.service))
             elif is_server_gone:
                 call.is_server_missing = True  # its replies may have arrived, but not been read yet
-            elif call.deadline <= now:
-                error_class = NoServerError if call.servers is None else ServiceTimeoutError
-                self._finish(call, error_class(self.spec.service, call.timeout_s or 0.0))
-        with self._lock:
-            deadlines = [
-                min(each.deadline, now + (_DISCOVERY_POLL_S if each.servers is None else _SERVER_CHECK_S))
-                for each in self._calls.values()
-            ]
-        return min(deadlines, default=math.inf)
+        return super().expire(now)
+
+    def _next_deadline_locked(self) -> float:
+        now = time.monotonic()
+        check_times = (
+            now + (_SERVER_CHECK_S if each.is_sent else _DISCOVERY_POLL_S) for each in self._calls.values()
+        )
+        return min(super()._next_deadline_locked(), *check_times, math.inf)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
@@ -262,14 +231,11 @@ class Ros2Client(ClientCalls[_Call]):
 
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`. Idempotent."""
-        with self._lock:
-            if self.is_closed:
-                return
-            self.is_closed = True
-            in_flight, self._calls = list(self._calls.values()), {}
+        in_flight = self._begin_close()
+        if in_flight is None:
+            return
         self._deadlines.remove_client(self)
         if self._channel is not None:
             self._channel.close()
         self._on_close(self)
-        for call in in_flight:
-            self._run_callback(call, self._closed_error())
+        self._fail_closed(in_flight)

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
 from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
@@ -18,7 +19,6 @@ from nep.backends.services import (
     limit_reply_size,
     rejection_reply,
 )
-from nep.backends.zeromq.sockets import RejectionCounter
 from nep.errors import NepError
 from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
@@ -64,9 +64,8 @@ class Ros2Server:
             self.spec.id, topic_of(self.spec.service), self._type.name, SERVICE_TYPE, self.endpoints
         )
 
-    @property
     def counts(self) -> PublisherCount:
-        """Statistics shown in the graph."""
+        """Return the statistics shown in the graph."""
         stats = self.stats
         return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 

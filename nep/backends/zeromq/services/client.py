@@ -6,30 +6,27 @@ all remaining calls that were sent over this connection fail.
 
 from __future__ import annotations
 
-import itertools
 import logging
 import math
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import zmq
+from msgspec.structs import replace
 
-from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
+from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
+from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.services import ClientSpec, Outcome
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import RejectionCounter, is_remote
+from nep.backends.zeromq.sockets import is_remote
 from nep.errors import (
-    ClosedError,
     NepError,
     NoServerError,
     ServerGoneError,
-    ServiceTimeoutError,
     WireError,
 )
-from nep.i18n import _
-from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
+from nep.protocol.requests import RemotePublisher, SubscriberCount
 from nep.protocol.service_wire import ORIGINAL, ORIGINAL_CODEC, Framing
 
 _logger = logging.getLogger("nep")
@@ -41,22 +38,7 @@ _PENDING_RETRY_S = 0.8
 _HANDOVER_TIMEOUT_S = 2.0
 """Maximum time in seconds that new calls wait for the last replies of a closing server."""
 
-OutcomeCallback = Callable[[Outcome], None]
-_Outcomes = list[tuple[OutcomeCallback, Outcome]]
-
-
-@dataclass(eq=False)
-class _Call:
-    number: int
-    data: bytes | memoryview
-    timeout_s: float | None
-    deadline: float
-    callback: OutcomeCallback
-    is_sent: bool = False
-
-    @property
-    def size(self) -> int:
-        return len(self.data)
+_Outcomes = list[tuple[PendingCall, Outcome]]
 
 
 class Connection(Protocol):
@@ -94,7 +76,7 @@ class Connection(Protocol):
         """Release the connection in a forked child process."""
 
 
-class SocketClient:
+class SocketClient(PendingCalls[PendingCall]):
     """Client for services over sockets.
 
     Args:
@@ -120,7 +102,7 @@ class SocketClient:
         query_services: Callable[[float], tuple[str, ...]] | None = None,
         endpoint: str = "",
     ) -> None:
-        self.spec = spec
+        super().__init__(spec, PendingCall)
         self._connect_to = connect_to
         self._connection: Connection | None = None
         self._framing = self._default_framing = framing
@@ -129,16 +111,13 @@ class SocketClient:
         self._serve_soon = serve_soon
         self._closer = closer
         self._query_services = query_services
-        self._lock = threading.Lock()
-        self._numbers = itertools.count(1)
-        self._calls: dict[int, _Call] = {}
         self._unanswered_sizes: dict[int, int] = {}
         """Sizes of the calls sent over this connection by number, oldest first, including cancelled ones.
 
         Needed because replies without a number arrive in this order, and to limit the bytes sent to a server
         that hangs.
         """
-        self._bytes = self._unanswered_bytes = 0
+        self._unanswered_bytes = 0
         self.fixed_endpoint = endpoint
         """Endpoint of the server without a master, or ""."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
@@ -155,8 +134,6 @@ class SocketClient:
         self._attempts = 0
         self._retry_at = 0.0
         self._rejections = RejectionCounter()
-        self._is_closed = False
-        self._replied = self._failed = self._late = 0
 
     # ---- calling, in any thread
 
@@ -175,19 +152,9 @@ class SocketClient:
         return -1
 
     @property
-    def late(self) -> int:
-        """Number of replies that arrived after their call had timed out or was cancelled."""
-        return self._late
-
-    @property
     def is_busy(self) -> bool:
         """True if calls are in flight."""
         return bool(self._calls)
-
-    @property
-    def is_closed(self) -> bool:
-        """True after `close`, or after the node was closed."""
-        return self._is_closed
 
     @property
     def endpoint(self) -> str:
@@ -197,28 +164,19 @@ class SocketClient:
 
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
-    ) -> _Call:
+    ) -> PendingCall:
         """Send a call. See `ClientTransport.start_call`."""
-        number = next(self._numbers)
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        call = _Call(number, data, timeout_s, deadline, callback)
         with self._lock:
-            if self._is_closed:
-                raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
-            count = max(len(self._calls), len(self._unanswered_sizes))
-            check_call_limits(self._name, count, max(self._bytes, self._unanswered_bytes), call.size)
-            self._calls[number] = call
-            self._bytes += call.size
+            call = self._add_locked(data, timeout_s, callback)
             if self._connection is not None:
                 self._connection.update()
                 self._send_locked(call)
         self._serve_soon(self)  # schedules the deadline, and the socket was used
         return call
 
-    def cancel(self, call: OpenCall) -> None:
-        """Cancel a call; its callback isn't called."""
-        with self._lock:
-            self._remove_locked(call.number)
+    def _load_locked(self) -> tuple[int, int]:
+        count, size = super()._load_locked()
+        return max(count, len(self._unanswered_sizes)), max(size, self._unanswered_bytes)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty without a master or if it doesn't reply."""
@@ -229,14 +187,7 @@ class SocketClient:
         except NepError:
             return ()
 
-    def _remove_locked(self, number: int) -> _Call | None:
-        # Returns None if the call is no longer in flight.
-        call = self._calls.pop(number, None)
-        if call is not None:
-            self._bytes -= call.size
-        return call
-
-    def _send_locked(self, call: _Call) -> None:
+    def _send_locked(self, call: PendingCall) -> None:
         # Calls go only to a connected server that hasn't announced its end.
         connection = self._connection
         if connection is None or not connection.is_open or self._current_id not in self._servers:
@@ -314,8 +265,7 @@ class SocketClient:
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
-        problem = self._rejections.recent_message()
-        return SubscriberCount(self.spec.id, clamp_count(self._replied), clamp_count(self._failed), problem)
+        return replace(super().counts(), problem=self._rejections.recent_message())
 
     # ---- in the I/O thread: the socket
 
@@ -330,7 +280,7 @@ class SocketClient:
         # Returns the time at which the client must be served again, or None.
         outcomes: _Outcomes = []
         with self._lock:
-            if self._is_closed:
+            if self.is_closed:
                 return None
             if self._connection is not None:
                 self._connection.update()
@@ -339,8 +289,9 @@ class SocketClient:
                 self._check_connection(now, outcomes)
             for call in [each for each in self._calls.values() if not each.is_sent]:
                 self._send_locked(call)
-            self._expire(now, outcomes)
-            due = self._next_deadline()
+            expired_calls = self._fail_locked(self._expired_locked(now))
+            outcomes += [(call, self._timeout_error(call)) for call in expired_calls]
+            due = self._next_deadline_locked()
             # zmq_send may consume input, and ZMQ_FD is edge-triggered: check again
             has_more = has_more or (self._connection is not None and self._connection.has_input)
         self._run_callbacks(outcomes)
@@ -369,10 +320,10 @@ class SocketClient:
             self._unanswered_bytes -= self._unanswered_sizes.pop(number or 0, 0)
             call = self._remove_locked(number or 0)
             if call is None:
-                self._late += 1
+                self.late += 1
                 continue
-            self._replied += 1
-            outcomes.append((call.callback, outcome))
+            self._answered += 1
+            outcomes.append((call, outcome))
         return True
 
     def _check_connection(self, now: float, outcomes: _Outcomes) -> None:
@@ -414,10 +365,8 @@ class SocketClient:
         self._switch_at = math.inf
         self._unanswered_sizes.clear()
         self._unanswered_bytes = 0
-        for call in [each for each in self._calls.values() if each.is_sent]:
-            self._remove_locked(call.number)
-            self._failed += 1
-            outcomes.append((call.callback, ServerGoneError(self._name)))
+        for call in self._fail_locked([each for each in self._calls.values() if each.is_sent]):
+            outcomes.append((call, ServerGoneError(self._name)))
 
     def _switch_server(self, outcomes: _Outcomes) -> None:
         self._fail_sent_calls(outcomes)
@@ -450,20 +399,14 @@ class SocketClient:
             connection.close()
             self._serve_soon(self)  # cancels scheduled calls for the closed sockets
 
-    def _expire(self, now: float, outcomes: _Outcomes) -> None:
-        for call in [each for each in self._calls.values() if each.deadline <= now]:
-            self._remove_locked(call.number)
-            self._failed += 1
-            timeout_s = call.timeout_s or 0.0
-            error: NepError = (
-                ServiceTimeoutError(self._name, timeout_s)
-                if call.is_sent
-                else NoServerError(self._name, timeout_s, address=self.fixed_endpoint.removeprefix("tcp://"))
-            )
-            outcomes.append((call.callback, error))
+    def _timeout_error(self, call: PendingCall) -> NepError:
+        if call.is_sent:
+            return super()._timeout_error(call)
+        address = self.fixed_endpoint.removeprefix("tcp://")
+        return NoServerError(self._name, call.timeout_s or 0.0, address=address)
 
-    def _next_deadline(self) -> float:
-        next_deadline = min((each.deadline for each in self._calls.values()), default=math.inf)
+    def _next_deadline_locked(self) -> float:
+        next_deadline = super()._next_deadline_locked()
         if self.is_connected and any(not each.is_sent for each in self._calls.values()):
             next_deadline = min(next_deadline, self._switch_at)
         if self.is_connected or not self._servers:
@@ -477,11 +420,8 @@ class SocketClient:
         return self.spec.service
 
     def _run_callbacks(self, outcomes: _Outcomes) -> None:
-        for callback, outcome in outcomes:
-            try:
-                callback(outcome)
-            except Exception:  # a failing callback must not affect other calls
-                _logger.exception("result callback for '%s' raised", self._name)
+        for call, outcome in outcomes:
+            self._run_callback(call, outcome)
 
     # ---- closing
 
@@ -491,19 +431,15 @@ class SocketClient:
 
     def release(self) -> None:
         """Fail the calls in flight and close the connection. Idempotent. Called by the closer."""
+        in_flight = self._begin_close()
         with self._lock:
-            self._is_closed = True
-            in_flight, self._calls = list(self._calls.values()), {}
             connection, self._connection = self._connection, None
         if connection is not None:  # without the lock: the thread that polls it may wait for the lock
             connection.close()
-        owner = _("client of '{service}'").format(service=self._name)
-        self._run_callbacks([(each.callback, ClosedError(owner)) for each in in_flight])
+        self._fail_closed(in_flight or ())
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
+        super().forked()
         if self._connection is not None:
             self._connection.forked()

@@ -15,6 +15,7 @@ from functools import partial
 
 import zmq
 
+from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.services import (
     CallQueue,
     IncomingCall,
@@ -25,7 +26,7 @@ from nep.backends.services import (
 )
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import RejectionCounter, Socket
+from nep.backends.zeromq.sockets import Socket
 from nep.errors import WireError
 from nep.protocol.requests import PublisherCount, clamp_count
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, Framing, Reply

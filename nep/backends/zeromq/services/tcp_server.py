@@ -23,12 +23,12 @@ from nep.backends.services import (
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.services.server import CallReader
 from nep.backends.zeromq.services.tcp_stream import TcpStream, enable_keep_alive
-from nep.backends.zeromq.sockets import wait_until
 from nep.errors import AddressInUseError, WireError
 from nep.protocol.service_wire import NATIVE, Reply
 from nep.system.addresses import host_of
 from nep.system.descriptors import check_free_descriptors, has_free_descriptors
 from nep.system.log_rarely import is_logged
+from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 

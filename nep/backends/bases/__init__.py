@@ -1,0 +1,1 @@
+"""Base classes and parts that several back ends share. Contracts are in `nep.backends.base`."""
