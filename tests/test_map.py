@@ -12,7 +12,7 @@ from tools import map as package_map
 ROOT = Path(__file__).parents[1]
 MAX_ENTRIES = 18
 """Maximum number of entries in a package; lists of plug-ins and commands are exempt."""
-LISTS = {"app/ui/panels", "nep/cli"}
+LISTS = {"app/ui/panels"}
 FILE = re.compile(r"`((?:nep|app)/[\w/]+\.(?:py|ts))`")
 
 

@@ -22,33 +22,22 @@ from nep.system.streams import command_line_arguments, output_problem
 from nep.version import __version__
 
 if TYPE_CHECKING:
-    from nep.cli import (
-        blackboard,
-        bridge,
-        doctor,
-        log,
-        masters,
-        nodes,
-        parameters,
-        play,
-        record,
-        recordings,
-        services,
-        top,
-        topics,
-        watch,
-        web,
-        wire,
-    )
+    from nep.cli.graph import log, nodes, parameters, services, top
+    from nep.cli.programs import blackboard, bridge, doctor, masters, watch, web, wire
+    from nep.cli.recordings import play, record, recordings
+    from nep.cli.topics import topics
 else:  # a command line needs only one of them
-    blackboard, bridge = lazy_module("nep.cli.blackboard"), lazy_module("nep.cli.bridge")
-    doctor, log = lazy_module("nep.cli.doctor"), lazy_module("nep.cli.log")
-    masters, nodes = lazy_module("nep.cli.masters"), lazy_module("nep.cli.nodes")
-    parameters, play = lazy_module("nep.cli.parameters"), lazy_module("nep.cli.play")
-    record, recordings = lazy_module("nep.cli.record"), lazy_module("nep.cli.recordings")
-    services, top = lazy_module("nep.cli.services"), lazy_module("nep.cli.top")
-    topics, watch = lazy_module("nep.cli.topics"), lazy_module("nep.cli.watch")
-    web, wire = lazy_module("nep.cli.web"), lazy_module("nep.cli.wire")
+    blackboard, bridge = lazy_module("nep.cli.programs.blackboard"), lazy_module("nep.cli.programs.bridge")
+    doctor, log = lazy_module("nep.cli.programs.doctor"), lazy_module("nep.cli.graph.log")
+    masters, nodes = lazy_module("nep.cli.programs.masters"), lazy_module("nep.cli.graph.nodes")
+    parameters, play = lazy_module("nep.cli.graph.parameters"), lazy_module("nep.cli.recordings.play")
+    record, recordings = (
+        lazy_module("nep.cli.recordings.record"),
+        lazy_module("nep.cli.recordings.recordings"),
+    )
+    services, top = lazy_module("nep.cli.graph.services"), lazy_module("nep.cli.graph.top")
+    topics, watch = lazy_module("nep.cli.topics.topics"), lazy_module("nep.cli.programs.watch")
+    web, wire = lazy_module("nep.cli.programs.web"), lazy_module("nep.cli.programs.wire")
 
 _COMMANDS: Mapping[str, Callable[[], object]] = {
     "master": lambda: masters.master,

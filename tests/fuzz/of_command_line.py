@@ -6,8 +6,8 @@ import json
 
 import orjson
 
-from nep.cli import topic_patterns
-from nep.cli.publish import parse_payload as payload_of
+from nep.cli.topics import topic_patterns
+from nep.cli.topics.publish import parse_payload as payload_of
 from nep.cli.values import encode_json, format_payload
 from nep.errors import EncodeError, NepError, WrongTypeError
 from nep.messages.codecs import CODECS

@@ -340,8 +340,8 @@ def test_command_line_imports_only_its_own_command():
         "from nep.cli.app import run\n"
         "sys.argv = ['nep', 'doctor', '--timeout', 'x']\n"
         "assert run() == 2\n"
-        "assert 'nep.cli.doctor' in sys.modules\n"
-        "others = ('masters', 'topics', 'recordings', 'watch', 'bridge')\n"
+        "assert 'nep.cli.programs.doctor' in sys.modules\n"
+        "others = ('programs.masters', 'topics', 'recordings', 'programs.watch', 'programs.bridge')\n"
         "assert not [name for name in others if f'nep.cli.{name}' in sys.modules]\n"
     )
     assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0

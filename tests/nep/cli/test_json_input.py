@@ -9,7 +9,7 @@ import shlex
 import pytest
 
 from nep.cli.json_input import parse_json
-from nep.cli.publish import parse_payload
+from nep.cli.topics.publish import parse_payload
 from nep.errors import NepError
 
 

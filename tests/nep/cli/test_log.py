@@ -10,7 +10,7 @@ import typer
 
 import nep
 from nep.cli.alert_printer import AlertLog
-from nep.cli.log import log
+from nep.cli.graph.log import log
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC, LOG_TYPE
 from tests.nep.programs import eventually
 

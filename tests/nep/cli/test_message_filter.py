@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep.cli.message_filter import MessageFilter
+from nep.cli.topics.message_filter import MessageFilter
 from nep.errors import NepError
 
 PAYLOAD = {

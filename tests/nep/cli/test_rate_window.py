@@ -10,10 +10,10 @@ import time
 import pytest
 
 import nep
-from nep.cli.hz_bw import _DelayReport, bw, format_duration, format_latency, hz
-from nep.cli.publish import repeat
-from nep.cli.rate_window import MAX_MESSAGES, Delay, LatchedFilter, LatencyWindow, RateWindow
 from nep.cli.screen import print_status
+from nep.cli.topics.hz_bw import _DelayReport, bw, format_duration, format_latency, hz
+from nep.cli.topics.publish import repeat
+from nep.cli.topics.rate_window import MAX_MESSAGES, Delay, LatchedFilter, LatencyWindow, RateWindow
 from nep.errors import BadTopicError, WaitTimeoutError
 from nep.messages.clocks import OWN_CLOCK, UNKNOWN_CLOCK
 from nep.messages.message import message_kind
@@ -136,7 +136,7 @@ def test_topic_that_appears_later_is_measured(master, capsys, monkeypatch):
             print_status(sentence)
             talking.start()
 
-        monkeypatch.setattr("nep.cli.topic_wait.print_status", said)
+        monkeypatch.setattr("nep.cli.topics.topic_wait.print_status", said)
         hz(["/odom"], 60.0, 2, master.address)
         ended.set()
         talking.join()

@@ -5,15 +5,15 @@ from __future__ import annotations
 import io
 import json
 import math
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 from rich.live import Live
 
 import nep
-from nep.cli import top
-from nep.cli.top import TopicOrder, node_rows, topic_rows
+from nep.cli.graph import top
+from nep.cli.graph.top import TopicOrder, node_rows, topic_rows
 from nep.masters.master import Master
 from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo

@@ -7,7 +7,7 @@ import json
 import pytest
 
 import nep
-from nep.cli.topic_patterns import TopicPatterns, is_pattern, matches
+from nep.cli.topics.topic_patterns import TopicPatterns, is_pattern, matches
 from tests.nep.cli.test_command import Running
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from nep.cli.echo import MessagePrinter, show_record
-from nep.cli.publish import parse_payload, wait_for_subscribers
+from nep.cli.topics.echo import MessagePrinter, show_record
+from nep.cli.topics.publish import parse_payload, wait_for_subscribers
 from nep.errors import EncodeError, NepError
 from nep.messages.message import Message
 
@@ -107,7 +107,7 @@ def test_payload_is_read_from_a_file(tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="/dev/zero is a device of Unix")
 def test_endless_device_is_rejected_as_payload_file(monkeypatch):
-    monkeypatch.setattr("nep.cli.publish._MAX_FILE_BYTES", 1000)
+    monkeypatch.setattr("nep.cli.topics.publish._MAX_FILE_BYTES", 1000)
     with pytest.raises(EncodeError, match=r"larger than 1\.0 kB"):
         parse_payload("@/dev/zero", "bytes")
 

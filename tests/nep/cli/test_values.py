@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.cli.echo import MessagePrinter, echo, show_record, topics_and_fields
+from nep.cli.topics.echo import MessagePrinter, echo, show_record, topics_and_fields
 from nep.cli.values import convert_ids_to_text, encode_json, format_payload
 from nep.errors import WaitTimeoutError
 from nep.messages.message import Message

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.cli import screen
-from nep.cli.ring import KEEP_SERVICE, has_flight_recorder
+from nep.cli.recordings.ring import KEEP_SERVICE, has_flight_recorder
 from nep.masters.master import Master
 from nep.programs.alarms.rule_file import EXAMPLE
 from tests.nep.programs import eventually, running
@@ -173,7 +173,7 @@ def test_watch_command_waits_for_a_master_that_starts_later(type_in, file, monke
         if sentence.endswith("; waiting"):
             waits.set()
 
-    monkeypatch.setattr("nep.cli.watch.print_status", say)
+    monkeypatch.setattr("nep.cli.programs.watch.print_status", say)
 
     def come_later() -> None:
         if waits.wait(30):

@@ -16,9 +16,9 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
-from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_flight_recorder
+from nep.cli.recordings.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_flight_recorder
 from nep.cli.screen import console, print_status, show_json, write
-from nep.cli.topic_wait import suggestion
+from nep.cli.topics.topic_wait import suggestion
 from nep.cli.values import escape_for_terminal
 from nep.errors import NepError
 from nep.i18n import _

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.options import JsonOption
-from nep.cli.recording_files import FileArgument, clock_text, exit_if_damaged, progress_bar
+from nep.cli.recordings.recording_files import FileArgument, clock_text, exit_if_damaged, progress_bar
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,

@@ -12,7 +12,7 @@ import typer
 from nep.cli import interrupts
 from nep.cli.network import open_command_node
 from nep.cli.options import AllowMovingOption, MasterOption
-from nep.cli.recording_files import (
+from nep.cli.recordings.recording_files import (
     FileArgument,
     FromOption,
     RecordedTopicsArgument,

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import typer
 
-from nep.cli.echo import echo
-from nep.cli.hz_bw import bw, delay, hz
+from nep.cli.graph_text import count_text, node_list
 from nep.cli.network import BackendOption, query_graph
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.publish import publish
 from nep.cli.screen import (
-    UNKNOWN,
     TextColumn,
     format_bandwidth,
     format_rate,
@@ -21,11 +16,14 @@ from nep.cli.screen import (
     show_json,
     show_table,
 )
-from nep.cli.topic_info import find, info, show_type
+from nep.cli.topics.echo import echo
+from nep.cli.topics.hz_bw import bw, delay, hz
+from nep.cli.topics.publish import publish
+from nep.cli.topics.topic_info import find, info, show_type
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import convert_ids_to_text
 from nep.i18n import _, lazy
-from nep.protocol.graph_view import GraphView, TopicInfo
+from nep.protocol.graph_view import GraphView, TopicInfo, to_plain
 from nep.text import escaped
 
 app: typer.Typer = typer.Typer(
@@ -60,7 +58,7 @@ def list_topics(
     graph = query_graph(master, backend)
     topics = [graph.topics[name] for name in sorted(graph.topics)]
     if as_json:
-        show_json(convert_ids_to_text([asdict(topic) for topic in topics]))
+        show_json(convert_ids_to_text([to_plain(topic) for topic in topics]))
         return
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
@@ -73,16 +71,9 @@ def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
     return (
         escaped(topic.name),
         escaped(topic.msg_type),
-        _node_names(graph, [each.node_id for each in topic.publishers]),
-        _node_names(graph, [each.node_id for each in topic.subscribers]),
+        node_list(graph, (each.node_id for each in topic.publishers)),
+        node_list(graph, (each.node_id for each in topic.subscribers)),
         format_rate(topic.rate_hz),
         format_bandwidth(topic),
-        UNKNOWN if topic.lost is None else str(topic.lost),
+        count_text(topic.lost),
     )
-
-
-def _node_names(graph: GraphView, node_ids: list[str]) -> str:
-    nodes = [graph.nodes[each] for each in node_ids if each in graph.nodes]
-    has_originals = any(node.generation not in {"native", "gateway"} for node in nodes)
-    names = [node.name for node in nodes if not (has_originals and node.generation == "gateway")]
-    return "\n".join(dict.fromkeys(map(escaped, names))) or UNKNOWN

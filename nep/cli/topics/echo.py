@@ -15,7 +15,6 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_field_or_topic, complete_topic
-from nep.cli.message_filter import MessageFilter
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import (
@@ -28,9 +27,10 @@ from nep.cli.screen import (
     show_json,
     write,
 )
-from nep.cli.table_file import CsvMessageWriter, FieldExtractor
-from nep.cli.topic_patterns import TopicPatterns, is_pattern
-from nep.cli.topic_wait import TopicMonitor
+from nep.cli.topics.message_filter import MessageFilter
+from nep.cli.topics.table_file import CsvMessageWriter, FieldExtractor
+from nep.cli.topics.topic_patterns import TopicPatterns, is_pattern
+from nep.cli.topics.topic_wait import TopicMonitor
 from nep.cli.values import encode_json, escape_for_terminal, format_payload
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, format_list, ngettext

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nep.cli import recording_info, ring
 from nep.cli.options import JsonOption
-from nep.cli.recording_files import (
+from nep.cli.recordings import recording_info, ring
+from nep.cli.recordings.recording_files import (
     FileArgument,
     FromOption,
     RecordedTopicsArgument,

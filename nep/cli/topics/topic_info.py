@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
 from nep.cli.complete import complete_topic, complete_type
+from nep.cli.graph_text import count_text, node_text, plain_with_names
 from nep.cli.network import BackendOption, query_graph
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
@@ -22,7 +22,7 @@ from nep.cli.screen import (
     show_table,
     write,
 )
-from nep.cli.topic_wait import suggestion
+from nep.cli.topics.topic_wait import suggestion
 from nep.cli.values import convert_ids_to_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
@@ -65,7 +65,7 @@ def info(
     graph = query_graph(master, backend)
     topic_info = _find_topic(topic, graph)
     if as_json:
-        show_json(convert_ids_to_text(_record(graph, topic_info)))
+        show_json(convert_ids_to_text(plain_with_names(graph, topic_info, "publishers", "subscribers")))
         return
     is_latched = any(each.latched for each in topic_info.publishers)
     for heading, value in (
@@ -75,7 +75,7 @@ def info(
         (_("latched"), _("yes") if is_latched else _("no")),
         (_("rate"), format_rate(topic_info.rate_hz)),
         (_("bandwidth"), format_bandwidth(topic_info)),
-        (_("lost"), _count_text(topic_info.lost)),
+        (_("lost"), count_text(topic_info.lost)),
     ):
         write(f"{heading}: {value}\n")
     write("\n")
@@ -129,17 +129,10 @@ def _find_topic(topic: str, graph: GraphView) -> TopicInfo:
     return topic_info
 
 
-def _record(graph: GraphView, topic: TopicInfo) -> dict[str, object]:
-    record: dict[str, object] = asdict(topic)
-    for role, members in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
-        record[role] = [{**asdict(each), "node": _node_name(graph, each.node_id)} for each in members]
-    return record
-
-
 def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
     publishers = [
         (
-            escaped(_node_name(graph, each.node_id) or UNKNOWN),
+            node_text(graph, each.node_id),
             _("publishes"),
             str(each.count),
             format_rate(each.rate_hz),
@@ -150,22 +143,13 @@ def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
     ]
     subscribers = [
         (
-            escaped(_node_name(graph, each.node_id) or UNKNOWN),
+            node_text(graph, each.node_id),
             _("subscribes"),
-            _count_text(each.received),
+            count_text(each.received),
             UNKNOWN,
             UNKNOWN,
-            _count_text(each.lost),
+            count_text(each.lost),
         )
         for each in topic.subscribers
     ]
     return [*sorted(publishers), *sorted(subscribers)]
-
-
-def _node_name(graph: GraphView, node_id: str) -> str | None:
-    node = graph.nodes.get(node_id)
-    return None if node is None else node.name
-
-
-def _count_text(value: int | None) -> str:
-    return UNKNOWN if value is None else str(value)

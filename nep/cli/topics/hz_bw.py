@@ -15,7 +15,6 @@ import typer
 from nep.cli.complete import complete_topic
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.rate_window import Bandwidth, Delay, Frequency, LatchedFilter, LatencyWindow, RateWindow
 from nep.cli.screen import (
     UNKNOWN,
     display_width,
@@ -26,7 +25,8 @@ from nep.cli.screen import (
     show_json,
     write,
 )
-from nep.cli.topic_wait import TopicMonitor
+from nep.cli.topics.rate_window import Bandwidth, Delay, Frequency, LatchedFilter, LatencyWindow, RateWindow
+from nep.cli.topics.topic_wait import TopicMonitor
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message

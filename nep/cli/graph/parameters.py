@@ -16,8 +16,8 @@ import typer
 from nep.cli.complete import complete_node
 from nep.cli.json_input import decode_text, parse_json
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_json, show_table, write
+from nep.cli.topics.publish import read_file
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import encode_json, format_payload
 from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean

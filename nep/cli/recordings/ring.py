@@ -18,7 +18,7 @@ from nep.cli import interrupts
 from nep.cli.complete import complete_topic
 from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.recording_files import TopicsToRecordArgument, clock_text
+from nep.cli.recordings.recording_files import TopicsToRecordArgument, clock_text
 from nep.cli.screen import console, format_size, print_status, show_json
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -21,12 +20,12 @@ from nep.cli.screen import (
     show_table,
     write,
 )
-from nep.cli.topic_wait import suggestion
+from nep.cli.topics.topic_wait import suggestion
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.protocol.graph_view import GraphView, NodeInfo
+from nep.protocol.graph_view import GraphView, NodeInfo, to_plain
 from nep.text import escaped, quotable
 
 app: typer.Typer = typer.Typer(
@@ -65,7 +64,7 @@ def list_nodes(
     nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
     if as_json:
         show_json(
-            [{**asdict(node), **_topics_of(graph, node), **_services_of(graph, node)} for node in nodes]
+            [{**to_plain(node), **_topics_of(graph, node), **_services_of(graph, node)} for node in nodes]
         )
         return
     if nodes and graph.services:
@@ -120,7 +119,7 @@ def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
         role: {name: graph.services[name].msg_type for name in names}
         for role, names in _services_of(graph, node).items()
     }
-    return {**asdict(node), **topics, **services}
+    return {**to_plain(node), **topics, **services}
 
 
 def _description(graph: GraphView, node: NodeInfo) -> str:

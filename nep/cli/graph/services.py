@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from nep.cli.complete import complete_service, complete_service_type
+from nep.cli.graph_text import count_text, node_list, node_text, plain_with_names
 from nep.cli.json_input import decode_text, parse_json
 from nep.cli.network import BackendOption, open_node, query_graph
 from nep.cli.options import JsonOption, MasterOption, check_duration
-from nep.cli.publish import read_file
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
@@ -23,12 +22,13 @@ from nep.cli.screen import (
     show_table,
     write,
 )
-from nep.cli.topic_wait import suggestion
+from nep.cli.topics.publish import read_file
+from nep.cli.topics.topic_wait import suggestion
 from nep.cli.typer_texts import TranslatedGroup
 from nep.cli.values import convert_ids_to_text, format_payload, service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.protocol.graph_view import GraphView, ServiceInfo
+from nep.protocol.graph_view import GraphView, ServiceInfo, to_plain
 from nep.protocol.service_wire import check_service
 from nep.text import escaped, quotable
 
@@ -72,7 +72,7 @@ def list_services(
     graph = query_graph(master, backend)
     services = [graph.services[name] for name in sorted(graph.services)]
     if as_json:
-        show_json(convert_ids_to_text([asdict(each) for each in services]))
+        show_json(convert_ids_to_text([to_plain(each) for each in services]))
         return
     if services:
         show_table(_COLUMNS, [_row(graph, each) for each in services])
@@ -92,7 +92,7 @@ def info(
     graph = query_graph(master, backend)
     service_info = _find_service(service, graph)
     if as_json:
-        show_json(convert_ids_to_text(_record(graph, service_info)))
+        show_json(convert_ids_to_text(plain_with_names(graph, service_info, "servers", "clients")))
         return
     for heading, value in (
         (_("service"), escaped(service_info.name)),
@@ -208,29 +208,17 @@ def _find_service(service: str, graph: GraphView) -> ServiceInfo:
 def _row(graph: GraphView, service: ServiceInfo) -> tuple[str, ...]:
     return (
         escaped(service.name),
-        _node_names(graph, [each.node_id for each in service.servers]),
-        _node_names(graph, [each.node_id for each in service.clients]),
+        node_list(graph, (each.node_id for each in service.servers)),
+        node_list(graph, (each.node_id for each in service.clients)),
         str(service.calls) if service.servers else UNKNOWN,
         str(service.errors) if service.servers else UNKNOWN,
     )
 
 
-def _node_names(graph: GraphView, node_ids: list[str]) -> str:
-    names = [escaped(graph.nodes[each].name) for each in node_ids if each in graph.nodes]
-    return "\n".join(dict.fromkeys(names)) or UNKNOWN
-
-
-def _record(graph: GraphView, service: ServiceInfo) -> dict[str, object]:
-    record: dict[str, object] = asdict(service)
-    for role, members in (("servers", service.servers), ("clients", service.clients)):
-        record[role] = [{**asdict(each), "node": _node_name(graph, each.node_id)} for each in members]
-    return record
-
-
 def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
     servers = [
         (
-            escaped(_node_name(graph, each.node_id) or UNKNOWN),
+            node_text(graph, each.node_id),
             _("serves"),
             str(each.calls),
             str(each.errors),
@@ -241,22 +229,13 @@ def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
     ]
     clients = [
         (
-            escaped(_node_name(graph, each.node_id) or UNKNOWN),
+            node_text(graph, each.node_id),
             _("calls"),
-            _count_text(each.answered),
-            _count_text(each.failed),
+            count_text(each.answered),
+            count_text(each.failed),
             UNKNOWN,
             UNKNOWN,
         )
         for each in service.clients
     ]
     return [*servers, *sorted(clients)]  # calls go to the first server
-
-
-def _node_name(graph: GraphView, node_id: str) -> str | None:
-    node = graph.nodes.get(node_id)
-    return None if node is None else node.name
-
-
-def _count_text(value: int | None) -> str:
-    return UNKNOWN if value is None else str(value)

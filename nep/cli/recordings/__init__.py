@@ -1,0 +1,1 @@
+"""Commands that record, play and inspect recordings."""
