@@ -15,7 +15,7 @@ import pytest
 from msgpack import packb  # type: ignore[import-untyped]
 
 from app import errors as app_errors
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.documents.file_format import parse_file
 from app.core.network import graph_changes
 from app.core.network.decode_checks import CheckResult

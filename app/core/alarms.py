@@ -9,7 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ShowAlarms
 from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
@@ -35,7 +36,6 @@ from nep.programs.alarms.sentences import duration_text, event_text, subject_tex
 from nep.protocol.graph_view import GraphView
 
 FILE_NAME = "alarms.json"
-SHOW_COMMAND = "panel:alarms"
 """Name of the window command that shows the alarms panel."""
 MAX_MESSAGE_AGE_S = 10.0
 """Maximum age in seconds of an unsent message. Older messages may be outdated and are discarded."""
@@ -175,7 +175,7 @@ class SessionAlarms:
         text = _("You have {count} alarms, the maximum.").format(count=MAX_ALARMS)
         hint = _("Delete one you don't need.")
         self._session.alerts.raise_alert(
-            "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW_COMMAND, count=0
+            "alarms:most", "warn", text, hint, button=_("Show the alarms"), intent=ShowAlarms(), count=0
         )
         return False
 
@@ -312,7 +312,7 @@ class SessionAlarms:
             f"{alert_text[:1].upper()}{alert_text[1:]}.",
             ". ".join([*(each[:1].upper() + each[1:] for each in details), ""]).strip(),
             button=_("Show the alarm"),
-            action=SHOW_COMMAND,
+            intent=ShowAlarms(),
             count=max(count, total_count - previous_count) if previous_count else max(1, count),
         )
 
@@ -412,7 +412,7 @@ class SessionAlarms:
             is_partial = stored.value is not None
             title = _("Some alarms couldn't be read.") if is_partial else _("The alarms couldn't be read.")
             self._session.alerts.raise_alert(
-                "alarms:file", "warn", title, stored.problem, button=_("Show the alarms"), action=SHOW_COMMAND
+                "alarms:file", "warn", title, stored.problem, button=_("Show the alarms"), intent=ShowAlarms()
             )
         return stored.value if stored.value is not None else AlarmFile()
 

@@ -21,7 +21,8 @@ from types import TracebackType
 
 import platformdirs
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ShowLog
 from nep.i18n import _
 from nep.version import __version__
 
@@ -273,5 +274,5 @@ class FaultAlerts:
     def _update_alert(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")
         self._alerts.raise_alert(
-            ALERT_ID, "error", title, fault.message, button=_("Show the log"), action="help.log", count=count
+            ALERT_ID, "error", title, fault.message, button=_("Show the log"), intent=ShowLog(), count=count
         )

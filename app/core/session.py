@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.core.alarms import SessionAlarms
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ConnectRobot, OpenDoctor
 from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.documents.journal import Journal
@@ -506,7 +507,7 @@ class Session:
                     event.message,
                     event.detail.splitlines()[-1] if event.detail else "",
                     button=_("Restart the robot") if event.is_robot else _(OPEN_DOCTOR_LABEL),
-                    action=f"connect:{event.name}" if event.is_robot else "help.doctor",
+                    intent=ConnectRobot(event.name) if event.is_robot else OpenDoctor(),
                 )
             case WatchFailed():
                 self.alerts.raise_alert(
@@ -579,7 +580,7 @@ class Session:
                 _("Lost the connection to the master."),
                 _("Connected programs keep running. New programs can't join until a master responds."),
                 button=_(OPEN_DOCTOR_LABEL),
-                action="help.doctor",
+                intent=OpenDoctor(),
             )
             self.live.topics.values_revision += 1
 

@@ -19,7 +19,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.documents.journal import newer_work_names, unsaved_work
 from app.core.documents.versions import move_old_versions
 from app.core.reports import studio_versions

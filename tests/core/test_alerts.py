@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 
 
 def test_alerts_are_sorted_by_severity_then_age() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 import nep
 from app.core import faults
+from app.core.alerts.intents import ShowLog
 from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_text
 from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound
 from app.core.robots.stop.report import StopCompleted, StopReport
@@ -197,7 +198,7 @@ def test_event_handler_that_raises_does_not_block_other_events(
     assert session.master.kind == "connected"
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
     assert alert.detail.startswith("Studio can't handle RunnerEvent: ValueError")
-    assert alert.action == "help.log"
+    assert alert.intent == ShowLog()
     once = RepeatFilter()
     assert sum(once.filter(record) is not None for record in caplog.records) == 2  # the first, and the tenth
 

@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 import nep
+from app.core.alerts.intents import ConnectRobot
 from app.core.network.source import JobFailed
 from app.core.session import MONITORING_FAILED_MESSAGE, Session
 from app.errors import RobotInputError, UnknownRobotError
@@ -137,7 +138,7 @@ def test_alert_about_a_crashed_virtual_robot_offers_a_restart(session: Session) 
     session.launcher._robots["Pepper"][0].kill()
     tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
-    assert (alert.button, alert.action) == ("Restart the robot", "connect:Pepper")
+    assert (alert.button, alert.intent) == ("Restart the robot", ConnectRobot("Pepper"))
     tick_until(session, lambda: not session.fleet.connected)
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))

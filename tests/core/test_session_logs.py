@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import Intent, OpenDoctor
 from app.core.network.source import MasterFound, MasterLost
 from app.core.robots.launcher import LaunchFailed
 from app.core.session import Session
@@ -119,13 +120,13 @@ def test_program_output_is_shown_once_even_if_it_is_also_published_as_log(sessio
 
 
 def test_connection_alerts_link_to_the_doctor(session: Session) -> None:
-    def next_steps(alerts: Alerts) -> dict[str, str | None]:
-        return {alert.id: alert.action for alert in alerts.active}
+    def next_steps(alerts: Alerts) -> dict[str, Intent | None]:
+        return {alert.id: alert.intent for alert in alerts.active}
 
     session._on_event(MasterFound("127.0.0.1:1"), 0.0)
     session._on_event(MasterLost("127.0.0.1:1", "no master answers"), 0.0)
     session._on_event(LaunchFailed("master", "The master can't be started.", "Port …", False), 0.0)
-    assert next_steps(session.alerts) == {"master": "help.doctor", "companion:master": "help.doctor"}
+    assert next_steps(session.alerts) == {"master": OpenDoctor(), "companion:master": OpenDoctor()}
     assert {alert.button for alert in session.alerts.active} == {"Open the connection doctor"}
 
 

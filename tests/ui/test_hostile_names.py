@@ -14,6 +14,7 @@ from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
 
 import app.ui
+from app.core.alerts.intents import Inspect
 from app.ui.panels.base import PanelWidget
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.banner import AlertBanner
@@ -72,7 +73,7 @@ def hostile() -> Window:
     actions = [replace(action, title=f"{action.title} {NAME}") for action in robot.actions]
     link.robot = replace(robot, actions=tuple(actions))
     session.fleet.revision += 1
-    session.alerts.raise_alert("a", "error", NAME, NAME, button=NAME, action="x")
+    session.alerts.raise_alert("a", "error", NAME, NAME, button=NAME, intent=Inspect(NAME))
     session.console.add("error", NAME, NAME)
     return Window(session)
 

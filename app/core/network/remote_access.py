@@ -6,7 +6,8 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import AllowOtherComputers
 from app.core.storage.settings import ListSettings
 from app.errors import SettingsError
 from nep.errors import NepError
@@ -110,7 +111,7 @@ class RemoteAccess:
                 _("The list of allowed connections can't be saved."),
                 template.format(error=error),
                 button=_("Choose an address"),
-                action="network.others",
+                intent=AllowOtherComputers(),
                 count=0,
             )
         else:
@@ -142,7 +143,7 @@ class RemoteAccess:
             _("Other computers can't connect."),
             f"{event.message[:1].upper()}{event.message[1:]}.",
             button=_("Choose an address"),
-            action="network.others",
+            intent=AllowOtherComputers(),
         )
 
     def close(self) -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal, Protocol
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import BrowseNetworks
 from app.core.network.mailbox import Batch
 from app.core.network.nodes import NodeEntry, Nodes
 from app.core.network.source import GraphReceived, MasterFound, MasterLost, Sink, WatchFailed
@@ -20,8 +21,6 @@ from nep.i18n import _
 
 SETTING_KEY = "networks"
 """Name of the setting that stores the address of each shown network."""
-BROWSE_COMMAND = "network.look"
-"""Name of the window command that opens the selection of networks."""
 COUNT_INTERVAL_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
@@ -294,7 +293,7 @@ class Networks:
             _("{network} can't be shown now.").format(network=network.kind.product_name),
             f"{network.sentence[:1].upper()}{network.sentence[1:]}.",
             button=_("Other networks"),
-            action=BROWSE_COMMAND,
+            intent=BrowseNetworks(),
             count=0,
         )
 

@@ -20,7 +20,7 @@ from typing import IO, Protocol
 
 import orjson
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.own_process import module_command
 from nep.i18n import _, ngettext
 from nep.masters.process import NO_CONSOLE

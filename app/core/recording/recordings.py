@@ -10,7 +10,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ChooseRecordingsFolder
 from app.core.recording.client import (
     RecorderClient,
     RecorderEvent,
@@ -47,8 +48,6 @@ else:  # they import the reading of recordings, which no start should wait for
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER_ALERT = "recorder:folder"
-CHOOSE_FOLDER_COMMAND = "recording.folder"
-"""Name of the window command that lets the user choose another folder."""
 _GB = 1_000_000_000
 _SAVED_FILE_PATTERN = re.compile(r"[\w.-]+\.mcap\b")
 
@@ -124,7 +123,7 @@ class SessionRecordings:
             _("Not recording: the recordings folder is missing."),
             problem,
             button=_("Choose a folder"),
-            action=CHOOSE_FOLDER_COMMAND,
+            intent=ChooseRecordingsFolder(),
         )
         return None
 

@@ -13,7 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ReportProblem
 from app.core.faults import CONSOLE_EXTRA, RepeatFilter, log_folder
 from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
@@ -26,7 +27,6 @@ from nep.version import __version__
 MAX_REPORTS = 10
 MAX_REPORT_CHARS = 100_000
 ALERT_ID = "crash"
-REPORT_COMMAND = "help.report"
 _STAMP_FORMAT = "%Y-%m-%d %H.%M.%S"
 _NAME_PATTERN = re.compile(
     rf"crash (?P<stamp>\d{{4}}-\d\d-\d\d \d\d\.\d\d\.\d\d) (?P<part>{'|'.join(PARTS)})(?: \d+)?"
@@ -152,7 +152,7 @@ def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
             _(ALERT_TITLES[worst.part]),
             " ".join(sentences),
             button=_("Report a problem"),
-            action=REPORT_COMMAND,
+            intent=ReportProblem(),
         )
 
 

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from nep.i18n import _, format_list, ngettext
 
 ALERT_ID = "system-libraries"

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import (
+    ConnectRobot,
+    Inspect,
+    OpenDoctor,
+    SaveBehaviour,
+    SaveBehaviourAs,
+    StopRobots,
+)
 from app.core.network.decode_checks import CheckResult
 from app.core.network.topics import Topics
 from app.core.own_process import ExecutableState
@@ -118,7 +126,7 @@ class Health:
                         next_step=_(VIRTUAL_ROBOT_HINT if link.is_virtual else REAL_ROBOT_HINT)
                     ),
                     button=_("Stop"),
-                    action="run.stop",
+                    intent=StopRobots(),
                     count=0,
                 )
             else:
@@ -140,7 +148,7 @@ class Health:
             _("Your unsaved work isn't backed up."),
             f"{reason[0].upper()}{reason[1:]}.",
             button=_("Save"),
-            action="file.save",
+            intent=SaveBehaviour(),
             count=0,
         )
 
@@ -164,7 +172,7 @@ class Health:
                 why=f"{reason[0].upper()}{reason[1:]}"
             ),
             button=_("Save somewhere else"),
-            action="file.save_as",
+            intent=SaveBehaviourAs(),
             count=0,
         )
         return False
@@ -245,7 +253,7 @@ class Health:
             title,
             detail,
             button=button,
-            action="help.doctor",
+            intent=OpenDoctor(),
             count=0,
             for_developers=True,
         )
@@ -268,7 +276,7 @@ class Health:
             title.format(topic=topic, count=bad_topic.count),
             detail.format(why=reason, count=bad_topic.unchecked_count),
             button=_("Show"),
-            action=f"inspect:{topic}",
+            intent=Inspect(topic),
             count=result.bad_count,
         )
 
@@ -286,7 +294,7 @@ class Health:
             ),
             _(VIRTUAL_ROBOT_HINT if link.is_virtual else REAL_ROBOT_HINT),
             button=_("Restart the robot") if link.is_virtual else _(OPEN_DOCTOR_LABEL),
-            action=f"connect:{link.name}" if link.is_virtual else "help.doctor",
+            intent=ConnectRobot(link.name) if link.is_virtual else OpenDoctor(),
             count=0,
         )
 
@@ -338,7 +346,7 @@ class Health:
             f"{problem}.",
             detail,
             button=_("Stop"),
-            action="run.stop",
+            intent=StopRobots(),
             count=0,
         )
 
@@ -396,6 +404,6 @@ class Health:
             ),
             _("Blocks that need its images are waiting."),
             button=_(OPEN_DOCTOR_LABEL),
-            action="help.doctor",
+            intent=OpenDoctor(),
             count=0,
         )

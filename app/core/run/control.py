@@ -13,7 +13,7 @@ from typing import Protocol
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import VariableValue
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.robots.fleet import Fleet

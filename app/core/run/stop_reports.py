@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import StopRobots
 from app.core.console import Console
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.report import StopReport
@@ -73,5 +74,5 @@ class StopReporter:
             )
             self._console.add("error", origin, f"{result}: {title}")
             self._alerts.raise_alert(
-                "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop"
+                "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), intent=StopRobots()
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from app.ui.intents import command_of
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.text.numbers import group_digits
 from app.ui.widgets import Chip, EmptyState
@@ -13,7 +14,7 @@ from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.alerts import ActiveAlert
+    from app.core.alerts.alerts import ActiveAlert
 
 
 class AlertsPanel(PanelWidget):
@@ -68,9 +69,9 @@ class AlertsPanel(PanelWidget):
         return row
 
     def _run_action(self, alert_id: str) -> None:
-        action = next((alert.action for alert in self.shown_alerts if alert.id == alert_id), None)
-        if action is not None:
-            self.context.run(action)
+        intent = next((alert.intent for alert in self.shown_alerts if alert.id == alert_id), None)
+        if intent is not None:
+            self.context.run(command_of(intent))
 
 
 def _since_text(alert: ActiveAlert) -> str:

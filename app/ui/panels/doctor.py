@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
+from app.core.alerts.intents import BrowseNetworks
 from app.core.network.topics import split_key
-from app.core.networks.networks import BROWSE_COMMAND, lost_message, topic_label
+from app.core.networks.networks import lost_message, topic_label
 from app.core.reports import not_installed
+from app.ui.intents import command_of
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Separator, label
 from app.ui.widgets.cards import AlertRow
@@ -228,7 +230,9 @@ class DoctorPanel(PanelWidget):
         message = lost or (f"{topic_label(topic)}: {problem}." if problem else "")
         if message:
             fix = _("Check its address, and its password or key if it needs one.")
-            yield Blocker(message, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
+            yield Blocker(
+                message, fix, _("Other networks"), lambda: self.context.run(command_of(BrowseNetworks()))
+            )
 
     def _update_topics(self) -> None:
         live, expected_topic = self.session.live, self.session.doctor.expected_topic

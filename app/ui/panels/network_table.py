@@ -10,8 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.core.alerts.intents import BrowseNetworks
 from app.core.network.source import NODE_NAME
-from app.core.networks.networks import BROWSE_COMMAND, lost_message
+from app.core.networks.networks import lost_message
+from app.ui.intents import command_of
 from app.ui.panels.base import PanelContext
 from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.theme.theme import Theme
@@ -31,7 +33,7 @@ class NetworkTable(TablePanel[Row]):
         self.networks = NetworkLine(self.theme, context.run)
         self._network_count = 0
         self._networks_action = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
-        self._networks_action.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
+        self._networks_action.triggered.connect(lambda _on=False: context.run(command_of(BrowseNetworks())))
 
     def has_other_networks(self) -> bool:
         """Return True if the table shows other networks in addition to Studio's own."""
@@ -57,7 +59,7 @@ class NetworkLine(QWidget):
         self.text_label.setMinimumWidth(0)
         self.button = LinkButton(theme, _("Other networks"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.button.clicked.connect(lambda: run(BROWSE_COMMAND))
+        self.button.clicked.connect(lambda: run(command_of(BrowseNetworks())))
         row = QHBoxLayout()
         row.setContentsMargins(12, 5, 12, 5)
         row.setSpacing(8)

@@ -30,7 +30,7 @@ from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
-    from app.core.alerts import ActiveAlert
+    from app.core.alerts.alerts import ActiveAlert
     from app.core.documents.document import Document
     from app.robots.description.description import Robot
 

@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 from PySide6.QtCore import QObject, QTimer
 
 from app.blocks.fixes.fixes import fix
+from app.core.alerts.intents import Intent, OpenBehaviour, SaveBehaviourAs
 from app.core.documents.document import Document
 from app.core.documents.file_format import SUFFIX, file_type_hint
 from app.core.documents.journal import UnsavedWork
@@ -131,7 +132,7 @@ class DocumentController:
                 open_file(path)
         if unknown_files:
             self._raise_alert(
-                unknown_type_text(unknown_files), "file.open", _("Open another file"), alert="strange"
+                unknown_type_text(unknown_files), OpenBehaviour(), _("Open another file"), alert="strange"
             )
 
     def open_example(self, path: Path) -> None:
@@ -211,7 +212,7 @@ class DocumentController:
         try:
             self._documents.rename(document, name)
         except AppError as error:
-            self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
+            self._raise_alert(alert_text(error), SaveBehaviourAs(), _("Save somewhere else"))
             return False
         self._session.tabs.save()
         if old_path is not None and document.path is not None:
@@ -317,7 +318,7 @@ class DocumentController:
         try:
             act()
         except AppError as error:
-            self._raise_alert(alert_text(error), "file.open", _("Open another file"))
+            self._raise_alert(alert_text(error), OpenBehaviour(), _("Open another file"))
             return
         self._session.tabs.save()
         self._session.alerts.resolve("file")
@@ -383,11 +384,11 @@ class DocumentController:
             self._session.console.add("warn", "studio", str(error))
 
     def _report_save_error(self, error: Exception) -> None:
-        self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
+        self._raise_alert(alert_text(error), SaveBehaviourAs(), _("Save somewhere else"))
 
-    def _raise_alert(self, text: AlertText, action: str, button: str, alert: str = "file") -> None:
+    def _raise_alert(self, text: AlertText, intent: Intent, button: str, alert: str = "file") -> None:
         self._session.alerts.raise_alert(
-            alert, "error", text.title, text.detail, button=button, action=action
+            alert, "error", text.title, text.detail, button=button, intent=intent
         )
 
 

@@ -22,7 +22,7 @@ while not session.alerts.has("companion:master") and time.monotonic() < end:
     session.tick()
     threading.Event().wait(0.03)
 for alert in session.alerts.active:
-    print(alert.id, alert.title, alert.detail, alert.action)
+    print(alert.id, alert.title, alert.detail, alert.intent)
 for _ in range(100):
     session.tick()
     threading.Event().wait(0.03)
@@ -38,7 +38,7 @@ def test_loopback_down_is_reported_once_with_advice(tmp_path: Path) -> None:
     assert alert == (
         "companion:master The master can't be started. Programs on this computer can't reach each other: "
         "network is unreachable. Turn on the loopback interface. A firewall or a sandbox may have turned "
-        "it off. help.doctor"
+        "it off. OpenDoctor()"
     )
     assert lines == "1 line"
 
@@ -60,7 +60,7 @@ def test_firewall_between_studio_and_master_is_reported(tmp_path: Path) -> None:
     alert, lines = done.stdout.splitlines()
     said = "10.9.9.2:7780 doesn't respond, so the master can't be reached."
     assert alert.startswith(f"companion:master The master doesn't respond. {said} {FIREWALL}")
-    assert alert.endswith("help.doctor")
+    assert alert.endswith("OpenDoctor()")
     assert lines == "1 line"
 
 

@@ -6,7 +6,8 @@ import threading
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import AllowOtherComputers
 from app.core.network.remote_access import ALERT, RemoteAccess
 from app.core.storage.settings import Settings
 from nep.errors import RequestRefusedError
@@ -95,7 +96,7 @@ def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make)
     reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     (alert,) = alerts.active
-    assert (alert.id, alert.action) == (ALERT, "network.others")
+    assert (alert.id, alert.intent) == (ALERT, AllowOtherComputers())
     assert alert.detail == f"{world.refusal}."
     assert reach.hosts == ()
     world.refusal = ""

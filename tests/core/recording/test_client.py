@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.recording import client as client_module
 from app.core.recording.client import RecorderClient, RecorderEvent, RecorderExited, RingChoice
 from nep.recordings.reader import Recording

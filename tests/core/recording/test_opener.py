@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.recording.film_strip import read_preview
 from app.core.recording.folder import RecordingInfo, read_info
 from app.core.recording.opener import LocalOpener, process_opener

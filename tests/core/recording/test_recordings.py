@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ChooseRecordingsFolder
 from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import (
-    CHOOSE_FOLDER_COMMAND,
     NO_FOLDER_ALERT,
     SessionRecordings,
     saved_file_name,
@@ -123,7 +123,7 @@ def test_missing_selected_folder_is_reported_not_created(made):
     assert made.again().folder == away
     assert made.recordings.record() == "The recordings folder is missing."
     (alert,) = made.alerts.active
-    assert (alert.id, alert.action) == (NO_FOLDER_ALERT, CHOOSE_FOLDER_COMMAND)
+    assert (alert.id, alert.intent) == (NO_FOLDER_ALERT, ChooseRecordingsFolder())
     assert not away.exists()
     assert made.lines == []
     away.mkdir(parents=True)

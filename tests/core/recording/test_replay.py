@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.network.mailbox import Batch
 from app.core.recording.replay.replay import Replay, create_graph
 from app.core.storage.settings import Settings

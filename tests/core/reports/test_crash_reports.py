@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ReportProblem
 from app.core.reports.crash import PARTS, Crash, crash_extra
 from app.core.reports.crash_reports import (
     ALERT_ID,
@@ -142,10 +143,10 @@ def test_next_start_offers_the_most_severe_crash_once(reports: CrashReports) -> 
         reports.add(Crash(part, "how"))  # type: ignore[arg-type]
     show_crash_alert(alerts, reports)
     told = alerts.active[0]
-    assert (told.title, told.button, told.action) == (
+    assert (told.title, told.button, told.intent) == (
         "Studio closed unexpectedly last time.",
         "Report a problem",
-        "help.report",
+        ReportProblem(),
     )
     again = Alerts()
     show_crash_alert(again, reports)

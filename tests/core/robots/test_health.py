@@ -7,7 +7,8 @@ from typing import cast
 
 import pytest
 
-from app.core.alerts import ActiveAlert, Alerts
+from app.core.alerts.alerts import ActiveAlert, Alerts
+from app.core.alerts.intents import ConnectRobot, Inspect, OpenDoctor, StopRobots
 from app.core.network.decode_checks import CheckResult
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
@@ -46,7 +47,7 @@ def test_malformed_messages_are_one_alert_with_exact_count(case: Case) -> None:
     for _ in range(30):
         case.look(33)
     (alert,) = case.alerts.active
-    assert (alert.id, alert.count, alert.action) == ("message:/a", 990, "inspect:/a")
+    assert (alert.id, alert.count, alert.intent) == ("message:/a", 990, Inspect("/a"))
     assert "990 messages" in alert.title
     assert alert.detail == "No json. See the raw bytes in the Inspector."
 
@@ -103,8 +104,8 @@ def test_valid_messages_raise_no_alert(case: Case) -> None:
 def test_occupied_ports_are_one_developer_alert_that_opens_the_doctor(case: Case) -> None:
     ports = [Alert(f"port:{port}", f"Port {port} is taken", "Close it.") for port in (7000, 50000, 7777)]
     case.health.update_graph_alerts(GraphView(1, 1, alerts=(*ports, Alert("name:x", "2 x", ""))))
-    told = {alert.id: (alert.action, alert.for_developers) for alert in case.alerts.active}
-    assert told == {"ports": ("help.doctor", True), "name:x": (None, False)}
+    told = {alert.id: (alert.intent, alert.for_developers) for alert in case.alerts.active}
+    assert told == {"ports": (OpenDoctor(), True), "name:x": (None, False)}
     (both,) = [alert.title for alert in case.alerts.active if alert.id == "ports"]
     assert all(number in both for number in ("7000", "50000", "7777"))
     assert [alert.id for alert in case.alerts.errors_and_warnings()] == ["name:x"]
@@ -138,11 +139,11 @@ def test_disconnected_real_robot_is_reported_after_a_delay_and_resolved_on_retur
     case.health.check()
     alert = case.alert()
     assert alert is not None
-    assert (alert.id, alert.title, alert.action) == ("robot:Rover", "Rover disconnected.", "help.doctor")
+    assert (alert.id, alert.title, alert.intent) == ("robot:Rover", "Rover disconnected.", OpenDoctor())
     case.health.check(used_names={"Rover"})
     used = case.alert()
     assert used is not None
-    assert (used.severity, used.action) == ("error", "run.stop")
+    assert (used.severity, used.intent) == ("error", StopRobots())
     case.links[0].is_connected = True
     case.health.check()
     assert case.alert() is None
@@ -160,7 +161,7 @@ def test_virtual_robot_is_reported_only_while_its_process_runs_here(case: Case) 
     case.health.check(started_names={"Rover"})
     alert = case.alert()
     assert alert is not None
-    assert (alert.title, alert.action) == ("Rover isn't responding.", "connect:Rover")
+    assert (alert.title, alert.intent) == ("Rover isn't responding.", ConnectRobot("Rover"))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import cast
 
 import pytest
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.network.topics import Topics
 from app.core.network.watches import Watches
 from app.core.robots.announcements import RizeNames

@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 from app.core import session as session_module
+from app.core.alerts.intents import Inspect
 from app.core.console import Console
 from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import SavedTabs
@@ -258,7 +259,7 @@ class Session(session_module.Session):
             session.console.add(level, origin, text)
         session.alerts.raise_alert(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
-            "1 204 messages can't be decoded.", button="Show the bytes", action="inspect:/faces",
+            "1 204 messages can't be decoded.", button="Show the bytes", intent=Inspect("/faces"),
         )  # fmt: skip
         return session
 

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 

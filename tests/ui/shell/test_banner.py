@@ -8,6 +8,7 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
+from app.core.alerts.intents import StopRobots
 from app.core.run.view import RunView
 from app.ui.shell.bars.banner import CLICK_GUARD_S
 from app.ui.shell.commands.commands import Commands
@@ -55,7 +56,7 @@ def show(window: MainWindow, layout: str) -> None:
 
 def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
     window.session.alerts.raise_alert(
-        name, severity, f"It is {name}.", "Mend it.", button="Mend", action="run.stop"
+        name, severity, f"It is {name}.", "Mend it.", button="Mend", intent=StopRobots()
     )
     settle(window)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from app.core.alerts.intents import OpenBehaviour
 from app.core.documents.document import Document
 from app.core.documents.versions import free_path
 from app.core.run.view import RunState
@@ -351,7 +352,7 @@ def test_file_that_is_not_a_behaviour_raises_an_alert(commands, window, document
     alert = window.session.alerts.active[0]
     assert alert.title == "bad.nepb is damaged or not a behaviour."
     assert alert.detail == "Open an earlier copy."
-    assert alert.action == "file.open"
+    assert alert.intent == OpenBehaviour()
     assert document.workspace == BLOCKS
 
 

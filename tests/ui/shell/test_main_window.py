@@ -12,6 +12,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QTabBar, QWidget
 
+from app.core.alerts.intents import Inspect
 from app.core.documents.journal import Journal, unsaved_work
 from app.core.faults import RepeatFilter
 from app.core.run.view import RunState, RunView
@@ -469,7 +470,7 @@ def test_alert_is_shown_in_the_banner_until_resolved_or_dismissed(
     alerts = window.session.alerts
     alerts.raise_alert("one", "warn", "A topic is slow.", "Look at it.")
     alerts.raise_alert(
-        "two", "error", "The camera is silent.", "It waits.", button="Look", action="inspect:/camera"
+        "two", "error", "The camera is silent.", "It waits.", button="Look", intent=Inspect("/camera")
     )
     window.tick()
     banner = window.banner.banner

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.network.remote_access import RemoteAccess, access_status
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet

@@ -11,6 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
+from app.core.alerts.intents import StopRobots
 from app.core.graph.walk import GraphSelection
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -224,7 +225,7 @@ def test_toasts_and_banners_leak_no_objects(window: MainWindow) -> None:
     def say() -> None:
         window.toast.show_toast("Done", "Undo", lambda: None)
         window.session.alerts.raise_alert(
-            "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
+            "x", "error", "This is wrong.", "Mend it.", button="Stop", intent=StopRobots()
         )
         for _ in range(STATUS_REFRESH_TICKS):  # until the status bar shows the alerts, too
             window.tick()

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QImage, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from app.core.alerts.intents import ShowRecordingFile
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
@@ -187,7 +188,7 @@ def test_file_that_is_not_a_recording_raises_an_alert_and_can_be_closed(qtbot, w
     window.commands.run(f"recording.open:{broken}")
     until(qtbot, window, lambda: session.replay.status.stage == "failed")
     window.tick()
-    assert [alert.action for alert in session.alerts.active] == [f"recording.folder:{broken}"]
+    assert [alert.intent for alert in session.alerts.active] == [ShowRecordingFile(broken)]
     timeline = window.bench.docks["timeline"].panel
     assert timeline.pages.currentIndex() == 0
     window.commands.run("replay.live")

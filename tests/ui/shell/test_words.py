@@ -11,7 +11,8 @@ from PySide6.QtCore import QCoreApplication, QKeyCombination, Qt
 from PySide6.QtWidgets import QMenu, QWidget
 
 from app import resources
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ShowAlarms
 from app.core.messages import snapshots
 from app.core.network.remote_access import RemoteAccess
 from app.core.robots.motion.permission import MotionPermission
@@ -158,7 +159,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
     window.start.show_all(True)
     look("all examples", window.start)
     window.session.alerts.raise_alert(
-        "one", "error", _("Nothing is running"), button=_("Try again"), action="panel:topics"
+        "one", "error", _("Nothing is running"), button=_("Try again"), intent=ShowAlarms()
     )
     window.session.alerts.raise_alert("two", "error", _("Nothing is running"))
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):

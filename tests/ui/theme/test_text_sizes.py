@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtCore import QPoint, QRect
 
 from app import resources
+from app.core.alerts.intents import ShowAlarms
 from app.core.run.view import RunView
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
@@ -181,9 +182,9 @@ def test_window_clips_no_text(
     alerts = window.session.alerts
     title, detail = "The camera of Pepper has sent nothing for 4 s.", "The behaviour waits for a face."
     alerts.raise_alert(
-        "one", "error", title, detail, button="Open the connection doctor", action="panel:topics"
+        "one", "error", title, detail, button="Open the connection doctor", intent=ShowAlarms()
     )
-    alerts.raise_alert("two", "error", "Another one.", button="Look", action="panel:topics")
+    alerts.raise_alert("two", "error", "Another one.", button="Look", intent=ShowAlarms())
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()

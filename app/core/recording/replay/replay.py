@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import ShowRecordingFile
 from app.core.console import CAPACITY, Console
 from app.core.messages.image_streams import Images
 from app.core.network.mailbox import Batch
@@ -34,8 +35,6 @@ from nep.recordings.reader import RecordedTopic
 
 FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
 """Ids of the alerts of a replay."""
-SHOW_FILE_COMMAND = "recording.folder"
-"""Prefix of the window command that shows a file in its folder. The path of the file follows."""
 LOG_TOPICS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
@@ -362,9 +361,13 @@ class Replay:
             self._has_failed = True
             title = _("{name} can't be played.").format(name=self.name)
             message = f"{reason[:1].upper()}{reason[1:]}."
-            action = f"{SHOW_FILE_COMMAND}:{self.path}"
             self._alerts.raise_alert(
-                FAILED, "error", title, message, button=_("Show the file"), action=action
+                FAILED,
+                "error",
+                title,
+                message,
+                button=_("Show the file"),
+                intent=ShowRecordingFile(self.path),
             )
         if len(status.corruption) > self._known_damage_count:
             self._known_damage_count = len(status.corruption)

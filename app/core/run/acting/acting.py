@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from app.core.alerts import Alerts
+from app.core.alerts.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source

@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.core.alerts.intents import ShowConsole
 from app.core.messages import snapshots
 from app.core.messages.image_style import PLAIN, PictureStyle, parse_style
 from app.core.networks.networks import topic_label
@@ -300,7 +301,7 @@ class ImagePanel(PanelWidget):
         self.session.console.add("error", "image", message)
         self.session.alerts.raise_alert(
             "snapshot", "error", _("Can't save the image."), reason, button=_("Open the console"),
-            action="panel:console",
+            intent=ShowConsole(),
         )  # fmt: skip
 
     def _show_actions(self, position: QPoint) -> None:

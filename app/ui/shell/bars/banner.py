@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QCursor, QFont, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
+from app.core.alerts.intents import ConnectRobot, Intent, OpenBehaviour, OpenDoctor, ReportProblem
+from app.ui.intents import command_of
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -27,11 +29,11 @@ MIN_WIDTH = 220  # px at 100 % text; below it only the status bar shows alerts
 MIN_TEXT_WIDTH = 160  # px at 100 % text; below it the next step is only an icon
 TEXT_KINDS = ("bodyLarge", "body", "small")
 MIN_TALL_HEIGHT = 44  # px at 100 % text; lower banners have small buttons
-STEP_ICONS = {
-    "help.doctor": "stethoscope",
-    "help.report": "message-square-warning",
-    "robots.virtual": "bot",
-    "file.open": "folder-open",
+STEP_ICONS: Mapping[type[Intent], str] = {
+    OpenDoctor: "stethoscope",
+    ReportProblem: "message-square-warning",
+    ConnectRobot: "bot",
+    OpenBehaviour: "folder-open",
 }
 NARROW_BUTTON_ICON = "arrow-right"
 CLICK_GUARD_S = 0.5
@@ -39,7 +41,7 @@ CLICK_GUARD_S = 0.5
 
 
 class AlertLike(Protocol):
-    """Interface of `app.core.alerts.ActiveAlert` that the banner uses."""
+    """Interface of `app.core.alerts.alerts.ActiveAlert` that the banner uses."""
 
     @property
     def id(self) -> str:
@@ -62,8 +64,8 @@ class AlertLike(Protocol):
         """Text of the button for the next step, or None for no button."""
 
     @property
-    def action(self) -> str | None:
-        """Command that the button runs, or None."""
+    def intent(self) -> Intent | None:
+        """Next step that the button carries out, or None."""
 
 
 class BannerText(QWidget):
@@ -340,7 +342,7 @@ class AlertBanner(QWidget):
             self.hide()
             return
         others = len(alerts) - 1
-        icon = STEP_ICONS.get(first.action or "")
+        icon = None if first.intent is None else STEP_ICONS.get(type(first.intent))
         self.banner.show_text(first.severity, first.title, first.detail, first.button, others, icon=icon)
         self.show()
 
@@ -364,8 +366,8 @@ class AlertBanner(QWidget):
     def _run_next_step(self) -> None:
         if self._offer is not None:
             self._run_offer_action(0)
-        elif self._alert is not None and self._alert.action is not None:
-            self.on_action(self._alert.action)
+        elif self._alert is not None and self._alert.intent is not None:
+            self.on_action(command_of(self._alert.intent))
 
     def _close(self) -> None:
         if self._offer is not None:

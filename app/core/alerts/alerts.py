@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from app.core.alerts.intents import Intent
+
 SEVERITIES = ("error", "warn", "info")
 
 
@@ -17,7 +19,7 @@ class ActiveAlert:
         title: Problem in one sentence.
         detail: Explanation of the problem; may be empty.
         button: Label of the button for the next step, or None.
-        action: Name of the window command that the button runs, or None.
+        intent: Next step that the button carries out, or None.
         since_s: Time of the first occurrence, on the clock passed to `Alerts`.
         count: Number of occurrences since the alert was last resolved.
         for_developers: True if the alert is shown in the Developer layout only.
@@ -28,7 +30,7 @@ class ActiveAlert:
     title: str
     detail: str
     button: str | None
-    action: str | None
+    intent: Intent | None
     since_s: float
     count: int
     for_developers: bool = False
@@ -74,7 +76,7 @@ class Alerts:
         detail: str = "",
         *,
         button: str | None = None,
-        action: str | None = None,
+        intent: Intent | None = None,
         count: int = 1,
         for_developers: bool = False,
     ) -> None:
@@ -86,7 +88,7 @@ class Alerts:
             title: Problem in one sentence.
             detail: Explanation of the problem.
             button: Label of the button for the next step.
-            action: Name of the window command that the button runs.
+            intent: Next step that the button carries out.
             count: Number of new occurrences, added to the previous ones.
             for_developers: True to show the alert in the Developer layout only.
 
@@ -98,7 +100,7 @@ class Alerts:
         old = self._alerts.get(id)
         if old is None:
             now = self._clock()
-            new = ActiveAlert(id, severity, title, detail, button, action, now, count, for_developers)
+            new = ActiveAlert(id, severity, title, detail, button, intent, now, count, for_developers)
         else:
             new = replace(
                 old,
@@ -106,7 +108,7 @@ class Alerts:
                 title=title,
                 detail=detail,
                 button=button,
-                action=action,
+                intent=intent,
                 count=old.count + count,
                 for_developers=for_developers,
             )
