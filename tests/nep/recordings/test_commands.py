@@ -17,8 +17,8 @@ import typer
 
 import nep
 from nep.cli.app import app
-from nep.cli.recording_files import parse_time_ns
-from nep.cli.ring import has_flight_recorder
+from nep.cli.recordings.recording_files import parse_time_ns
+from nep.cli.recordings.ring import has_flight_recorder
 from nep.errors import NepError, RecordingError, RecordingsUnavailableError, ServiceError
 from nep.recordings.reader import Recording
 from tests.nep.programs import eventually
@@ -288,7 +288,7 @@ def test_play_command_stops_publishing_a_topic_when_a_robot_moved_by_the_topic_c
 
 
 def test_shell_completion_offers_the_topics_of_the_recording(path):
-    from nep.cli.recording_files import _complete_recorded_topic
+    from nep.cli.recordings.recording_files import _complete_recorded_topic
 
     def offered(file):
         return _complete_recorded_topic(SimpleNamespace(params={"file": file}), "/a")
