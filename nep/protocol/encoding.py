@@ -153,6 +153,14 @@ def decode_reply(body: bytes) -> tuple[int, Reply | Push]:
     return call, _decode_fields(kind, received.fields)
 
 
+def call_of_reply(body: bytes) -> int | None:
+    """Return the call id of a reply whose fields can't be decoded; None if the id is unknown."""
+    try:
+        return _decode_scalar(int, _decode_body(_ReceivedReply, body).call)
+    except WireError:
+        return None
+
+
 def _encode(message: _SentRequest | _SentReply) -> bytes:
     try:
         return _ENCODER.encode(message)

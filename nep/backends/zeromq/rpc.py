@@ -15,7 +15,8 @@ import zmq
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, Socket
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
-from nep.protocol.encoding import decode_reply, encode_request
+from nep.i18n import _
+from nep.protocol.encoding import call_of_reply, decode_reply, encode_request
 from nep.protocol.requests import Push, RejectedReply, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 from nep.system.waits import wait_until
@@ -40,6 +41,8 @@ class PendingRequest:
     callback: ReplyCallback | None = None
     reply: Reply | None = None
     is_sent: bool = False
+    problem: str = ""
+    """Reason why the reply can't be read."""
 
 
 class ReceivedMessage(NamedTuple):
@@ -138,7 +141,7 @@ class RpcClient:
         with self._changed:
             while not wait_until(
                 self._changed,
-                lambda: request.reply is not None or self._is_closed,
+                lambda: request.reply is not None or bool(request.problem) or self._is_closed,
                 _remaining_s(started_at, timeout_s),
             ):
                 if timeout_s is not None and time.monotonic() - started_at >= timeout_s:
@@ -149,6 +152,9 @@ class RpcClient:
                 request.is_sent = False  # requests are idempotent, so they may be resent
                 self._flush_locked()
                 self._after_use()
+        if request.problem:
+            reason = _("the master's reply can't be read: {reason}").format(reason=request.problem)
+            raise RequestRefusedError(reason)
         if request.reply is None:
             raise ClosedError("the node")
         if isinstance(request.reply, RejectedReply):
@@ -241,6 +247,10 @@ class RpcClient:
             number, reply = decode_reply(body)
         except WireError as error:
             self._reject(error)
+            rejected_request = self._requests.pop(call_of_reply(body) or 0, None)
+            if rejected_request is not None:
+                rejected_request.problem = error.reason
+                self._changed.notify_all()
             return None
         pending_request = self._requests.pop(number, None)
         if pending_request is None or isinstance(reply, Push):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 import threading
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -17,6 +16,7 @@ from nep.masters.graph import Graph
 from nep.masters.registry import Registry
 from nep.masters.router import MasterRouter
 from nep.masters.snapshot import GraphSnapshotBuilder
+from nep.messages.packing import pack
 from nep.programs.gateway.attachment import NativeNetwork
 from nep.programs.gateway.framing import PORT_A
 from nep.programs.gateway.graph_registrar import GraphRegistrar
@@ -24,11 +24,8 @@ from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.programs import OriginalProgram, ProgramTable, TopicLink
 from nep.programs.gateway.requests import RequestError, parse_request
 from nep.protocol import encoding
-from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.requests import (
     AddPublisher,
-    DoneReply,
-    GraphReply,
     Join,
     NodeRecord,
     Ping,
@@ -111,29 +108,6 @@ def pair() -> Iterator[SimpleNamespace]:
     calls.release()
     router.close(0)
     context.term()
-
-
-def test_graph_is_decoded_in_the_calling_thread_and_not_the_node_thread(pair: SimpleNamespace) -> None:
-    asked = pair.calls.send_request(QueryGraph())
-    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
-    sender, body = pair.router.recv_multipart()
-    topics = {f"/t{n}": TopicInfo(f"/t{n}", "json", "json") for n in range(3)}
-    seen = GraphReply(7, 1, GraphView(7, 1, {}, topics))
-    pair.router.send_multipart([sender, encoding.encode_reply(seen, encoding.decode_request(body).call)])
-    eventually(lambda: pair.calls.read() == [] and asked.graph_reply is not None)
-    assert asked.reply is None  # nothing was decoded yet
-    assert pair.calls.wait(asked, 1.0) == seen
-
-
-def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace) -> None:
-    pair.calls.send_request(Ping())
-    eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
-    sender, _body = pair.router.recv_multipart()
-    pair.router.send_multipart([sender, encoding.encode_reply(GraphReply(7, 1, GraphView(7, 1)), 12345)])
-    pair.router.send_multipart([sender, encoding.encode_reply(DoneReply(7, 1), 1)])
-    answers: list[object] = []
-    eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
-    assert [type(each.content) for each in answers] == [DoneReply]  # type: ignore[attr-defined]
 
 
 def test_many_pushes_are_read_in_batches(pair: SimpleNamespace) -> None:
@@ -239,12 +213,14 @@ def test_original_request_with_oversized_text_is_rejected() -> None:
         parse_request(request, PORT_A)
 
 
-def test_undecodable_graph_reply_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
+def test_undecodable_reply_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
     asked = pair.calls.send_request(QueryGraph())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
-    good = encoding.encode_reply(GraphReply(7, 1, GraphView(7, 1)), encoding.decode_request(body).call)
-    pair.router.send_multipart([sender, good[:-3]])
+    what = {"epoch": 7, "revision": 1, "view": 5}
+    pair.router.send_multipart(
+        [sender, pack({"is": "seen", "re": encoding.decode_request(body).call, "what": what})]
+    )
     failed: list[str] = []
 
     def wait() -> None:
@@ -255,9 +231,11 @@ def test_undecodable_graph_reply_raises_in_the_waiting_thread(pair: SimpleNamesp
 
     thread = threading.Thread(target=wait)
     thread.start()
-    eventually(lambda: pair.calls.read() == [] and asked.graph_reply is not None)
+    eventually(lambda: pair.calls.read() == [] and bool(asked.problem))
     thread.join(5.0)
-    assert re.match("RequestRefusedErrorthe master's .*msgpack", failed[0])
+    assert failed == [
+        "RequestRefusedErrorthe master's reply can't be read: 'GraphReply.view' must be a map, not 'int'"
+    ]
 
 
 class JustConnected:
