@@ -96,8 +96,7 @@ INTERNAL = frozenset({
     "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
     "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
     "Server.run_one", "Server.spin_queue", "Subscriber.decoded", "Subscriber.is_typed",
-    "Subscriber.payloads", "Subscriber.decoded_unshared", "Subscriber.typed", "Subscriber.want_messages",
-    "Subscriber.want_payloads",
+    "Subscriber.decoded_unshared", "Subscriber.take", "Subscriber.typed",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.claim_tick",
 })  # fmt: skip
 """Public members that are omitted because only nep uses them."""
