@@ -332,7 +332,7 @@ def test_errors_of_invalid_requests_and_replies_are_translated() -> None:
     ):  # fmt: skip
         request = decode_request(body).request
         assert isinstance(request, nep_errors.WireError)
-        said(request.reason, data=("xx", "Leave", "node_id", "str", "int", "list"))
+        said(request.reason, data=("xx", "Leave", "node_id", "str", "int", "array"))
     no_request = decode_request(b"").request
     assert isinstance(no_request, nep_errors.WireError)
     assert no_request.reason.startswith("[")  # the rest is a message of msgpack

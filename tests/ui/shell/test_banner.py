@@ -8,7 +8,7 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
-from app.core.alerts.intents import StopRobots
+from app.core.alerts.intents import OpenDoctor, StopRobots
 from app.core.run.view import RunView
 from app.ui.shell.bars.banner import CLICK_GUARD_S
 from app.ui.shell.commands.commands import Commands
@@ -158,8 +158,8 @@ def test_banner_moves_to_the_bar_of_the_new_layout(window: MainWindow, mouse: Mo
 
 
 def test_button_in_a_narrow_banner_keeps_its_accessible_name(window: MainWindow, mouse: Mouse) -> None:
-    step = {"button": "Open the connection doctor", "action": "help.doctor"}
-    window.session.alerts.raise_alert("one", "warn", "It is one.", **step)
+    button_text = "Open the connection doctor"
+    window.session.alerts.raise_alert("one", "warn", "It is one.", button=button_text, intent=OpenDoctor())
     settle(window)
     button = window.banner.banner.button
     assert button.accessibleName() == "Open the connection doctor"

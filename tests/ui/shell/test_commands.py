@@ -5,17 +5,20 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from dataclasses import fields
 from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from PySide6.QtWidgets import QMenu
 
 import app
+from app.core.alerts.intents import Intent
+from app.ui.intents import command_of
 from app.ui.shell.actions.actions import MENU_ROLES, STOP_COMMAND
 from app.ui.shell.actions.command import UnknownCommandError
-from app.ui.shell.bars.banner import STEP_ICONS
 from app.ui.shell.bars.run_bar import SPEED_COMMANDS
 from app.ui.shell.commands.behaviours import TabPosition
 from app.ui.shell.commands.commands import Commands
@@ -23,8 +26,6 @@ from app.ui.shell.commands.menus import LAYOUT_COMMANDS
 from app.ui.shell.commands.robots import RobotReplacement
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
 from app.ui.shell.main_window import MainWindow
-from tests.ui import sample_data
-from tests.ui.fakes import session as full_session
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -104,15 +105,10 @@ def found() -> list[tuple[Path, str, int]]:
 def test_command_references_in_core_code_panels_and_buttons_are_collected() -> None:
     words = {words for _, words, _ in found()}
     assert {
-        "network.others",  # an alert of the core
-        "connect:{}",  # an alert, and a problem of the compiler
         "limit:{}",
-        "file.save_as",  # an alert about a file
         "robot.use:{}:{}",
         "robot.virtual:{}",
         "tab.move:{}:{}",  # panels
-        "inspect:{}",
-        "panel:console",
         "edit.undo",  # buttons
         "run.stop",
     } <= words
@@ -125,7 +121,7 @@ def test_every_referenced_command_is_registered() -> None:
 
 
 def test_lists_of_command_ids_contain_only_existing_commands() -> None:
-    assert {*STEP_ICONS, *MENU_ROLES, *SPEED_COMMANDS, *LAYOUT_COMMANDS, STOP_COMMAND} <= IDS
+    assert {*MENU_ROLES, *SPEED_COMMANDS, *LAYOUT_COMMANDS, STOP_COMMAND} <= IDS
 
 
 def test_every_tab_command_of_the_tab_menu_is_registered() -> None:
@@ -135,11 +131,9 @@ def test_every_tab_command_of_the_tab_menu_is_registered() -> None:
     assert listed <= ABOUT
 
 
-def test_alerts_in_test_data_reference_existing_commands() -> None:
-    sources = (Path(full_session.__file__), Path(sample_data.__file__))
-    alerts = [words for source in sources for words, _ in named(source) if "." in words or ":" in words]
-    assert alerts
-    assert all(map(is_known, alerts))
+@pytest.mark.parametrize("kind", get_args(Intent), ids=lambda kind: kind.__name__)
+def test_next_step_of_an_alert_is_an_existing_command(kind: type[Intent]) -> None:
+    assert is_known(command_of(kind(*("x" for _field in fields(kind)))))
 
 
 @pytest.mark.parametrize("name", ["nonsense", "nonsense:x", "panel.nonsense", "run.run:x", ""])
