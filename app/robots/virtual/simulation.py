@@ -79,8 +79,11 @@ class Simulation:
         ]
 
     def start(self) -> None:
-        """Start both threads."""
+        """Detect the objects in view, then start both threads."""
         cv2.setNumThreads(1)  # more threads don't pay off for small images
+        # Before the camera thread's first image, so that an action of the first moment finds its target.
+        self._view = self._render(self.body.room, lens_of(self.body))
+        self.latest_detections = self._view.detections
         for thread in self._threads:
             thread.start()
 

@@ -338,8 +338,8 @@ def test_action_that_exceeds_its_timeout_fails_with_the_limit(shared) -> None:
             bench.running(wanted)
             bench.clock.advance(action.timeout_s + 0.1)
             ended = bench.ears.final(wanted)
-        if ended["state"] == "succeeded" or "in the picture" in ended["error"]:
-            continue  # the action finished in that moment, or the robot sees no face on a busy computer
+        if ended["state"] == "succeeded":
+            continue  # the action finished in that moment
         assert ended["state"] == "failed"
         assert ended["error"] == f"{action.name} took longer than {action.timeout_s:g} s"
         late.append(action.name)
@@ -354,7 +354,7 @@ def test_busy_robot_queues_replaces_or_rejects_actions_as_declared(shared) -> No
             second = bench.invoke(action)
             eventually(lambda bench=bench, second=second: bench.ears.states(second))
             if bench.finals(first) and bench.finals(first)[0]["state"] != "canceled":
-                continue  # the action had nothing to do, or nothing to look at
+                continue  # the action had nothing to do
             told = bench.ears.answers(second)[0]
             if action.on_busy == "queue":
                 assert told["waits_for"] == [action.name]

@@ -11,6 +11,7 @@ import pytest
 import nep
 from app.robots.driver.driver import Driver
 from app.robots.simulated import ROBOT, create_room
+from app.robots.virtual.simulation import Simulation
 from tests.robots.conftest import Ears, eventually
 
 
@@ -221,6 +222,15 @@ def test_robot_turns_its_head_to_the_ball(pepper):
     x, y, width, height = pepper.newest("balls")["items"][0]["box"]
     assert x + width / 2 == pytest.approx(160, abs=12)
     assert y + height / 2 == pytest.approx(120, abs=12)
+
+
+def test_robot_sees_the_face_and_the_ball_before_its_first_camera_image(node, monkeypatch):
+    monkeypatch.setattr(Simulation, "capture", lambda _simulation, *, publish: None)
+    with nep.node("listener", "memory") as other, Driver(ROBOT, "Pepper", node) as driver:
+        pepper = Pepper(other, driver)
+        for target in ("face", "ball"):
+            pepper.invoke(target, "look_at", target=target)
+            assert pepper.final(target)["state"] == "succeeded"
 
 
 def test_subscriber_receives_a_jpeg_camera_image(node, pepper):
