@@ -212,6 +212,7 @@ class Tasks:
                 ended. Not called if too many stops are pending. None for no reply.
             reason: Reason in the replies to the tasks.
         """
+        deadline_s = self._clock.now() + self._stop_reply_timeout_s
         with self._lock:
             self._epoch += 1
             calls = [task.call for task in self._running if task.call is not None]
@@ -221,9 +222,9 @@ class Tasks:
         run = self._stop_thread.reserve()
         try:
             if self._dispatcher.is_current:
-                self._start_stop(run, on_reply, reason)
+                self._start_stop(run, deadline_s, on_reply, reason)
             elif self._dispatcher.urgent_backlog < _MAX_PENDING_STOPS:
-                self._dispatcher.post_urgent(partial(self._start_stop, run, on_reply, reason))
+                self._dispatcher.post_urgent(partial(self._start_stop, run, deadline_s, on_reply, reason))
         finally:
             self._stop_thread.wake()
 
@@ -320,8 +321,9 @@ class Tasks:
 
     # ---- thread of the tasks ------------------------------------------------------------------------
 
-    def _start_stop(self, run: int, on_reply: Callable[[TaskReply], None] | None, reason: str) -> None:
-        deadline_s = self._clock.now() + self._stop_reply_timeout_s
+    def _start_stop(
+        self, run: int, deadline_s: float, on_reply: Callable[[TaskReply], None] | None, reason: str
+    ) -> None:
         if on_reply is not None:
             self._pending_stops.append(_PendingStop(run, deadline_s, on_reply))
         self._watchdog.reset()
