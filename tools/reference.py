@@ -100,7 +100,7 @@ INTERNAL = frozenset({
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.claim_tick",
 })  # fmt: skip
 """Public members that are omitted because only nep uses them."""
-INTERNAL_EVERYWHERE = frozenset({"args", "forked", "on_node_close"})
+INTERNAL_EVERYWHERE = frozenset({"args", "on_node_close"})
 """Names of members that are omitted in all classes."""
 _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
 """Types of default values, keyed by the beginning of the value's source text."""

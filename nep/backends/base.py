@@ -108,24 +108,17 @@ class PublishHooks(NamedTuple):
     """Arguments of `SupportsFastPublish.fast_publish_function`.
 
     Attributes:
-        owner: Publisher that is checked for closing; after it is closed, calls go to `fallback`.
         raw_type: Payload type that is sent unchanged, without encoding; None if there is none.
         encode: Encodes payloads of other types; if it raises, the payload is passed to `fallback`.
         on_null: Called with each payload whose encoding contains ``null``; None to skip the check.
-        fallback: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
+        fallback: Full publish method. Also used with ``strict=True``, while the topic has no subscribers, and
+            after the publisher was closed.
     """
 
-    owner: Closable
     raw_type: type | None
     encode: Callable[[Any], bytes]
     on_null: Callable[[Any], object] | None
     fallback: Callable[..., object]
-
-
-class Closable(Protocol):
-    """Object that can be closed."""
-
-    is_closed: bool
 
 
 @runtime_checkable
@@ -238,12 +231,6 @@ class SubscriberTransport(Protocol):
 
     def close(self) -> None:
         """Unregister the subscriber and discard its unread messages."""
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed and discard its messages in a forked child process.
-
-        Takes no lock and touches no socket.
-        """
 
 
 class Transport(Protocol):

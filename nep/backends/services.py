@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from nep.backends.connection import Configuration
@@ -16,6 +16,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, CallKind, Reply, error_reply
+from nep.system.forks import Generation, current_generation
 
 _logger = logging.getLogger("nep")
 MAX_CALLS = 1000
@@ -99,13 +100,18 @@ class IncomingCall:
         data: Encoded request.
         codec: Number of the codec of `data`.
         deadline: Time (`time.monotonic`) at which the client stops waiting; None if it waits forever.
-        reply: Sends a reply; returns False if the reply can't be delivered.
+        send_reply: Sends a reply; returns False if the reply can't be delivered.
     """
 
     data: bytes | memoryview
     codec: int
     deadline: float | None
-    reply: Callable[[Reply], bool]
+    send_reply: Callable[[Reply], bool]
+    _generation: Generation = field(default_factory=current_generation, init=False, repr=False)
+
+    def reply(self, reply: Reply) -> bool:
+        """Send a reply; return False if it can't be delivered, or if this is a forked child process."""
+        return not self._generation.is_inherited and self.send_reply(reply)
 
     @property
     def is_late(self) -> bool:
@@ -122,11 +128,12 @@ class CallQueue:
         self._bytes = 0
         self._wake_callbacks: list[Callable[[], None]] = []
         self._is_closed = False
+        self._generation = current_generation()
 
     @property
     def is_closed(self) -> bool:
-        """True after `close`; new calls are then rejected."""
-        return self._is_closed
+        """True after `close`, when new calls are rejected, or if this is a forked child process."""
+        return self._is_closed or self._generation.is_inherited
 
     def put(self, call: IncomingCall) -> bool:
         """Append a call and wake a waiting thread; return False if the queue is full or closed."""
@@ -147,6 +154,8 @@ class CallQueue:
 
         Returns None on timeout or if the queue is closed and empty.
         """
+        if self._generation.is_inherited:
+            return None
         with self._changed:
             if timeout_s > 0.0:
                 self._changed.wait_for(lambda: self._calls or self._is_closed, timeout_s)
@@ -166,9 +175,10 @@ class CallQueue:
 
     def leave_wait(self, wake: Callable[[], None]) -> None:
         """Unregister a function registered by `enter_wait`."""
+        if self._generation.is_inherited:
+            return
         with self._changed:
-            if wake in self._wake_callbacks:  # not registered if the process was forked in between
-                self._wake_callbacks.remove(wake)
+            self._wake_callbacks.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
         """Reject new calls, wake all waiting threads, and return the calls that are still queued."""
@@ -179,13 +189,6 @@ class CallQueue:
             self._bytes = 0
             self._changed.notify_all()
             return remaining
-
-    def forked(self) -> None:
-        """Mark the queue as closed and empty in a forked child process, without acquiring a lock."""
-        self._changed = threading.Condition(threading.Lock())
-        self._calls = deque()
-        self._wake_callbacks = []
-        self._is_closed = True
 
 
 Outcome = Reply | NepError
@@ -238,9 +241,6 @@ class ServerTransport(Protocol):
     def close(self, timeout_s: float) -> None:
         """Unregister and close the server; replies are flushed for up to `timeout_s` seconds. Idempotent."""
 
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process. Acquires no lock and touches no socket."""
-
 
 class ClientTransport(Protocol):
     """Interface of the clients of a back end."""
@@ -284,9 +284,6 @@ class ClientTransport(Protocol):
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`."""
 
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process. Acquires no lock and touches no socket."""
-
 
 class SurveyTransport(Protocol):
     """Interface of the surveyors of a back end."""
@@ -317,9 +314,6 @@ class SurveyTransport(Protocol):
 
     def close(self) -> None:
         """Unregister the surveyor; calls in flight fail with `ClosedError`."""
-
-    def forked(self) -> None:
-        """Mark the surveyor as closed in a forked child process. Acquires no lock and touches no socket."""
 
 
 class ServiceTransport(Protocol):

@@ -21,7 +21,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import GraphReply, Listen, QueryGraph, RejectedReply, Reply, Request
 from nep.system.addresses import master_address
 from nep.system.computer import computer_id
-from nep.system.forks import close_in_child, notify_after_fork
+from nep.system.forks import current_generation
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -77,8 +77,7 @@ class Master:
         self._owner = None if owner_pid is None else Owner(owner_pid)
         self._server: MasterServer | None = None
         self._lock = threading.Lock()
-        self._is_forked = False
-        notify_after_fork(self)
+        self._generation = current_generation()
 
     def start(self) -> Self:
         """Bind the address, start the attachments and serve requests. Return self.
@@ -90,6 +89,7 @@ class Master:
         graph = Graph(self.epoch, time.monotonic(), self._learn_s, self._lease_s, computer_id())
         listeners = [attachment.changed for attachment in self._attachments]
         server = MasterServer(self.address, graph, listeners, self._owner)
+        self._generation, self._lock = current_generation(), threading.Lock()
         self.address = server.address
         self._server = server
         server.start()
@@ -109,6 +109,8 @@ class Master:
 
     def close(self) -> None:
         """Close the attachments and stop. Idempotent. Callable from any thread except the master's."""
+        if self._generation.is_inherited:
+            return
         with self._lock:
             server, self._server = self._server, None
         if server is None:
@@ -117,14 +119,6 @@ class Master:
             attachment.close()
         server.close()
 
-    def forked(self) -> None:
-        """Detach from the parent's master in a forked child process. See `nep.system.forks`."""
-        if self._server is not None:
-            close_in_child(*self._server.endpoints)
-        self._server = None
-        self._lock = threading.Lock()
-        self._is_forked = True
-
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the master has stopped; return False after the time limit.
 
@@ -132,7 +126,7 @@ class Master:
             timeout_s: Time limit in seconds; None waits without limit.
         """
         server = self._server
-        if server is None:
+        if server is None or self._generation.is_inherited:
             return True
         if timeout_s is not None:
             return server.ended.wait(timeout_s)
@@ -150,8 +144,9 @@ class Master:
             WaitTimeoutError: The master did not reply in time.
         """
         server = self._server
-        if server is None or server.ended.is_set():
-            raise ClosedError(f"the master at '{self.address}'", is_forked=self._is_forked)
+        is_forked = self._generation.is_inherited
+        if is_forked or server is None or server.ended.is_set():
+            raise ClosedError(f"the master at '{self.address}'", is_forked=is_forked)
         return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:

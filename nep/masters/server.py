@@ -32,7 +32,7 @@ from nep.protocol.requests import (
     Request,
 )
 from nep.system.addresses import endpoint_of
-from nep.system.forks import notify_after_fork
+from nep.system.forks import call_in_child, close_in_child, current_generation
 from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
@@ -96,7 +96,8 @@ class MasterServer:
         """Renewals without a reply yet: sender, request, and time of receipt (ns since 1970)."""
         self._notify_at = 0.0
         self._is_open = False
-        self._is_closing = self._is_forked = False
+        self._is_closing = False
+        self._generation = current_generation()
         self._notified_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
@@ -104,7 +105,7 @@ class MasterServer:
         self._address_check_at = 0.0
         self._failure_count = 0
         self._ticked_at = time.monotonic()
-        notify_after_fork(self)
+        call_in_child(self._give_up_in_child)
 
     # ---- other threads
 
@@ -129,9 +130,8 @@ class MasterServer:
         """Bound endpoints."""
         return (endpoint_of(self.address), *self._listen_addresses.endpoints)
 
-    def forked(self) -> None:
-        """Stop in a forked child process without touching sockets. See `nep.system.forks`."""
-        self._is_closing = self._is_forked = True
+    def _give_up_in_child(self) -> None:
+        close_in_child(*self.endpoints)
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
         """Execute a request of this process. See `Master.submit`."""
@@ -151,7 +151,7 @@ class MasterServer:
         polled: list[tuple[int | zmq.Socket[bytes], int]] = [waker]
         tick_at = time.monotonic()
         try:
-            while not self._is_closing:
+            while not (self._is_closing or self._generation.is_inherited):
                 if self._is_open and len(polled) == 1:
                     polled.append((self._router.socket, int(zmq.POLLIN)))
                 zmq.zmq_poll(polled, self._poll_timeout_ms(tick_at))
@@ -166,7 +166,7 @@ class MasterServer:
                 except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
                     self._log_failure(error, "do its work")
         finally:
-            if not self._is_forked:
+            if not self._generation.is_inherited:
                 self.ended.set()
                 self._release()
                 for submission in (*self._submissions, *self._pending_submissions.values()):

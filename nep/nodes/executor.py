@@ -43,7 +43,8 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
             if remaining_s <= 0.0:
                 return
             # a generator would stop at the first
-            if any([work.run() for work in running if work.is_running]):  # noqa: C419
+            has_run = any([work.run() for work in running if work.is_running])  # noqa: C419
+            if has_run or any(work.is_closed for work in running):
                 continue
             remaining_s = min(remaining_s, *(work.next_timer_delay_s for work in running))
             if remaining_s > 0.0:

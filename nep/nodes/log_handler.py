@@ -24,7 +24,7 @@ from typing import Protocol
 
 from nep.errors import ClosedError, NepError
 from nep.i18n import _, ngettext, number
-from nep.system.forks import notify_after_fork
+from nep.system.forks import current_generation
 from nep.text import bounded_str, shortened
 
 LOG_TOPIC = "/nep/log"
@@ -206,7 +206,7 @@ class LogHandler(logging.Handler):
         self._has_work = threading.Condition()
         self._thread: threading.Thread | None = None
         self._is_closed = False
-        notify_after_fork(self)
+        self._generation = current_generation()
 
     @property
     def unreported_drops(self) -> int:
@@ -219,10 +219,11 @@ class LogHandler(logging.Handler):
         Records beyond the rate limit are dropped and counted.
         """
         if (
-            getattr(record, _PUBLISHED_BY_ATTRIBUTE, None) is self
+            self._generation.is_inherited
+            or getattr(record, _PUBLISHED_BY_ATTRIBUTE, None) is self
             or threading.current_thread() is self._thread
         ):
-            return  # received twice (also through the root logger), or caused by publishing itself
+            return  # forked, received twice (also through the root logger), or caused by publishing itself
         setattr(record, _PUBLISHED_BY_ATTRIBUTE, self)
         with self._has_work:
             if self._is_closed:
@@ -250,21 +251,14 @@ class LogHandler(logging.Handler):
 
     def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
         """Publish queued records within `timeout_s` seconds and close. Idempotent."""
-        with self._has_work:
-            self._is_closed = True
-            thread = self._thread
-            self._has_work.notify()
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(max(0.0, timeout_s))
+        if not self._generation.is_inherited:
+            with self._has_work:
+                self._is_closed = True
+                thread = self._thread
+                self._has_work.notify()
+            if thread is not None and thread is not threading.current_thread():
+                thread.join(max(0.0, timeout_s))
         super().close()
-
-    def forked(self) -> None:
-        """Mark the handler as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = True
-        self._has_work = threading.Condition()
-        self._thread = None
-        self._queue.clear()
-        self._dropped_count = 0
 
     # ---- worker thread
 

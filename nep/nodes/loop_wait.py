@@ -35,8 +35,6 @@ ReadyCallback = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
 """`LoopWait` of each event loop by the loop's id; a reference to the loop would keep it alive."""
-_inherited_waits: list[LoopWait] = []
-"""`LoopWait` objects of the parent process after a fork. Referenced forever, so that none is finalized."""
 _lock = threading.Lock()
 
 
@@ -44,7 +42,7 @@ def _reset_after_fork() -> None:
     # In a forked child there is no thread, and no loop runs.
     global _lock  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
-    _inherited_waits.extend(_waits.values())
+    forks.prevent_finalization(*_waits.values())
     _waits.clear()
 
 

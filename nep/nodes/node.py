@@ -85,8 +85,6 @@ messages.
 
 _open_nodes: set[Node] = set()
 """Open nodes, referenced until they are closed, because a publisher may outlive the variable of its node."""
-_inherited_nodes: list[Node] = []
-"""Nodes of the parent process after a fork. Referenced forever, so that none is finalized."""
 _finalizer_pid = 0
 """Id of the process in which `multiprocessing` is set up to close the nodes at exit."""
 
@@ -147,7 +145,7 @@ class Node(ServiceNode):
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
         self._is_closed = False
-        self._is_forked = False
+        self._generation = forks.current_generation()
         self._log_handler: LogHandler | None = None
         self._parameters: Parameters | None = None
         record = NodeRecord(
@@ -168,7 +166,6 @@ class Node(ServiceNode):
         self._work = Work(name, self._transport, time.monotonic, self._services)
         _open_nodes.add(self)
         _register_worker_close()
-        forks.notify_after_fork(self)
 
     # ---- configurations
 
@@ -420,7 +417,7 @@ class Node(ServiceNode):
     @property
     def is_closed(self) -> bool:
         """True if the node was closed, or if this is a forked child process."""
-        return self._is_closed
+        return self._is_closed or self._generation.is_inherited
 
     # ---- parameters
 
@@ -541,7 +538,7 @@ class Node(ServiceNode):
 
         Thread-safe; may also be called in callbacks.
         """
-        if not self._is_forked:
+        if not self._generation.is_inherited:
             self._work.stop()
 
     # ---- logging, graph, closing
@@ -584,7 +581,8 @@ class Node(ServiceNode):
             timeout_s: Time limit for the delivery in seconds.
         """
         check_time_limit("timeout_s", timeout_s)
-        _close((self,), timeout_s)
+        if not self._generation.is_inherited:
+            _close((self,), timeout_s)
 
     def _close_log(self, timeout_s: float) -> None:
         if self._log_handler is not None:
@@ -613,28 +611,13 @@ class Node(ServiceNode):
         self._transport.close(max(0.0, deadline - time.monotonic()))
         self._services.stop_threads(max(0.0, deadline - time.monotonic()))
 
-    def forked(self) -> None:
-        """Mark the node as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = self._is_forked = True
-        self._lock = threading.RLock()
-        self._work.forked()
-        for publisher in self._publishers:
-            publisher.forked()
-        for subscriber in self._subscribers:
-            subscriber.forked()
-        self._services.forked()
-        if self._parameters is not None:
-            self._parameters.forked()
-        _open_nodes.discard(self)
-        _inherited_nodes.append(self)
-
     def _open_transport(self) -> Transport:
-        if self._is_closed:
+        if self.is_closed:
             raise self._closed_error()
         return self._transport
 
     def _closed_error(self) -> ClosedError:
-        return ClosedError(f"node '{self.name}'", is_forked=self._is_forked)
+        return ClosedError(f"node '{self.name}'", is_forked=self._generation.is_inherited)
 
     def __enter__(self) -> Self:
         return self
@@ -694,6 +677,13 @@ def _close_all() -> None:
     _close(tuple(_open_nodes), FLUSH_TIMEOUT_S)
 
 
+def _give_up_in_child() -> None:
+    for node in _open_nodes:  # its logger and its parameters can still be used
+        node._lock = threading.RLock()  # noqa: SLF001 - private to this module
+    forks.prevent_finalization(*_open_nodes)  # with their sockets
+    _open_nodes.clear()
+
+
 def _register_worker_close() -> None:
     # A forked worker of `multiprocessing` skips the interpreter's exit handlers, so closing is registered
     # with `multiprocessing` itself. It forgets registrations made before it starts: register when a node is
@@ -706,3 +696,4 @@ def _register_worker_close() -> None:
 
 
 atexit.register(_close_all)
+forks.call_in_child(_give_up_in_child)

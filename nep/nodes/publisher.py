@@ -27,6 +27,7 @@ from nep.messages.codecs import JsonEncoder, fast_encoder
 from nep.messages.encoded import Encoded, new_encoded
 from nep.nodes.arguments import check_time_limit
 from nep.protocol.wire import extension_part
+from nep.system.forks import current_generation
 from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
@@ -65,7 +66,7 @@ class Publisher:
     ) -> None:
         self._on_close = on_close
         self._is_strict = is_strict
-        self._is_forked = False
+        self._generation = current_generation()
         self._transport = transport
         self._spec = spec
         self._json_encoder = (
@@ -74,8 +75,7 @@ class Publisher:
         self._encode = spec.codec.encode if self._json_encoder is None else self._json_encoder.encode
         self._rejected = RejectedPayloads(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
-        self.is_closed = False
-        """True if the publisher or its node was closed."""
+        self._is_closed = False
         if isinstance(transport, SupportsFastPublish) and (encode := fast_encoder(spec.codec)) is not None:
             self._install_fast_publish(transport, encode)
 
@@ -95,9 +95,14 @@ class Publisher:
         return self._spec.id
 
     @property
+    def is_closed(self) -> bool:
+        """True if the publisher or its node was closed."""
+        return self._is_closed or self._generation.is_inherited
+
+    @property
     def subscribers(self) -> int:
         """Number of connected subscribers."""
-        return 0 if self._is_forked else self._transport.subscribers
+        return 0 if self._generation.is_inherited else self._transport.subscribers
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
@@ -106,14 +111,14 @@ class Publisher:
         The subscriber of a program that doesn't respond stays connected after its node was removed from the
         graph. Empty for back ends that can't identify subscribers.
         """
-        if self._is_forked or not isinstance(self._transport, SupportsSubscriberIds):
+        if self._generation.is_inherited or not isinstance(self._transport, SupportsSubscriberIds):
             return frozenset()
         return self._transport.subscriber_ids
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of subscribed nodes that aren't connected, because they are starting or don't respond."""
-        return () if self._is_forked else self._transport.missing
+        return () if self._generation.is_inherited else self._transport.missing
 
     @property
     def count(self) -> int:
@@ -156,7 +161,11 @@ class Publisher:
         if strict or self._is_strict:
             self._publish_strict(payload)
             return
-        if self.is_closed or not (self._transport.has_subscribers or self._is_latched):
+        if (
+            self._is_closed
+            or self._generation.is_inherited
+            or not (self._transport.has_subscribers or self._is_latched)
+        ):
             self._skip(payload)
             return
         try:
@@ -172,7 +181,7 @@ class Publisher:
 
     def _publish_strict(self, payload: object) -> None:
         if self.is_closed:
-            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+            raise self._closed_error()
         try:
             if isinstance(payload, Encoded):
                 self._check_payload(payload)
@@ -193,9 +202,7 @@ class Publisher:
         # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
         on_null = None if self._json_encoder is None else self._json_encoder.check_for_nan
         kind = bytes if self._spec.codec.name == "bytes" else None
-        fast_publish = transport.fast_publish_function(
-            PublishHooks(self, kind, encode, on_null, self.publish)
-        )
+        fast_publish = transport.fast_publish_function(PublishHooks(kind, encode, on_null, self.publish))
         fast_publish.__doc__ = Publisher.publish.__doc__
         setattr(self, "publish", fast_publish)  # noqa: B010 - mypy rejects the assignment to a method
 
@@ -249,10 +256,13 @@ class Publisher:
     def _skip(self, payload: object) -> None:
         # Counts a message without subscribers; encodes it from time to time to detect errors.
         if self.is_closed:
-            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+            raise self._closed_error()
         self._check_payload(payload)
         if self._rejected.is_valid(payload):
             self._transport.skip()
+
+    def _closed_error(self) -> ClosedError:
+        return ClosedError(f"publisher '{self.topic}'", is_forked=self._generation.is_inherited)
 
     # ---- names of the original module
 
@@ -297,7 +307,7 @@ class Publisher:
             ClosedError: The publisher is closed.
         """
         if self.is_closed:
-            raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
+            raise self._closed_error()
         import numpy as np  # noqa: PLC0415 - optional and heavy
 
         number_type = np.dtype(dtype)
@@ -313,7 +323,7 @@ class Publisher:
         """Deliver published messages within `timeout_s` seconds and unregister. Idempotent."""
         check_time_limit("timeout_s", timeout_s)
         if not self.is_closed:
-            self.is_closed = True
+            self._is_closed = True
             try:
                 self._transport.close(timeout_s)
             finally:
@@ -322,11 +332,7 @@ class Publisher:
 
     def on_node_close(self) -> None:
         """Mark the publisher as closed because its node is being closed."""
-        self.is_closed = True
-
-    def forked(self) -> None:
-        """Mark the publisher as closed in a forked child process. See `nep.system.forks`."""
-        self.is_closed = self._is_forked = True
+        self._is_closed = True
 
     def __enter__(self) -> Self:
         return self

@@ -13,6 +13,7 @@ from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message
 from nep.nodes.arguments import check_optional_time_limit
 from nep.nodes.async_reading import AsyncMessages, AsyncReader
+from nep.system.forks import current_generation
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Subscriber:
         on_close: Callable[[Subscriber], object] | None = None,
     ) -> None:
         self._on_close = on_close
-        self._is_forked = False
+        self._generation = current_generation()
         self._transport = transport
         self._spec = spec
         self._ready = transport.ready
@@ -88,7 +89,7 @@ class Subscriber:
     @property
     def is_closed(self) -> bool:
         """True if the subscriber or its node was closed."""
-        return self._transport.is_closed
+        return self._generation.is_inherited or self._transport.is_closed
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """Return (True, payload) for the next message, or (False, empty payload) if there is none.
@@ -109,7 +110,7 @@ class Subscriber:
             is_invalid = True
         if is_invalid:
             check_optional_time_limit("timeout_s", timeout_s)
-        while self._ready:  # already read
+        while self._ready and not self._generation.is_inherited:  # already read
             try:
                 return True, self.decoded_unshared(self._ready.popleft())
             except IndexError:  # another thread took the last one
@@ -179,7 +180,7 @@ class Subscriber:
         return None if message is None else self.typed(message)
 
     def _receive(self, timeout_s: float | None) -> Message | None:
-        if self._ready or self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
+        if self._ready or self.is_closed or (timeout_s is not None and timeout_s <= 0.0):
             return self._take_or_raise()
         wait_s = WAIT_SLICE_S if timeout_s is None or timeout_s > WAIT_SLICE_S else timeout_s
         message = self._transport.receive(wait_s)
@@ -188,7 +189,7 @@ class Subscriber:
     def _receive_after_slice(self, timeout_s: float | None) -> Message | None:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            if self._transport.is_closed:
+            if self.is_closed:
                 raise self._closed_error()
             remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
             if remaining_s <= 0.0:
@@ -225,6 +226,8 @@ class Subscriber:
 
         Returns None if there is none or the subscriber is closed.
         """
+        if self._generation.is_inherited:
+            return None
         try:
             return self._ready.popleft()
         except IndexError:  # also if another thread took the last one
@@ -232,7 +235,7 @@ class Subscriber:
 
     def _take_or_raise(self) -> Message | None:
         message = self.take()
-        if message is None and self._transport.is_closed:
+        if message is None and self.is_closed:
             raise self._closed_error()
         return message
 
@@ -241,7 +244,7 @@ class Subscriber:
         return None if message is None else self.typed(message)
 
     def _closed_error(self) -> ClosedError:
-        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
+        return ClosedError(f"subscriber '{self.topic}'", is_forked=self._generation.is_inherited)
 
     def typed(self, message: Message) -> Message:
         """Convert a message of the transport to the message that this subscriber returns."""
@@ -286,15 +289,10 @@ class Subscriber:
 
     def close(self) -> None:
         """Unregister the subscriber and discard its unread messages. Idempotent."""
-        if not self._is_forked:
+        if not self._generation.is_inherited:
             self._transport.close()
             if self._on_close is not None:
                 self._on_close(self)
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process. See `nep.system.forks`."""
-        self._is_forked = True
-        self._transport.forked()
 
     def __iter__(self) -> Iterator[Message]:
         while True:

@@ -6,6 +6,8 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 
+from nep.system.forks import current_generation
+
 
 class Timer:
     """Periodic timer of a node. Thread-safe. Created by `Node.new_timer`.
@@ -29,6 +31,7 @@ class Timer:
         self._clock = clock
         self._on_cancel = on_cancel
         self._is_cancelled = False
+        self._generation = current_generation()
         self._lock = threading.Lock()
         self._due = clock() + period_s
 
@@ -44,8 +47,8 @@ class Timer:
 
     @property
     def is_cancelled(self) -> bool:
-        """True if the timer was cancelled or its node was closed."""
-        return self._is_cancelled
+        """True if the timer was cancelled, its node was closed, or this is a forked child process."""
+        return self._is_cancelled or self._generation.is_inherited
 
     @property
     def due(self) -> float:
@@ -66,7 +69,7 @@ class Timer:
         before the call, so that it is correct even if the function raises or spins itself.
         """
         now = self._clock()
-        if self._is_cancelled or now < self._due:
+        if self.is_cancelled or now < self._due:
             return False
         with self._lock:
             if now < self._due:  # another thread was faster
@@ -76,12 +79,14 @@ class Timer:
 
     def cancel(self) -> None:
         """Cancel the timer. A running call is not interrupted. Thread-safe; idempotent."""
+        if self._generation.is_inherited:
+            return
         self._is_cancelled = True
         if self._on_cancel is not None:
             self._on_cancel(self)
 
     def on_node_close(self) -> None:
-        """Cancel the timer because its node is closed or the process was forked. Acquires no lock."""
+        """Cancel the timer because its node is closed."""
         self._is_cancelled = True
 
     def __repr__(self) -> str:

@@ -14,6 +14,7 @@ from nep.nodes.subscriber import WAIT_SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
 from nep.patterns.services.registry import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
+from nep.system.forks import current_generation
 
 NO_MESSAGE = object()
 """Sentinel that `Work.next_item` returns if there is no message."""
@@ -53,7 +54,8 @@ class Work:
         self.services = services
         self.callbacks: tuple[Callback, ...] = ()
         self.timers: tuple[Timer, ...] = ()
-        self.is_closed = self.is_forked = False
+        self._is_closed = False
+        self._generation = current_generation()
         self._node_name = node_name
         self._lock = threading.Lock()
         self._is_stopped = threading.Event()
@@ -66,7 +68,7 @@ class Work:
     def add_callback(self, callback: Callback) -> None:
         """Add a callback, unless its subscriber or the node is closed."""
         with self._lock:
-            if not callback.transport.is_closed and not self.is_closed:
+            if not callback.transport.is_closed and not self._is_closed:
                 self.callbacks = (*self.callbacks, callback)
                 if is_coroutine_function(callback.call):
                     self._coroutine_owner = self._coroutine_owner or callback.subscriber.topic
@@ -82,7 +84,7 @@ class Work:
         """Create and start a timer. See `Timer`."""
         timer = Timer(period_s, callback, self.clock, self._remove_timer)
         with self._lock:
-            if self.is_closed:
+            if self._is_closed:
                 timer.on_node_close()
             else:
                 self.timers = (*self.timers, timer)
@@ -106,6 +108,11 @@ class Work:
     # ---- state
 
     @property
+    def is_closed(self) -> bool:
+        """True if the node was closed, or if this is a forked child process."""
+        return self._is_closed or self._generation.is_inherited
+
+    @property
     def is_running(self) -> bool:
         """True until the node is stopped or closed."""
         return not self._is_stopped.is_set() and not self.is_closed
@@ -117,7 +124,8 @@ class Work:
 
     def reset_stop(self) -> None:
         """Clear a stop request at the end of a spin."""
-        self._is_stopped.clear()
+        if not self._generation.is_inherited:
+            self._is_stopped.clear()
 
     def wake(self) -> None:
         """Wake the spinning thread so that it re-evaluates its work."""
@@ -132,13 +140,15 @@ class Work:
 
     def unwatch(self, watcher: Wakeable) -> None:
         """Unregister an object that `watch` registered."""
+        if self._generation.is_inherited:
+            return
         with self._lock:
             self._watchers = tuple(each for each in self._watchers if each is not watcher)
 
     def close(self) -> None:
         """Remove all callbacks and timers because the node is closed."""
         with self._lock:
-            self.is_closed = True
+            self._is_closed = True
             self.callbacks = ()
             timers, self.timers = self.timers, ()
         self._is_stopped.set()
@@ -147,18 +157,9 @@ class Work:
         for watcher in self._watchers:
             watcher.wake()
 
-    def forked(self) -> None:
-        """Discard everything in a forked child process. See `nep.system.forks`."""
-        self.is_closed = self.is_forked = True
-        self._lock = threading.Lock()
-        self._is_stopped = threading.Event()
-        for timer in self.timers:
-            timer.on_node_close()
-        self.callbacks, self.timers, self._watchers = (), (), ()
-
     def check_not_forked(self) -> None:
         """Raise `ClosedError` in a forked child process."""
-        if self.is_forked:
+        if self._generation.is_inherited:
             raise ClosedError(f"node '{self._node_name}'", is_forked=True)
 
     # ---- running
@@ -234,7 +235,7 @@ class Work:
         # Returns True if another message was read together with one of these.
         has_more, is_stopped = False, self._is_stopped.is_set
         for subscriber, transport, call, with_message in self.callbacks:
-            if is_stopped() or self.is_closed:
+            if is_stopped() or self._is_closed:
                 break
             item = self.next_item(subscriber, with_message=with_message)
             if transport.ready:
@@ -291,7 +292,7 @@ class Work:
                 remaining_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - self.clock())
                 if remaining_s <= 0.0:
                     return
-                if self._run_until(self.clock() + remaining_s):
+                if self._run_until(self.clock() + remaining_s) or self.is_closed:
                     continue
                 if self.timers:
                     remaining_s = min(remaining_s, self.next_timer_delay_s)

@@ -1,9 +1,9 @@
-"""Fork support: objects that must be discarded in a forked child process (Linux, macOS).
+"""Fork support: what a forked child process must not use or keep (Linux, macOS).
 
 A child process gets a copy of the memory, but only the thread that called fork: I/O threads are missing,
-locks stay held, and descriptors are shared with the parent. Objects with sockets can't be used or even closed
-in a child, because one byte written to an inherited descriptor would wake the parent's threads. Owners of
-such objects are registered here and notified in a child.
+locks stay held, and descriptors are shared with the parent. Objects with threads or sockets can't be used or
+even closed in a child, because one byte written to an inherited descriptor would wake the parent's threads.
+Such objects remember the `Generation` in which they were created, and check it before they acquire a lock.
 
 A long-lived child would keep the parent's ports and connections open, and peers would not notice when the
 parent closes them. libzmq doesn't expose its descriptors, so they are found by their addresses and closed.
@@ -12,57 +12,80 @@ parent closes them. libzmq doesn't expose its descriptors, so they are found by 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import socket
 import stat
 import sys
 from collections.abc import Callable
-from typing import Protocol
-from weakref import WeakSet
+from types import MethodType
+from weakref import WeakKeyDictionary
 
 
-class ForkAware(Protocol):
-    """Object that must not be used in a forked child process."""
+class Generation:
+    """Life of a process up to the next fork, in which objects were created.
 
-    def forked(self) -> None:
-        """Mark the object as closed in a child process, without taking a lock or touching a ZeroMQ socket."""
+    A shared object instead of a number: checking its attribute costs a publisher 2 ns per message.
+    """
+
+    def __init__(self) -> None:
+        self.is_inherited = False
+        """True in a forked child process: objects of this generation belong to the parent process."""
 
 
-_fork_aware_objects: WeakSet[ForkAware] = WeakSet()
-_handlers: list[Callable[[], None]] = []
+_generation = Generation()
+_methods: WeakKeyDictionary[object, Callable[..., object]] = WeakKeyDictionary()
+_functions: list[Callable[[], object]] = []
 _inherited_endpoints: set[str] = set()
 _DESCRIPTOR_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
 _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
-def notify_after_fork(owner: ForkAware) -> None:
-    """Register an object whose `forked` is called in every child process. Only a weak reference is stored."""
-    _fork_aware_objects.add(owner)
+def current_generation() -> Generation:
+    """Return the generation of this process."""
+    return _generation
+
+
+def call_in_child(call: Callable[[], object]) -> None:
+    """Register a function to be called in every child process, or a method for the next child process.
+
+    Methods are called first. They must not acquire a lock or touch a ZeroMQ socket, and their objects are
+    referenced only weakly. An object can have one method.
+    """
+    if isinstance(call, MethodType):
+        _methods[call.__self__] = call.__func__
+    else:
+        _functions.append(call)
 
 
 def close_in_child(*endpoints: str) -> None:
     """Close the sockets in this child process that are bound to, accepted at or connected to these endpoints.
 
-    Call this in `forked`; the sockets are closed after all owners were notified. Endpoints have the form
-    `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
+    Call this in a method of `call_in_child`; the sockets are closed after all methods and functions were
+    called. Endpoints have the form `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
     """
     _inherited_endpoints.update(endpoints)
 
 
-def call_in_child(call: Callable[[], None]) -> None:
-    """Register a function to be called in every child process, after the `forked` of all objects.
+def prevent_finalization(*instances: object) -> None:
+    """Prevent objects, and everything that they reference, from ever being finalized, even at exit.
 
-    For the global state of modules; use `notify_after_fork` for objects.
+    In a forked child process, finalizing an object of a library could block, or notify the network.
     """
-    _handlers.append(call)
+    for instance in instances:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))
 
 
-def _notify_owners() -> None:
-    owners = list(_fork_aware_objects)
-    _fork_aware_objects.clear()
-    for callback in (*(owner.forked for owner in owners), *_handlers):
+def _begin_generation() -> None:
+    # Called in the child process.
+    global _generation  # noqa: PLW0603 - one per process
+    _generation.is_inherited = True
+    _generation = Generation()
+    calls: list[Callable[[], object]] = [MethodType(function, owner) for owner, function in _methods.items()]
+    _methods.clear()
+    for call in (*calls, *_functions):
         with contextlib.suppress(Exception):  # a failure must not prevent the others
-            callback()
+            call()
     if _inherited_endpoints:
         with contextlib.suppress(OSError):
             _close_sockets(*_addresses(_inherited_endpoints))
@@ -120,4 +143,4 @@ def _socket_addresses(number: int) -> list[object]:
 
 
 if sys.platform != "win32":
-    os.register_at_fork(after_in_child=_notify_owners)
+    os.register_at_fork(after_in_child=_begin_generation)

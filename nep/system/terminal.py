@@ -14,7 +14,7 @@ from collections import deque
 from typing import TYPE_CHECKING, TextIO
 
 from nep.i18n import ngettext
-from nep.system.forks import notify_after_fork
+from nep.system.forks import call_in_child
 from nep.text import escaped
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Terminal(io.TextIOBase):
         self._is_writing = False
         self._condition = threading.Condition()
         self._thread: threading.Thread | None = None
-        notify_after_fork(self)
+        call_in_child(self._reset_in_child)
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -102,13 +102,14 @@ class Terminal(io.TextIOBase):
     def __exit__(self, *_exc: object) -> None:
         self.close()
 
-    def forked(self) -> None:
-        """Reset in a forked child process; the queued text belongs to the parent. See `nep.system.forks`."""
+    def _reset_in_child(self) -> None:
+        # The queued text belongs to the parent.
         self._condition = threading.Condition()
         self._thread = None
         self._queue.clear()
         self._queued_characters = self._dropped_lines = 0
         self._is_writing = False
+        call_in_child(self._reset_in_child)
 
     def _start_thread_locked(self) -> None:
         thread = threading.Thread(target=self._run, name="nep-terminal", daemon=True)

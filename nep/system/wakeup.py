@@ -11,7 +11,7 @@ import threading
 from nep.errors import TooManyFilesError
 from nep.i18n import _
 from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
-from nep.system.forks import notify_after_fork
+from nep.system.forks import call_in_child
 
 _HAS_EVENTFD = sys.platform == "linux" and hasattr(os, "eventfd")
 
@@ -43,7 +43,7 @@ class Waker:
             end.setblocking(False)
         self.fd = self._sockets[0].fileno() if self._sockets else self._event
         """File descriptor to poll for reading."""
-        notify_after_fork(self)
+        call_in_child(self._close_in_child)
 
     def wake(self) -> None:
         """Make `fd` readable. Never blocks; several wakes before a `clear` count as one."""
@@ -67,8 +67,8 @@ class Waker:
         with self._lock:
             self._close()
 
-    def forked(self) -> None:
-        """Close the inherited descriptors in a forked child process; the parent's descriptors stay open."""
+    def _close_in_child(self) -> None:
+        # The parent's descriptors stay open.
         self._lock = threading.RLock()
         self._close()
 

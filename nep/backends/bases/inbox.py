@@ -12,6 +12,7 @@ from nep.backends.bases.waking import WakingSubscriber
 from nep.backends.services import CallQueue, wake_on_call
 from nep.messages.message import Message
 from nep.messages.queue import Inbox
+from nep.system.forks import current_generation
 
 _logger = logging.getLogger("nep")
 _BATCH_BYTES = 64 * 2**20
@@ -39,6 +40,7 @@ class Inboxes:
         self._sinks: tuple[InboxSubscriber, ...] = ()
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
+        self._generation = current_generation()
 
     def wait(
         self,
@@ -101,6 +103,8 @@ class Inboxes:
                         sink(messages)
                     except BaseException:  # also SystemExit: the sink thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
+                    if self._generation.is_inherited:  # the sink forked: the child has no other thread
+                        return
             self._closing.wait(_BATCH_INTERVAL_S)
 
 
@@ -169,7 +173,3 @@ class InboxSubscriber(WakingSubscriber):
             self.notify_waiting()
         self._inboxes.remove_sink(self)
         return True
-
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True

@@ -72,10 +72,3 @@ class OpenServices(Generic[S, C]):
         for server in self.servers:
             server.close(max(0.0, deadline - time.monotonic()))
         self.deadlines.close(max(0.0, deadline - time.monotonic()))
-
-    def forked(self) -> None:
-        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = True
-        self._lock = threading.Lock()
-        for owner in (*self.servers, *self.clients):
-            owner.forked()

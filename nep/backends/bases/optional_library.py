@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -44,11 +43,3 @@ class OptionalLibrary:
             return import_modules()
         except Exception as error:  # some loaders raise exceptions of their own classes
             raise BackendUnavailableError(self._backend, self._install_hint()) from error
-
-
-def prevent_finalization(instance: object) -> None:
-    """Prevent an object from ever being finalized, even at exit.
-
-    In a forked child process, finalizing an object of a library could block, or notify the network.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(instance))

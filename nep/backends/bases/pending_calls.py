@@ -169,11 +169,5 @@ class PendingCalls(Generic[C]):
         for call in calls:
             self._run_callback(call, self._closed_error())
 
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process, without acquiring the lock."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self._calls = {}
-
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("client of '{service}'").format(service=self.spec.service))

@@ -124,11 +124,6 @@ class MemoryServer:
             client.handle_server_closed(self)
         self._on_close(self)
 
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process."""
-        self.is_closed = True
-        self.calls.forked()
-
 
 class MemoryClient(PendingCalls[_Call]):
     """Client with its calls in flight, which the hub's lock guards."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from nep.backends.bases.deadlines import Deadlines
-from nep.backends.bases.optional_library import prevent_finalization
 from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.nanomsg.library import load_pynng
 from nep.backends.nanomsg.server import close_context, join_parts, split_parts
@@ -184,9 +183,3 @@ class NanomsgClient(PendingCalls[_Call]):
             if thread is not threading.current_thread():
                 thread.join(max(0.0, deadline - time.monotonic()))
         self._socket.close()
-
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process, without touching nng."""
-        for call in (*self._calls.values(), *self._late_calls.values()):
-            prevent_finalization(call.context)
-        super().forked()

@@ -10,14 +10,14 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakSet
 
-from nep.backends.bases.optional_library import OptionalLibrary, prevent_finalization
+from nep.backends.bases.optional_library import OptionalLibrary
 from nep.errors import AddressInUseError
 from nep.i18n import _
 from nep.messages.codecs import Codec
 from nep.system.addresses import LOOPBACK, ORIGINAL_PORTS, host_of
 from nep.system.descriptors import check_free_descriptors
 from nep.system.exits import call_after_nodes, cancel_after_nodes
-from nep.system.forks import call_in_child
+from nep.system.forks import call_in_child, prevent_finalization
 
 MAX_QUEUE_LENGTH = 8192
 """Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
@@ -68,8 +68,7 @@ def _forked() -> None:
     if _MODULE_NAME not in sys.modules:
         return
     _library.has_forked = True
-    for socket in _sockets:
-        prevent_finalization(socket)  # the finalizer would close it
+    prevent_finalization(*_sockets)  # the finalizer would close them
     exit_handler = getattr(sys.modules[_MODULE_NAME], "_pynng_atexit", None)
     if exit_handler is not None:
         atexit.unregister(exit_handler)

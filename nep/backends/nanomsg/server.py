@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.bases.optional_library import prevent_finalization
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.nanomsg.library import load_pynng
 from nep.backends.services import (
@@ -182,11 +181,3 @@ class NanomsgServer:
             close_context(context)
         self._socket.close()
         self._thread.join(_JOIN_TIMEOUT_S)
-
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process, without touching nng."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-        self.calls.forked()
-        for context in self._contexts:
-            prevent_finalization(context)

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from nep.backends.bases.optional_library import prevent_finalization
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.direct import attach
 from nep.backends.nanomsg.library import load_pynng, new_socket
@@ -155,13 +154,6 @@ class NanomsgSurveyor:
             self._finish(survey)
             survey.callback(self._closed_error())
         self._socket.close()
-
-    def forked(self) -> None:
-        """Mark the surveyor as closed in a forked child process, without touching nng."""
-        self.is_closed = True
-        self._changed = threading.Condition(threading.Lock())
-        for survey in self._surveys.values():
-            prevent_finalization(survey.context)
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

@@ -86,11 +86,6 @@ class NanomsgTransport(ZeromqTransport):
         self._direct_services.close(timeout_s)
         super().close(max(0.0, deadline - time.monotonic()))
 
-    def forked(self) -> None:
-        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
-        self._direct_services.forked()
-        super().forked()
-
     def _session(self, address: str) -> MasterSession:
         if not is_loopback(address):
             raise NepError(

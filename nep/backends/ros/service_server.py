@@ -160,11 +160,6 @@ class RosServer:
         self.process.shutdown_callbacks.discard(self._on_rospy_shutdown)
         self._on_close(self)
 
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process."""
-        self.is_closed = True
-        self.calls.forked()
-
 
 def _message_class(rospy: Any, name: str, kind: ServiceType) -> type:  # noqa: ANN401 - rospy is not typed
     # Creates a message class whose instances contain encoded bodies.

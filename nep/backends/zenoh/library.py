@@ -9,9 +9,9 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from nep.backends.bases.optional_library import OptionalLibrary, prevent_finalization
+from nep.backends.bases.optional_library import OptionalLibrary
 from nep.i18n import _
-from nep.system.forks import call_in_child
+from nep.system.forks import call_in_child, prevent_finalization
 
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
@@ -65,8 +65,7 @@ def _forked() -> None:
     if "zenoh" not in sys.modules or not _sessions:
         return
     _library.has_forked = True
-    for session in _sessions:
-        prevent_finalization(session)
+    prevent_finalization(*_sessions)
 
 
 call_in_child(_forked)

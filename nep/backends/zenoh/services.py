@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from nep.backends.bases.deadlines import Deadlines
-from nep.backends.bases.optional_library import prevent_finalization
 from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.services import (
@@ -141,14 +140,6 @@ class ZenohServer:
         for query in pending_queries:
             query.drop()
         self._on_close(self)
-
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process."""
-        self.is_closed = True
-        for query in self._queries:
-            prevent_finalization(query)
-        self._lock = threading.Lock()
-        self.calls.forked()
 
 
 @dataclass(eq=False)

@@ -25,7 +25,7 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import ExpectedSubscriber, NodeRecord, RemovePublisher, SubscriberRecord
-from nep.system.forks import close_in_child, notify_after_fork
+from nep.system.forks import call_in_child, close_in_child
 
 _logger = logging.getLogger("nep")
 _CLOSE_TIMEOUT_S = 0.3
@@ -58,7 +58,7 @@ class ZenohTransport:
         self._is_closed = False
         self._is_shut_down = False
         self._services = ZenohServices(self._session, node.name)
-        notify_after_fork(self)
+        call_in_child(self._give_up_in_child)
 
     # ---- publishers and subscribers
 
@@ -262,10 +262,6 @@ class ZenohTransport:
         for session in sessions:
             session.close(min(_CLOSE_TIMEOUT_S, timeout_s))
 
-    def forked(self) -> None:
-        """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
+    def _give_up_in_child(self) -> None:
         for session in self._sessions.values():
             close_in_child(*session.endpoints)
-        self._services.forked()
-        for subscriber in self._subscribers:
-            subscriber.forked()

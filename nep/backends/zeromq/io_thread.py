@@ -43,7 +43,6 @@ from nep.system.descriptors import (
     is_descriptor_shortage,
     open_descriptor_count,
 )
-from nep.system.forks import notify_after_fork
 from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep.io")
@@ -121,7 +120,8 @@ class IoThread:
         self._is_closing = False
         self._pause = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        notify_after_fork(self)
+        self._generation = forks.current_generation()
+        forks.call_in_child(self._close_in_child)
 
     # ---- from other threads
 
@@ -161,13 +161,12 @@ class IoThread:
         elif threading.current_thread() is not self._thread:
             self._thread.join(timeout_s)
 
-    def forked(self) -> None:
-        """Mark the thread as closed in a forked child process, where the thread doesn't exist."""
-        self._is_closing = True
-        self._pause = threading.Event()
-        self._pollables.clear()
-        self._commands.clear()
+    def _close_in_child(self) -> None:
         self._selector.close()
+
+    @property
+    def _should_end(self) -> bool:
+        return self._is_closing or self._generation.is_inherited  # the latter after a sink has forked
 
     def _queue_command(self, command: str, pollable: Pollable, done: threading.Event | None) -> None:
         self._commands.append((command, pollable, done))
@@ -176,14 +175,16 @@ class IoThread:
     # ---- in the I/O thread
 
     def _run(self) -> None:
-        while not self._is_closing:
+        while not self._should_end:
             self._iteration += 1
             try:
                 self._run_once()
             except Exception:
-                if not self._is_closing:
+                if not self._should_end:
                     _logger.exception("polling failed; rebuilding the poller")
                     self._rebuild_poller()
+        if self._generation.is_inherited:
+            return
         self._release()
         for _command, _pollable, done in self._commands:
             if done is not None:
@@ -202,7 +203,7 @@ class IoThread:
         self._serve_due()
 
     def _rebuild_poller(self) -> None:
-        while not self._is_closing:
+        while not self._should_end:
             with suppress(Exception):  # the selector itself may be broken
                 self._selector.close()
             try:
@@ -232,13 +233,15 @@ class IoThread:
                 done.set()
 
     def _serve(self, pollable: Pollable) -> None:
+        if self._should_end:
+            return
         now = time.monotonic()
         try:
             state = pollable.serve(now)
         except Exception:  # one broken socket must not block the others
             _logger.exception("error while serving a socket; retrying")
             state = PollState(is_reading_paused=True, due=now + _RETRY_S)
-        if pollable not in self._pollables or self._is_closing:
+        if pollable not in self._pollables or self._should_end:
             return  # removed while it was served
         try:
             self._update_registration(pollable, _event_mask(state))
@@ -444,11 +447,6 @@ class SharedContext:
 
 _lock = threading.Lock()
 _shared_context: SharedContext | None = None
-_inherited_contexts: list[SharedContext] = []
-"""Contexts inherited by a forked child process.
-
-Never destroyed, because destroying them would affect the parent process.
-"""
 
 
 def shared_context() -> SharedContext:
@@ -473,9 +471,8 @@ def _discard_shared(context: SharedContext) -> None:
 def _forked() -> None:
     global _lock, _shared_context  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
-    if _shared_context is not None:
-        _inherited_contexts.append(_shared_context)
-        _shared_context = None
+    forks.prevent_finalization(_shared_context)  # destroying it would affect the parent process
+    _shared_context = None
     # pyzmq starts its garbage-collection thread under this lock; a fork at that moment leaves it locked.
     garbage.gc._lock = threading.Lock()  # noqa: SLF001
 

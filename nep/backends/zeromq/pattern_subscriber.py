@@ -250,12 +250,6 @@ class PatternSubscriber(WakingSubscriber):
         for member in members:
             member.close()
 
-    def forked(self) -> None:
-        """Mark the subscriber as closed in a forked child process."""
-        self.is_closed = True
-        for member in list(self._members.values()):
-            member.forked()
-
 
 class _RemovedTotals:
     """Statistics of removed members."""

@@ -16,6 +16,7 @@ from nep.backends.base import PublishHooks
 from nep.messages.codecs import NULL
 from nep.messages.encoded import Encoded
 from nep.protocol.batch import MAX_BATCH_MESSAGES
+from nep.system.forks import current_generation
 
 BATCH_WINDOW_NS = 20_000
 MAX_DELAY_NS = 100_000
@@ -34,6 +35,8 @@ _time_ns = time.time_ns
 class BatchOwner(Protocol):
     """Interface of a publisher to its batch."""
 
+    is_closed: bool
+    """True after the publisher was closed."""
     has_subscribers: bool
     """True if any subscriber is connected."""
     problem: str
@@ -108,15 +111,22 @@ class PendingBatch:
             sender: Sending end of the publisher.
             lock: Lock of `sender`.
         """
-        owner, raw_type, encode, on_null, fallback = hooks
+        raw_type, encode, on_null, fallback = hooks
         batch, pending, append, send_now = self, self.pending, self.pending.append, sender.send_now
+        generation = current_generation()
 
         def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
             if strict:
                 fallback(payload, strict=True)
                 return
             stamp_ns = _time_ns()
-            if owner.is_closed or sender.problem or not sender.has_subscribers or type(payload) is Encoded:
+            if (
+                generation.is_inherited
+                or sender.is_closed
+                or sender.problem
+                or not sender.has_subscribers
+                or type(payload) is Encoded
+            ):
                 fallback(payload)
                 return
             try:

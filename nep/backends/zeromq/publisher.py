@@ -172,7 +172,7 @@ class NativePublisher(HandshakePublisher):
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.counts_at_hello)
         self.fd = int(socket.getsockopt(zmq.FD))
-        bytes_hooks = PublishHooks(self, bytes, _reject_payload, None, self.send_now)
+        bytes_hooks = PublishHooks(bytes, _reject_payload, None, self.send_now)
         self._send_bytes = self._batch.publish_function(bytes_hooks, self, self._lock)
 
     @property

@@ -373,11 +373,6 @@ class SocketSubscriber(Generic[R]):
                 self._waker.close()
                 self._waker = None
 
-    def forked(self) -> None:
-        """Mark the subscriber as closed and empty in a forked child process."""
-        self.is_closed = True
-        self.ready.clear()
-
     @contextmanager
     def _requested_lock(self) -> Iterator[None]:
         # Takes the lock for all but readers; no reader waits in the socket while the lock is wanted.

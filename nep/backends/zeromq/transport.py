@@ -44,7 +44,7 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import ExpectedSubscriber, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import MAX_SUBSCRIPTION_BYTES
 from nep.system.descriptors import check_free_descriptors
-from nep.system.forks import close_in_child, notify_after_fork
+from nep.system.forks import call_in_child, close_in_child
 from nep.system.wakeup import Waker
 
 DIRECT_WAIT_S = 0.3
@@ -136,7 +136,7 @@ class ZeromqTransport:
         self._services = ZeromqServices(self._shared, self._session, node.name)
         self._direct_endpoints: dict[int, str] = {}
         """Endpoints of direct connections, by the id of their publisher or subscriber."""
-        notify_after_fork(self)
+        call_in_child(self._give_up_in_child)
 
     # ---- publishers
 
@@ -514,10 +514,8 @@ class ZeromqTransport:
                 session.start_leave()
                 session.close()
 
-    def forked(self) -> None:
-        """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
-        close_in_child(*self._direct_endpoints.values())
-        self._services.forked()
+    def _give_up_in_child(self) -> None:
+        close_in_child(*self._direct_endpoints.values(), *self._services.endpoints)
         for session in self._sessions.values():
             close_in_child(session.endpoint)
         for endpoint_owner in (*self._publishers, *self._subscribers.values()):

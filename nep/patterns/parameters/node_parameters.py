@@ -10,6 +10,7 @@ from typing import Protocol
 from nep.errors import ClosedError, ParameterError, did_you_mean
 from nep.i18n import _
 from nep.patterns.parameters.parameter import NodeParameter, new_parameter, short_repr
+from nep.system.forks import call_in_child
 from nep.text import bounded_str, escaped
 
 MSG_TYPE = "nep/patterns/parameters"
@@ -63,6 +64,7 @@ class Parameters:
         self._watchers: tuple[OnChange, ...] = ()
         self._lock = threading.RLock()
         self._topic: StateTopic | None = None
+        call_in_child(self._reset_in_child)
 
     # ---- declaring and reading
 
@@ -227,7 +229,8 @@ class Parameters:
             return {"refused": str(error) or type(error).__name__}
         return self._state()
 
-    def forked(self) -> None:
-        """Detach from the host in a forked child process. Acquires no lock."""
+    def _reset_in_child(self) -> None:
+        # The child's changes stay local.
         self._lock = threading.RLock()
         self._topic = None
+        call_in_child(self._reset_in_child)

@@ -24,6 +24,7 @@ from nep.messages.codecs import Codec, codec_by_number
 from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import CallKind, read_error_reply
 from nep.system.arguments import check_optional_time_limit
+from nep.system.forks import current_generation
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -67,7 +68,7 @@ class Client:
         self.timeout_s = timeout_s
         self._codec = types.request.codec(codec)
         self._on_close = on_close
-        self._is_forked = False
+        self._generation = current_generation()
         self._lock = threading.Lock()
         self._future_thread: _FutureThread | None = None
         self._sent_call: Future[object] | None = None
@@ -75,7 +76,7 @@ class Client:
     @property
     def is_connected(self) -> bool:
         """True if a server was connected at the last check; this can be outdated."""
-        return self._transport.is_connected
+        return not self._generation.is_inherited and self._transport.is_connected
 
     @property
     def late(self) -> int:
@@ -85,7 +86,7 @@ class Client:
     @property
     def is_closed(self) -> bool:
         """True if the client or its node was closed."""
-        return self._transport.is_closed
+        return self._generation.is_inherited or self._transport.is_closed
 
     # ---- calling
 
@@ -114,10 +115,10 @@ class Client:
                 with contextlib.suppress(queue.Empty):
                     outcome = outcomes.get(timeout=WAIT_SLICE_S)
                     break
-                if self._is_forked:
+                if self._generation.is_inherited:
                     raise self._closed_error()
         except BaseException:  # also KeyboardInterrupt
-            self._transport.cancel(call)
+            self._cancel(call)
             raise
         try:
             return self._result(outcome)
@@ -134,6 +135,8 @@ class Client:
             request: Value of the request.
             timeout_s: Time limit in seconds, as for `call`.
         """
+        if self.is_closed:
+            raise self._closed_error()
         with self._lock:
             if self._future_thread is None:
                 self._future_thread = _FutureThread(f"nep-client-{self.service}")
@@ -144,9 +147,7 @@ class Client:
             self._resolve_timeout(timeout_s),
             lambda outcome: future_thread.add(lambda: self._complete_future(future, outcome)),
         )
-        future.add_done_callback(
-            lambda done_future: self._transport.cancel(call) if done_future.cancelled() else None
-        )
+        future.add_done_callback(lambda done_future: self._cancel(call) if done_future.cancelled() else None)
         return future
 
     async def acall(self, request: object, timeout_s: TimeLimit = "default") -> object:
@@ -170,7 +171,7 @@ class Client:
         try:
             outcome = await future
         except BaseException:  # cancelled
-            self._transport.cancel(call)
+            self._cancel(call)
             raise
         try:
             return self._result(outcome)
@@ -199,7 +200,7 @@ class Client:
         done = threading.Event()
         sent_call.add_done_callback(lambda _future: done.set())
         while not done.wait(WAIT_SLICE_S):
-            if self._is_forked:
+            if self._generation.is_inherited:
                 raise self._closed_error()
         return sent_call.result()
 
@@ -208,9 +209,13 @@ class Client:
     def _start_call(
         self, request: object, timeout_s: float | None, callback: Callable[[Outcome], None]
     ) -> OpenCall:
-        if self._transport.is_closed:
+        if self.is_closed:
             raise self._closed_error()
         return self._transport.start_call(self._codec.encode(request).data, timeout_s, callback)
+
+    def _cancel(self, call: OpenCall) -> None:
+        if not self._generation.is_inherited:
+            self._transport.cancel(call)
 
     def _resolve_timeout(self, timeout_s: TimeLimit) -> float | None:
         return self.timeout_s if timeout_s == "default" else check_optional_time_limit("timeout_s", timeout_s)
@@ -255,7 +260,7 @@ class Client:
 
     def close(self) -> None:
         """Unregister and close the client. Running calls raise `ClosedError`. Idempotent."""
-        if self._is_forked:
+        if self._generation.is_inherited:
             return
         self._transport.close()
         self.join()
@@ -271,15 +276,10 @@ class Client:
         if future_thread is not None:
             future_thread.close()
 
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process. See `nep.system.forks`."""
-        self._is_forked = True
-        self._lock = threading.Lock()
-        self._future_thread = None
-        self._transport.forked()
-
     def _closed_error(self) -> ClosedError:
-        return ClosedError(_("client of '{service}'").format(service=self.service), is_forked=self._is_forked)
+        return ClosedError(
+            _("client of '{service}'").format(service=self.service), is_forked=self._generation.is_inherited
+        )
 
     def __enter__(self) -> Self:
         return self

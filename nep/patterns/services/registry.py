@@ -250,16 +250,6 @@ class ServiceRegistry:
             if isinstance(client, Client):
                 client.join()
 
-    def forked(self) -> None:
-        """Mark all servers and clients as closed in a forked child process. See `nep.system.forks`."""
-        self._lock = threading.Lock()
-        self._is_closed = True
-        for server in self._servers:
-            server.forked()
-        for client in self._clients:
-            client.forked()
-        self._servers = self._clients = ()
-
 
 def check_call_codec(codec: Codec) -> Codec:
     """Return `codec` if services support it; raise `NepError` otherwise."""

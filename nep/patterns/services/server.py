@@ -17,6 +17,7 @@ from nep.messages.codecs import codec_by_number
 from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import CallKind, Reply, error_reply
 from nep.system.arguments import check_optional_time_limit, check_time_limit
+from nep.system.forks import current_generation
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Server:
         self.service = service
         self._callback = callback
         self._on_close = on_close
-        self._is_forked = False
+        self._generation = current_generation()
         self._open_request: IncomingCall | None = None
         self._open_request_lock = threading.Lock()
         self._failure_count = 0
@@ -105,7 +106,7 @@ class Server:
     @property
     def is_closed(self) -> bool:
         """True if the server or its node was closed."""
-        return self._transport.is_closed
+        return self._generation.is_inherited or self._transport.is_closed
 
     @property
     def spin_queue(self) -> CallQueue | None:
@@ -206,6 +207,8 @@ class Server:
                     "without a callback"
                 ).format(service=self.service)
             )
+        if self._generation.is_inherited:
+            raise self._closed_error()
         if self._open_request is not None:
             raise NepError(_("the previous request has no reply yet; call 'send_info' first"))
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
@@ -234,7 +237,7 @@ class Server:
             ClosedError: The server is closed.
             NepError: No request is open.
         """
-        if self._transport.is_closed:
+        if self.is_closed:
             raise self._closed_error()
         with self._open_request_lock:
             call = self._open_request
@@ -253,7 +256,7 @@ class Server:
             timeout_s: Time limit in seconds for callbacks running in the server's own threads.
         """
         check_time_limit("timeout_s", timeout_s)
-        if self._is_forked:
+        if self._generation.is_inherited:
             return
         deadline = time.monotonic() + timeout_s
         self._transport.begin_close()
@@ -271,16 +274,10 @@ class Server:
             if thread is not threading.current_thread():
                 thread.join(max(0.0, deadline - time.monotonic()))
 
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
-        self._is_forked = True
-        self._open_request = None
-        self._threads = ()
-        self._open_request_lock = threading.Lock()
-        self._transport.forked()
-
     def _closed_error(self) -> ClosedError:
-        return ClosedError(_("server of '{service}'").format(service=self.service), is_forked=self._is_forked)
+        return ClosedError(
+            _("server of '{service}'").format(service=self.service), is_forked=self._generation.is_inherited
+        )
 
     def __enter__(self) -> Self:
         return self

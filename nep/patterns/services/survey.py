@@ -18,6 +18,7 @@ from nep.patterns.services.server import Server
 from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import SURVEY_PREFIX, CallKind, read_error_reply
 from nep.system.arguments import check_at_least, check_optional_time_limit
+from nep.system.forks import current_generation
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class Surveyor:
         self.timeout_s = timeout_s
         self._codec = types.request.codec(codec)
         self._on_close = on_close
-        self._is_forked = False
+        self._generation = current_generation()
         self._answers: Iterator[object] | None = None
         self.failures = 0
         """Number of respondents that replied with an error or stopped before replying."""
@@ -64,17 +65,17 @@ class Surveyor:
     @property
     def respondents(self) -> int:
         """Number of registered respondents of the survey."""
-        return self._transport.respondents
+        return 0 if self._generation.is_inherited else self._transport.respondents
 
     @property
     def late(self) -> int:
         """Number of answers that were dropped because they arrived after the time limit."""
-        return self._transport.late
+        return 0 if self._generation.is_inherited else self._transport.late
 
     @property
     def is_closed(self) -> bool:
         """True if the surveyor or its node was closed."""
-        return self._transport.is_closed
+        return self._generation.is_inherited or self._transport.is_closed
 
     def ask(
         self, question: object, timeout_s: TimeLimit = "default", *, expect: int | None = None
@@ -105,7 +106,7 @@ class Surveyor:
         )
         if expect is not None:
             check_at_least("expect", expect, 1)
-        if self._transport.is_closed:
+        if self.is_closed:
             raise self._closed_error()
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         deadline = None if limit_s is None else time.monotonic() + limit_s
@@ -126,7 +127,7 @@ class Surveyor:
                 outcome = None
                 with contextlib.suppress(queue.Empty):
                     outcome = outcomes.get(timeout=wait_s) if wait_s > 0.0 else outcomes.get_nowait()
-                if self._is_forked:
+                if self._generation.is_inherited:
                     raise self._closed_error()
                 if outcome is None:
                     if wait_s <= 0.0:
@@ -140,7 +141,8 @@ class Surveyor:
                     remaining -= 1
                     yield reply
         finally:
-            self._transport.cancel_all(calls)
+            if not self._generation.is_inherited:
+                self._transport.cancel_all(calls)
 
     def _decode_reply(self, outcome: Outcome) -> object:
         # Raises `NepError` for a failure.
@@ -188,18 +190,15 @@ class Surveyor:
 
     def close(self) -> None:
         """Unregister and close the surveyor. Idempotent."""
-        if self._is_forked:
+        if self._generation.is_inherited:
             return
         self._transport.close()
         self._on_close(self)
 
-    def forked(self) -> None:
-        """Mark the surveyor as closed in a forked child process. See `nep.system.forks`."""
-        self._is_forked = True
-        self._transport.forked()
-
     def _closed_error(self) -> ClosedError:
-        return ClosedError(_("surveyor of '{survey}'").format(survey=self.survey), is_forked=self._is_forked)
+        return ClosedError(
+            _("surveyor of '{survey}'").format(survey=self.survey), is_forked=self._generation.is_inherited
+        )
 
     def __enter__(self) -> Self:
         return self

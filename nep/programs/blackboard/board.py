@@ -151,7 +151,8 @@ class Blackboard:
         self._lock = threading.Lock()
         self._updated = threading.Condition(self._lock)
         self._version = 0
-        self._is_closed = self._is_forked = False
+        self._is_closed = False
+        self._generation = forks.current_generation()
         self._watches: tuple[BlackboardWatch, ...] = ()
         self._ignored_publisher_ids: frozenset[int] = frozenset()
         self._observers: tuple[_Observer, ...] = ()
@@ -160,7 +161,7 @@ class Blackboard:
         self._timer_at = math.inf
         self.changes_dropped = 0
         """Number of changes that were not passed to callbacks, because the node doesn't spin fast enough."""
-        forks.notify_after_fork(self)
+        forks.call_in_child(self._close_in_child)
 
     # ---- writing
 
@@ -542,8 +543,8 @@ class Blackboard:
 
     def _check_open(self) -> None:
         is_open = not self._is_closed and (self._node is None or not self._node.is_closed)
-        if self._is_forked or not is_open:
-            raise ClosedError(_("the blackboard"), is_forked=self._is_forked)
+        if not is_open:
+            raise ClosedError(_("the blackboard"), is_forked=self._generation.is_inherited)
 
     def close(self) -> None:
         """Stop watching and wake waiting threads. Values can still be read and stored. Idempotent."""
@@ -557,20 +558,16 @@ class Blackboard:
         for watch in watches:
             watch.close()
 
-    def forked(self) -> None:
-        """Close the blackboard in a forked child process (see `nep.system.forks`).
-
-        Values can still be read.
-        """
-        self._is_closed = self._is_forked = True
+    def _close_in_child(self) -> None:
+        # Values can still be read.
+        self._is_closed = True
         if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
             self._entries = self._entries.rebuilt_copy()
         self._lock = threading.Lock()
         self._updated = threading.Condition(self._lock)
         self._observers = ()
         self._pending = deque()
-        for watch in self._watches:
-            watch.forked()
+        forks.call_in_child(self._close_in_child)
 
     def __enter__(self) -> Self:
         return self

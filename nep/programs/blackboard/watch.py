@@ -15,6 +15,7 @@ from nep.nodes.subscriber import Subscriber
 from nep.programs.blackboard.keys import Key, key_text, parse_key, topic_to_key
 from nep.programs.blackboard.perception import parse_perception
 from nep.programs.blackboard.values import leaves
+from nep.system.forks import current_generation
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -173,6 +174,7 @@ class BlackboardWatch:
         self._subscriber: Subscriber | None = None
         self._is_closed = False
         self._lock = threading.Lock()
+        self._generation = current_generation()
 
     def attach(self, subscriber: Subscriber) -> None:
         """Set the subscriber, which is closed with the watch."""
@@ -185,7 +187,7 @@ class BlackboardWatch:
     def store_messages(self, messages: Sequence[Message]) -> None:
         """Store messages on the blackboard. Called in the node's sink thread."""
         for message in messages:
-            if self._is_closed:
+            if self._is_closed or self._generation.is_inherited:
                 return
             try:
                 self._store_message(message)
@@ -222,16 +224,13 @@ class BlackboardWatch:
 
     def close(self) -> None:
         """Stop storing messages. Stored values remain on the blackboard. Idempotent."""
+        if self._generation.is_inherited:
+            return
         with self._lock:
             self._is_closed = True
             subscriber = self._subscriber
         if subscriber is not None:
             subscriber.close()
-
-    def forked(self) -> None:
-        """Mark the watch as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = True
-        self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
         return self

@@ -21,7 +21,7 @@ from nep.programs.gateway.relay import AlertSink, NativeSide, Relay
 from nep.programs.gateway.request_server import Ports, RequestServer
 from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.system.descriptors import RESERVED_DESCRIPTORS, has_free_descriptors
-from nep.system.forks import close_in_child, notify_after_fork
+from nep.system.forks import call_in_child, close_in_child
 
 _MAINTENANCE_INTERVAL_S = 1.0
 """Interval in seconds at which exited programs are removed and ports that were in use are retried."""
@@ -95,10 +95,9 @@ class Gateway:
         self._maintain_at = 0.0
         self._published_versions: dict[TopicLine, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
-        notify_after_fork(self)
+        call_in_child(self._give_up_in_child)
 
-    def forked(self) -> None:
-        """Release the inherited ports in a forked child process. See `nep.system.forks`."""
+    def _give_up_in_child(self) -> None:
         for port in self._request_server.ports:
             close_in_child(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):

@@ -341,9 +341,7 @@ class _HeardWay:
 def test_encoded_payload_is_not_encoded_again() -> None:
     encoded: list[object] = []
     passed: list[object] = []
-    asked = PublishHooks(
-        _HeardWay(), None, lambda payload: encoded.append(payload) or b"", None, passed.append
-    )
+    asked = PublishHooks(None, lambda payload: encoded.append(payload) or b"", None, passed.append)
     publish = PendingBatch(is_enabled=False).publish_function(asked, _HeardWay(), threading.Lock())
     publish(Encoded(b"1"))
     assert (encoded, passed) == ([], [Encoded(b"1")])

@@ -345,3 +345,139 @@ node.close()
     with running(code, NEP_MASTER=master.address) as program:
         assert program.line() == "False"
         assert program.end() == ("", "")
+
+
+@pytest.mark.parametrize("transport", ["zeromq", "memory"])
+def test_child_of_a_sink_ends_with_the_sink(master: Master, transport: str) -> None:
+    code = (
+        CHILD
+        + """
+node = nep.node("parent", sys.argv[1])
+ended = threading.Event()
+codes = []
+
+def sink(messages):
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        return  # the only thread ends, and the child with it
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    ended.set()
+
+subs = [node.new_sub("topic", sink=sink), node.new_sub("topic", sink=len)]
+node.new_pub("topic").publish(1)
+assert ended.wait(30)
+print(codes)
+"""
+    )
+    with running(code, transport) as program:
+        assert program.line() == "[0]"
+        assert program.end()[1] == ""
+
+
+def test_callback_can_fork_while_several_nodes_spin(master: Master) -> None:
+    code = (
+        CHILD
+        + """
+nodes = [nep.node("a"), nep.node("b")]
+codes = []
+
+def callback(payload):
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        return  # and goes on spinning
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    for node in nodes:
+        node.stop_spin()
+
+for node in nodes:
+    node.new_callback("topic", "json", callback)
+nodes[0].new_pub("topic").publish(1)
+try:
+    nep.spin(*nodes)
+except nep.ClosedError as error:
+    assert error.is_forked
+    sys.exit(7)
+print(set(codes))
+"""
+    )
+    with running(code) as program:
+        assert program.line() == "{7}"
+        assert program.end()[1] == ""
+
+
+def test_server_callback_can_fork_and_only_the_parent_replies(master: Master) -> None:
+    code = (
+        CHILD
+        + """
+node = nep.node("parent")
+codes = []
+
+def answer(request):
+    pid = os.fork()
+    if not pid:
+        signal.alarm(20)
+        return {"from": "child"}
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+    return {"from": "parent"}
+
+node.new_server("who", answer, threads=1)
+client = node.new_client("who", timeout_s=30.0)
+print(client.call({}), codes)
+"""
+    )
+    with running(code) as program:
+        assert program.line() == "{'from': 'parent'} [0]"
+        assert program.end()[1] == ""
+
+
+def test_locks_are_renewed_in_the_child_and_in_the_grandchild() -> None:
+    code = (
+        CHILD
+        + """
+from nep.system import forks
+
+class Shared:
+    def __init__(self):
+        self.renew()
+
+    def renew(self):
+        self.lock = threading.Lock()
+        forks.call_in_child(self.renew)
+
+shared = Shared()
+
+def use(depth):
+    print(shared.lock.acquire(blocking=False))
+    if depth:
+        print(child(lambda: use(depth - 1)))
+
+use(2)
+"""
+    )
+    with running(code) as program:
+        assert [program.line() for _ in range(5)] == ["True", "True", "True", "0", "0"]
+        assert program.end()[1] == ""
+
+
+def test_timer_is_cancelled_in_the_child_and_continues_in_the_parent(master: Master) -> None:
+    code = (
+        CHILD
+        + """
+node = nep.node("parent")
+ticks = []
+timer = node.new_timer(0.01, lambda: (ticks.append(1), node.stop_spin()))
+
+def use():
+    print(timer.is_cancelled, flush=True)
+    timer.cancel()
+
+print(child(use), timer.is_cancelled)
+node.spin(30.0)
+print(ticks)
+"""
+    )
+    with running(code) as program:
+        assert [program.line() for _ in range(3)] == ["True", "0 False", "[1]"]
+        assert program.end()[1] == ""

@@ -137,8 +137,3 @@ class Ros2Server:
         self.is_closed = True
         self._channel.close()
         self._on_close(self)
-
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process."""
-        self.is_closed = True
-        self.calls.forked()

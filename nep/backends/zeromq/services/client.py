@@ -72,9 +72,6 @@ class Connection(Protocol):
     def close(self) -> None:
         """Close the connection and discard unread replies."""
 
-    def forked(self) -> None:
-        """Release the connection in a forked child process."""
-
 
 class SocketClient(PendingCalls[PendingCall]):
     """Client for services over sockets.
@@ -437,9 +434,3 @@ class SocketClient(PendingCalls[PendingCall]):
         if connection is not None:  # without the lock: the thread that polls it may wait for the lock
             connection.close()
         self._fail_closed(in_flight or ())
-
-    def forked(self) -> None:
-        """Mark the client as closed in a forked child process. See `nep.system.forks`."""
-        super().forked()
-        if self._connection is not None:
-            self._connection.forked()

@@ -94,9 +94,6 @@ class ServerConnection:
         except zmq.Again:
             return None
 
-    def forked(self) -> None:
-        """Do nothing in a forked child process, where libzmq must not be touched. See `nep.system.forks`."""
-
     def close(self) -> None:
         """Close the sockets and discard unread replies."""
         polled_sockets, self._polled_sockets = self._polled_sockets, ()

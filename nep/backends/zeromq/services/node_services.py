@@ -27,7 +27,6 @@ from nep.protocol.requests import PublisherRecord, SubscriberRecord
 from nep.protocol.service_wire import NATIVE, ORIGINAL, SERVICE_TYPE, Framing, topic_of
 from nep.system.addresses import endpoint_of, is_endpoint, resolve_address
 from nep.system.descriptors import check_free_descriptors
-from nep.system.forks import close_in_child
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -245,18 +244,11 @@ class ZeromqServices:
         for server in servers:
             server.close(max(0.0, deadline - time.monotonic()))
 
-    def forked(self) -> None:
-        """Mark all services as closed in a forked child process. See `nep.system.forks`."""
-        for server in self._servers:
-            close_in_child(*server.endpoints)
-            server.forked()
-        for surveyor in self._surveyors:
-            surveyor.forked()
-        for client in self._clients:
-            close_in_child(client.endpoint)
-            client.forked()
-        self._is_closed = True
-        self._lock = threading.Lock()
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Endpoints of all servers and connections. Acquires no lock."""
+        bound = (endpoint for server in self._servers for endpoint in server.endpoints)
+        return (*bound, *(client.endpoint for client in self._clients))
 
 
 def _framing(direct: Direct) -> Framing:

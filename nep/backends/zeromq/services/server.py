@@ -253,9 +253,3 @@ class RouterServer:
             if not self._is_closed:
                 self._is_closed = True
                 self.socket.close(max(0, round((deadline - time.monotonic()) * 1000)))
-
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
-        self._is_closed = True
-        self._lock = threading.Lock()
-        self.calls.forked()

@@ -189,10 +189,5 @@ class SurveyClient:
             self._removed_clients.clear()
         self._close_clients(clients)
 
-    def forked(self) -> None:
-        """Mark the surveyor as closed in a forked child process. See `nep.system.forks`."""
-        self.is_closed = True
-        self._lock = threading.Lock()
-
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

@@ -226,15 +226,6 @@ class TcpServer:
             self._io.remove(peer)
             peer.stream.close()
 
-    def forked(self) -> None:
-        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
-        self.is_closed = True
-        self._changed = threading.Condition(threading.Lock())
-        self._listener.detach()
-        for peer in self._peers:
-            peer.stream.forked()
-        self.calls.forked()
-
 
 class _Peer:
     # Connection of a client. `pending_replies` counts its calls without a reply; `is_closing` is True once

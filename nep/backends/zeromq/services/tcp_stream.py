@@ -156,14 +156,6 @@ class TcpStream:
         self._abort()
         self._socket.close()
 
-    def forked(self) -> None:
-        """Release the socket in a forked child process.
-
-        `nep.system.forks` closes the inherited file descriptor, which it finds by its address.
-        """
-        self.has_ended = self.is_broken = True
-        self._socket.detach()
-
 
 class TcpConnection:
     """TCP connection of a client. The constructor starts connecting. Counterpart of `ServerConnection`.
@@ -251,10 +243,6 @@ class TcpConnection:
         self._io.remove(self)
         self._is_dead = True
         self._stream.close()
-
-    def forked(self) -> None:
-        """Release the connection in a forked child process."""
-        self._stream.forked()
 
 
 def enable_keep_alive(connection: socket.socket, address: str) -> None:

@@ -28,7 +28,7 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakValueDictionary
 
-from nep.system.forks import call_in_child
+from nep.system.forks import call_in_child, current_generation, prevent_finalization
 
 MIN_SHARED_BYTES = 32 * 2**10
 """Payload size in bytes from which shared memory is faster than the socket."""
@@ -64,8 +64,6 @@ _SHARED_MEMORY_FOLDER = "/dev/shm"  # noqa: S108 - only queried for free space; 
 _MODULE_NAME = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
-_fork_count = 0
-"""Number of forks between the process that loaded this module and this process."""
 
 
 class _IceoryxNode:
@@ -147,18 +145,12 @@ def _create_private_folder() -> Path:
     return folder
 
 
-def _prevent_finalization(*inherited: object) -> None:
-    # Prevents finalizers from releasing the parent's resources in a forked child process.
-    for resource in inherited:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(resource))
-
-
 def _forked() -> None:
     # Called in the forked child process, which starts from scratch.
-    global _lock, _fork_count
-    _lock, _fork_count = threading.Lock(), _fork_count + 1
+    global _lock  # noqa: PLW0603 - one per process
+    _lock = threading.Lock()
     iceoryx_node = None if _process.node_ref is None else _process.node_ref()
-    _prevent_finalization(iceoryx_node, *_writers.values(), *_readers.values())
+    prevent_finalization(iceoryx_node, *_writers.values(), *_readers.values())
     _process.node_ref = None
 
 
@@ -216,7 +208,7 @@ class Loan:
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
-        self._fork_count = _fork_count
+        self._generation = current_generation()
         self._port = port  # the memory is valid while the port exists
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEADER_BYTES
@@ -236,8 +228,8 @@ class Loan:
         sample.assume_init().send()
 
     def __del__(self) -> None:
-        if self._fork_count != _fork_count:
-            _prevent_finalization(self._port, self._sample)
+        if self._generation.is_inherited:
+            prevent_finalization(self._port, self._sample)
 
 
 class SharedWriter:
@@ -361,11 +353,11 @@ class _HeldSample:
     # Keeps a payload in its slot until its last view is released, which is recorded in `releases`.
     def __init__(self, sample: Any, releases: deque[None]) -> None:  # noqa: ANN401
         self._sample, self._releases = sample, releases
-        self._fork_count = _fork_count
+        self._generation = current_generation()
 
     def __del__(self) -> None:
-        if self._fork_count != _fork_count:
-            _prevent_finalization(self._sample)
+        if self._generation.is_inherited:
+            prevent_finalization(self._sample)
         self._sample = None
         self._releases.append(None)
 
