@@ -163,6 +163,11 @@ def _read_frame(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int
     return kind, codec, limit_ms, number, parts[1]
 
 
+def split_frame(frame: bytes) -> list[bytes]:
+    """Split a call or reply of the native framing, joined in one frame, into its parts."""
+    return [frame[:HEADER_BYTES], frame[HEADER_BYTES:]]
+
+
 class _OriginalFraming:
     is_in_order = True
 

@@ -348,6 +348,25 @@ def join(
     return topic_part(topic), extended_header.pack(), payload, extension_part(extension)
 
 
+def split_frame(frame: bytes) -> list[bytes]:
+    """Split a frame without a topic into header, payload and, if the message has one, extension.
+
+    Raises `WireError` if the header is malformed or declares more bytes than follow.
+    """
+    header = read_header(frame[:HEADER_BYTES])
+    body = frame[HEADER_BYTES:]
+    if not header.flags & EXTENSION:
+        return [frame[:HEADER_BYTES], body]
+    if header.size > len(body):
+        raise WireError(
+            _("the header declares {size} bytes, but only {count} follow").format(
+                size=header.size, count=len(body)
+            ),
+            len(frame),
+        )
+    return [frame[:HEADER_BYTES], body[: header.size], body[header.size :]]
+
+
 def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
     """Split a message of one part into topic, header and payload.
 

@@ -7,13 +7,13 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
-from nep.errors import ClosedError, NepError, NoServerError, ServiceTimeoutError
+from nep.errors import ClosedError, NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
 from nep.protocol.requests import SubscriberCount, clamp_count
 
@@ -121,6 +121,11 @@ class PendingCalls(Generic[C]):
         with self._lock:
             self._remove_locked(call.number)
 
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
+        """Cancel several calls; their callbacks aren't called."""
+        for call in calls:
+            self.cancel(call)
+
     def _finish(self, call: C, outcome: Outcome) -> bool:
         # Returns False if the call is no longer in flight.
         is_error = isinstance(outcome, NepError)
@@ -131,6 +136,13 @@ class PendingCalls(Generic[C]):
             self._failed += is_error
         self._run_callback(call, outcome)
         return True
+
+    def _fail_orphaned(self, is_orphaned: Callable[[C], bool]) -> None:
+        # Fails the calls whose server has closed or was killed.
+        with self._lock:
+            failed = self._fail_locked([each for each in self._calls.values() if is_orphaned(each)])
+        for call in failed:
+            self._run_callback(call, ServerGoneError(self.spec.service))
 
     def _run_callback(self, call: C, outcome: Outcome) -> None:
         # The callback may use the client.

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 
 from nep.backends.base import PublisherSpec
 from nep.protocol.requests import PublisherCount
+from nep.protocol.wire import EXTENSION, LATCHED, MAX_SIZE, Header
 
 
 class BasePublisher:
@@ -42,6 +43,13 @@ class BasePublisher:
         self._bytes += size_bytes
         self._last_stamp_ns = stamp_ns = time.time_ns()
         return stamp_ns
+
+    def _next_header_locked(self, size_bytes: int, *, has_extension: bool) -> Header:
+        # Counts a message and returns its header.
+        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if has_extension else 0)
+        stamp_ns = self._count_locked(size_bytes)
+        size = size_bytes if size_bytes <= MAX_SIZE else 0
+        return Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id, size)
 
     def report(self, problem: str) -> None:
         """Set the reason why payloads can't be encoded, which the graph shows; "" clears it."""

@@ -6,25 +6,22 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 from nep.backends.bases.deadlines import Deadlines
 from nep.backends.bases.open_services import OpenServices
 from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
+from nep.backends.bases.server import BaseServer
 from nep.backends.connection import Configuration
 from nep.backends.services import (
-    CallQueue,
     ClientSpec,
     IncomingCall,
     OpenCall,
     ServerSpec,
-    ServerStats,
-    limit_reply_size,
-    rejection_reply,
 )
-from nep.errors import RequestRefusedError, ServerGoneError
+from nep.errors import RequestRefusedError
 from nep.masters.graph import Graph
 from nep.protocol import requests
 from nep.protocol.requests import (
@@ -62,20 +59,17 @@ class _Call(PendingCall):
     server: MemoryServer | None = None
 
 
-class MemoryServer:
-    """Server with a call queue."""
+class MemoryServer(BaseServer):
+    """Server whose calls clients append to its queue."""
 
     def __init__(
         self, node_id: str, hub: ServiceHub, spec: ServerSpec, on_close: Callable[[MemoryServer], None]
     ) -> None:
+        super().__init__(spec)
         self._node_id = node_id
         self._on_close = on_close
         self.hub = hub
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
         self.endpoints = ("memory",)
-        self.is_closed = False
 
     def enqueue(self, call: _Call, client: MemoryClient) -> None:
         """Queue a call, or reject it if the queue is full or closed. Call with the hub's lock held."""
@@ -86,18 +80,11 @@ class MemoryServer:
             None if call.deadline == math.inf else call.deadline,
             lambda reply: self._reply(call, client, reply),
         )
-        if not self.calls.put(incoming):
-            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+        self._enqueue(incoming)
 
     def _reply(self, call: _Call, client: MemoryClient, reply: Reply) -> bool:
-        reply = limit_reply_size(reply)
-        self.stats.add(reply)
+        reply = self._count_reply(reply)
         return client.handle_reply(call, reply._replace(data=bytes(reply.data)))
-
-    def counts(self) -> PublisherCount:
-        """Return the statistics that a renewal reports."""
-        stats = self.stats
-        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
 
     def begin_close(self) -> None:
         """Unregister the server and reject its queued calls."""
@@ -111,8 +98,7 @@ class MemoryServer:
                 del self.hub.servers[self.spec.service]
             if is_listed:
                 self.hub.apply(requests.RemovePublisher(self._node_id, self.spec.id, self.stats.calls))
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
+        super().begin_close()
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies need no flushing
         """Close the server; calls in flight fail with `ServerGoneError`."""
@@ -181,11 +167,6 @@ class MemoryClient(PendingCalls[_Call]):
             servers = self.hub.servers.get(self.spec.service, ())
             return [self._start_call(data, timeout_s, callback, server) for server in servers]
 
-    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel several calls; their callbacks aren't called."""
-        for call in calls:
-            self.cancel(call)
-
     def send_waiting_calls(self, server: MemoryServer) -> None:
         """Send the calls that are waiting for a server to `server`. Call with the hub's lock held."""
         for call in list(self._calls.values()):
@@ -201,10 +182,7 @@ class MemoryClient(PendingCalls[_Call]):
 
     def handle_server_closed(self, server: MemoryServer) -> None:
         """Fail the calls that a closed server hasn't answered."""
-        with self.hub.lock:
-            unanswered = self._fail_locked([each for each in self._calls.values() if each.server is server])
-        for call in unanswered:
-            self._run_callback(call, ServerGoneError(self.spec.service))
+        self._fail_orphaned(lambda call: call.server is server)
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""

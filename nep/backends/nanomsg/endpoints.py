@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import re
 
-from nep.errors import WireError
-from nep.i18n import _
-from nep.protocol.wire import EXTENSION, HEADER_BYTES, LATCHED, hello_part, read_header
+from nep.protocol.wire import HEADER_BYTES, LATCHED, hello_part, read_header, split_frame
 
 _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCII)
 
@@ -58,17 +56,6 @@ def split_message(message: bytes, prefix: bytes, *, is_alone: bool) -> list[byte
         WireError: The header is malformed or declares more bytes than follow.
     """
     tail = message[len(prefix) :]
-    header = read_header(tail[:HEADER_BYTES])
-    body = tail[HEADER_BYTES:]
-    if is_alone and not body and not header.flags & LATCHED:
+    if is_alone and len(tail) == HEADER_BYTES and not read_header(tail).flags & LATCHED:
         return [tail]
-    if not header.flags & EXTENSION:
-        return [tail[:HEADER_BYTES], body]
-    if header.size > len(body):
-        raise WireError(
-            _("the header declares {size} bytes, but only {count} follow").format(
-                size=header.size, count=len(body)
-            ),
-            len(message),
-        )
-    return [tail[:HEADER_BYTES], body[: header.size], body[header.size :]]
+    return split_frame(tail)

@@ -27,9 +27,6 @@ from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.protocol.wire import (
     BYE,
-    EXTENSION,
-    LATCHED,
-    MAX_SIZE,
     MAX_SUBSCRIPTION_BYTES,
     Header,
     extension_part,
@@ -127,14 +124,11 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
         """
         data, extension_fields = encoded
         extension = extension_part(extension_fields) if extension_fields else b""
-        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension_fields else 0)
         size = len(data) if isinstance(data, bytes) else data.nbytes
         with self._changed:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            stamp_ns = self._count_locked(size)
-            size_field = size if size <= MAX_SIZE else 0
-            header = Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id, size_field)
+            header = self._next_header_locked(size, has_extension=bool(extension))
             tail = b"".join((header.pack(), data, extension))
             self._history.add(tail, size)
             self._message_socket.send(self._topic + tail, block=False)

@@ -13,18 +13,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.bases.server import BaseServer
 from nep.backends.nanomsg.library import load_pynng
 from nep.backends.services import (
-    CallQueue,
-    IncomingCall,
     ServerSpec,
-    ServerStats,
-    limit_reply_size,
-    rejection_reply,
 )
 from nep.errors import WireError
-from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
+from nep.protocol.service_wire import NATIVE, Framing, Reply, split_frame
 
 _logger = logging.getLogger("nep")
 REPLY_TIMEOUT_S = 2.0
@@ -47,7 +42,7 @@ def join_parts(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
 
 def split_parts(framing: Framing, message: bytes) -> list[bytes]:
     """Split a message into the parts that `framing` parses; the reverse of `join_parts`."""
-    return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
+    return split_frame(message) if framing is NATIVE else [b"", message]
 
 
 def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
@@ -68,7 +63,7 @@ def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
         context.close()
 
 
-class NanomsgServer:
+class NanomsgServer(BaseServer):
     """Server on a socket that is already bound or connected, with a thread that receives calls.
 
     Implements `ServerTransport`.
@@ -82,15 +77,11 @@ class NanomsgServer:
         framing: Framing,
         on_close: Callable[[NanomsgServer], object],
     ) -> None:
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
-        self.is_closed = False
+        super().__init__(spec)
         self.endpoints: tuple[str, ...] = (endpoint,)
         self._socket = socket
         self._framing = framing
         self._on_close = on_close
-        self._rejections = RejectionCounter()
         self._lock = threading.Lock()
         self._replied_at = 0.0
         self._contexts: set[Any] = set()
@@ -109,22 +100,16 @@ class NanomsgServer:
             try:
                 call = self._framing.read_call(split_parts(self._framing, data))
             except WireError as error:
-                self._reject(context, error)
+                self._reject_context(context, error)
                 continue
-            deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
-            incoming = IncomingCall(
-                call.data, call.codec, deadline, self._reply_function(context, call.number)
-            )
-            if not self.calls.put(incoming):
-                incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+            reply = self._reply_function(context, call.number)
+            self._enqueue(self._new_call(call.data, call.codec, call.timeout_s, reply))
 
-    def _reject(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
+    def _reject_context(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
         with self._lock:
             self._contexts.discard(context)
         close_context(context)
-        self.stats.add_unreadable()
-        if self._rejections.add(error.reason):
-            _logger.warning("malformed call to '%s': %s", self.spec.service, error)
+        self._count_malformed(error)
 
     def _new_context(self) -> Any:  # noqa: ANN401 - pynng is not typed
         # Returns None when closed.
@@ -137,8 +122,7 @@ class NanomsgServer:
 
     def _reply_function(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
         def reply_to_call(reply: Reply) -> bool:
-            limited_reply = limit_reply_size(reply)
-            self.stats.add(limited_reply)
+            limited_reply = self._count_reply(reply)
             with self._lock:
                 if self.is_closed:
                     return False
@@ -158,11 +142,6 @@ class NanomsgServer:
             return True
 
         return reply_to_call
-
-    def begin_close(self) -> None:
-        """Reject queued and new calls."""
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
         """Close the server; replies are flushed for up to `timeout_s` seconds. Idempotent."""

@@ -8,19 +8,15 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from nep.backends.bases.server import BaseServer
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_types import NEP_CALL, ServiceType, service_type_for
 from nep.backends.services import (
-    CallQueue,
-    IncomingCall,
     ServerSpec,
-    ServerStats,
     limit_reply_size,
-    rejection_reply,
 )
 from nep.errors import NepError
 from nep.i18n import _
-from nep.protocol.requests import PublisherCount
 from nep.protocol.service_wire import CallKind, Reply, error_reply, read_error_reply
 
 
@@ -46,16 +42,13 @@ class _PendingReply:
         return self._body, self._reason
 
 
-class RosServer:
+class RosServer(BaseServer):
     """Server with a call queue."""
 
     def __init__(self, process: RosProcess, spec: ServerSpec, on_close: Callable[[RosServer], None]) -> None:
-        self.spec = spec
+        super().__init__(spec)
         self.process = process
         self.service = process.resolve_name(spec.service)
-        self.calls = CallQueue()
-        self.stats = ServerStats()
-        self.is_closed = False
         self._on_close = on_close
         self._type = service_type_for(spec.msg_type)
         self._changed = threading.Condition(threading.Lock())
@@ -98,12 +91,11 @@ class RosServer:
         except NepError as error:
             self._reply(pending_reply, error_reply(CallKind.REJECTED, "", str(error)))
             return
-        deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
-        incoming = IncomingCall(
-            call.data, call.codec, deadline, lambda reply: self._reply(pending_reply, limit_reply_size(reply))
-        )
-        if self.is_closed or not self.calls.put(incoming):
-            self._reply(pending_reply, rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+        incoming = self._new_call(*call, lambda reply: self._reply(pending_reply, limit_reply_size(reply)))
+        if self.is_closed:
+            self._reject(incoming)
+        else:
+            self._enqueue(incoming)
 
     def _reply(self, pending_reply: _PendingReply, reply: Reply) -> bool:
         body: bytes | None = None
@@ -119,11 +111,6 @@ class RosServer:
 
     # ---- closing
 
-    def counts(self) -> PublisherCount:
-        """Return the statistics shown in the graph."""
-        stats = self.stats
-        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
-
     def begin_close(self) -> None:
         """Unregister the server and reject its queued calls."""
         with self._changed:
@@ -133,13 +120,11 @@ class RosServer:
             with contextlib.suppress(RuntimeError):  # see `process.run_with_timeout`
                 thread.start()
                 self._unregister_thread = thread
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
+        super().begin_close()
 
     def _on_rospy_shutdown(self) -> None:
         self.is_closed = True
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
+        super().begin_close()
 
     def _unregister(self) -> None:
         if not self.process.is_shut_down:

@@ -16,7 +16,7 @@ from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.protocol.requests import PublisherRecord
-from nep.protocol.wire import EXTENSION, LATCHED, MAX_SIZE, Header, extension_part
+from nep.protocol.wire import Header, extension_part
 
 
 class ZenohPublisher(BasePublisher):
@@ -101,14 +101,10 @@ class ZenohPublisher(BasePublisher):
         """
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         extension = extension_part(encoded.extension) if encoded.extension else b""
-        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)
-        size = len(data) if len(data) <= MAX_SIZE else 0
         with self._stats_lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            stamp_ns = self._count_locked(len(data))
-            header = Header(self.spec.codec.number, flags, self.count, stamp_ns, self.spec.id, size)
-            attachment = header.pack() + extension
+            attachment = self._next_header_locked(len(data), has_extension=bool(extension)).pack() + extension
             self._history.add((data, attachment), len(data))
             self._zenoh_publisher.put(data, attachment=attachment)
 

@@ -10,23 +10,20 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from nep.backends.bases.deadlines import Deadlines
 from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
 from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.bases.server import BaseServer
 from nep.backends.services import (
-    CallQueue,
     ClientSpec,
-    IncomingCall,
     OpenCall,
     ServerSpec,
-    ServerStats,
-    limit_reply_size,
-    rejection_reply,
     size_error_text,
 )
 from nep.backends.zenoh.keys import service_key
@@ -35,7 +32,6 @@ from nep.backends.zenoh.session import ZenohSession
 from nep.errors import NepError, ServerGoneError, WireError
 from nep.i18n import _
 from nep.protocol.requests import (
-    PublisherCount,
     PublisherRecord,
     SubscriberRecord,
 )
@@ -49,19 +45,15 @@ _TOKEN_DELAY_S = 0.5
 """Maximum time in seconds from the end of a server's queries to the removal of its liveliness token."""
 
 
-class ZenohServer:
+class ZenohServer(BaseServer):
     """Server with a call queue. Owns the queryable and the queries that have no reply yet."""
 
     def __init__(
         self, session: ZenohSession, spec: ServerSpec, on_close: Callable[[ZenohServer], object]
     ) -> None:
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
-        self.is_closed = False
+        super().__init__(spec)
         self._session = session
         self._on_close = on_close
-        self._rejections = RejectionCounter()
         self._lock = threading.Lock()
         self._queries: set[Any] = set()
         self._key = service_key(spec.service, time.time_ns(), spec.id)
@@ -82,9 +74,7 @@ class ZenohServer:
                 raise WireError(size_error_text(len(data)))
         except WireError as error:
             query.drop()
-            self.stats.add_unreadable()
-            if self._rejections.add(error.reason):
-                _logger.warning("malformed call to '%s': %s", self.spec.service, error)
+            self._count_malformed(error)
             return
         with self._lock:
             is_closed = self.is_closed
@@ -93,16 +83,11 @@ class ZenohServer:
         if is_closed:
             query.drop()
             return
-        deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
-        number = call.number
-        incoming = IncomingCall(
-            data, call.codec, deadline, lambda reply: self._reply(query, number, limit_reply_size(reply))
-        )
-        if not self.calls.put(incoming):
-            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+        reply = partial(self._reply, query, call.number)
+        self._enqueue(self._new_call(call.data, call.codec, call.timeout_s, reply))
 
     def _reply(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh is not typed
-        self.stats.add(reply)
+        reply = self._count_reply(reply)
         with self._lock:
             if query not in self._queries:
                 return False
@@ -116,16 +101,10 @@ class ZenohServer:
             return False
         return True
 
-    def counts(self) -> PublisherCount:
-        """Return the statistics shown in the graph."""
-        stats = self.stats
-        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
-
     def begin_close(self) -> None:
         """Unregister; reject queued and new calls."""
         self._session.discard_service(self)
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
+        super().begin_close()
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies are flushed by the session
         """Close the server; calls that have no reply yet fail."""
@@ -274,11 +253,6 @@ class ZenohClient(PendingCalls[_Call]):
                 "call, or a router's access control denies '{key}'"
             )
             self._finish(call, NepError(template.format(service=self.spec.service, key=call.key)))
-
-    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel several calls; their callbacks aren't called."""
-        for call in calls:
-            self.cancel(call)
 
     # ---- events
 

@@ -9,16 +9,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.bases.inbox import Inboxes, InboxSubscriber
-from nep.backends.bases.loss import PublisherTracker
+from nep.backends.bases.inbox import Inboxes
 from nep.backends.bases.message_parser import MessageParser
-from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.bases.parsing_subscriber import ParsingSubscriber
 from nep.backends.zenoh.early_messages import EarlyMessages
 from nep.backends.zenoh.keys import topic_of
 from nep.errors import WireError
 from nep.i18n import _
-from nep.messages.message import Message
-from nep.protocol.requests import RemotePublisher, SubscriberCount, clamp_count
+from nep.protocol.requests import RemotePublisher
 from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
@@ -34,7 +32,7 @@ class _TopicParser(NamedTuple):
     parser: MessageParser
 
 
-class ZenohSubscriber(InboxSubscriber):
+class ZenohSubscriber(ParsingSubscriber):
     """Subscriber with an inbox or a sink.
 
     Args:
@@ -48,8 +46,6 @@ class ZenohSubscriber(InboxSubscriber):
     ) -> None:
         super().__init__(spec, inboxes)
         self._on_close = on_close
-        self._sources = PublisherTracker()
-        self._rejections = RejectionCounter()
         self._early_messages = EarlyMessages[tuple[_TopicParser, list[bytes]]](
             self._sources, spec.max_messages
         )
@@ -82,28 +78,6 @@ class ZenohSubscriber(InboxSubscriber):
             if len(self._topic_parsers) > _MAX_TOPIC_PARSERS:
                 self._topic_parsers.popitem(last=False)
             return topic_parser
-
-    # ---- statistics
-
-    @property
-    def received(self) -> int:
-        """Number of messages received."""
-        return self._sources.received
-
-    @property
-    def lost(self) -> int:
-        """Number of messages lost in transit or dropped from the full queue."""
-        return self._sources.lost
-
-    @property
-    def refused(self) -> int:
-        """Number of received frames rejected because they are not valid messages."""
-        return self._rejections.count
-
-    def counts(self) -> SubscriberCount:
-        """Return the statistics shown in the graph."""
-        problem = self.problem or self._rejections.recent_message()
-        return SubscriberCount(self.spec.id, clamp_count(self.received), clamp_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
 
@@ -149,12 +123,11 @@ class ZenohSubscriber(InboxSubscriber):
                 and self._queue_if_early(topic_parser, tail)
             ):
                 return
-            self._enqueue(topic_parser.parser.parse(first_part, tail))
+            self._enqueue_locked(topic_parser.parser.parse(first_part, tail))
             if first_part == topic_parser.subscriber_part and len(tail) == 1:  # end of the reply to a hello
                 self._deliver_early_messages(read_header(tail[0]).publisher)
         except WireError as error:
-            if self._rejections.add(error.reason):
-                _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
+            self._count_malformed(error)
 
     def _queue_if_early(self, topic_parser: _TopicParser, tail: list[bytes]) -> bool:
         header = read_header(tail[0])
@@ -163,13 +136,9 @@ class ZenohSubscriber(InboxSubscriber):
             self._deliver_early_messages(header.publisher)
         return is_early
 
-    def _enqueue(self, message: Message | None) -> None:
-        if message is not None:
-            self._sources.count_dropped(self._put_locked(message))
-
     def _deliver_early_messages(self, publisher: int) -> None:
         for topic_parser, tail in self._early_messages.pop(publisher):
-            self._enqueue(topic_parser.parser.parse(topic_parser.topic, tail))
+            self._enqueue_locked(topic_parser.parser.parse(topic_parser.topic, tail))
 
     def end_handshake(self, publishers: Iterable[int]) -> None:
         """Stop waiting for the replies of these publishers to a hello, and deliver their queued messages."""

@@ -6,21 +6,17 @@ import logging
 import time
 from collections.abc import Callable
 
-from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.bases.server import BaseServer
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
 from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
 from nep.backends.ros2.services.definitions import service_type_for
 from nep.backends.services import (
-    CallQueue,
-    IncomingCall,
     ServerSpec,
-    ServerStats,
     limit_reply_size,
-    rejection_reply,
 )
 from nep.errors import NepError
-from nep.protocol.requests import PublisherCount, PublisherRecord
+from nep.protocol.requests import PublisherRecord
 from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
 
 _logger = logging.getLogger("nep")
@@ -29,7 +25,7 @@ _MATCH_TIMEOUT_S = 1.0
 _POLL_S = 0.01
 
 
-class Ros2Server:
+class Ros2Server(BaseServer):
     """Server with a call queue. The constructor raises `BadTopicError` or `NepError`."""
 
     def __init__(
@@ -39,14 +35,10 @@ class Ros2Server:
         spec: ServerSpec,
         on_close: Callable[[Ros2Server], object],
     ) -> None:
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
-        self.is_closed = False
+        super().__init__(spec)
         self.endpoints = ("ros2",)
         self._on_close = on_close
         self._participant = participant
-        self._rejections = RejectionCounter()
         self._type = service_type_for(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
             participant, node_id, spec.service, self._type, spec.id, on_sample=self._handle_request
@@ -64,26 +56,15 @@ class Ros2Server:
             self.spec.id, topic_of(self.spec.service), self._type.name, SERVICE_TYPE, self.endpoints
         )
 
-    def counts(self) -> PublisherCount:
-        """Return the statistics shown in the graph."""
-        stats = self.stats
-        return PublisherCount(self.spec.id, stats.calls, stats.bytes, stats.calls, errors=stats.errors)
-
     def _handle_request(self, sample: ReceivedSample) -> None:
         # Runs in the participant's thread, with its lock held.
         try:
             request = self._type.decode_call(sample.cdr)
         except NepError as error:
-            if self._rejections.add(str(error)):
-                _logger.warning("malformed call to '%s': %s", self.spec.service, error)
+            self._count_malformed(error)
             self._reply(sample, error_reply(CallKind.REJECTED, "", str(error)))
             return
-        deadline = None if request.timeout_s is None else time.monotonic() + request.timeout_s
-        incoming = IncomingCall(
-            request.data, request.codec, deadline, lambda reply: self._reply(sample, limit_reply_size(reply))
-        )
-        if not self.calls.put(incoming):
-            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+        self._enqueue(self._new_call(*request, lambda reply: self._reply(sample, limit_reply_size(reply))))
 
     def _reply(self, sample: ReceivedSample, reply: Reply) -> bool:
         cdr: bytes | None = None
@@ -122,11 +103,6 @@ class Ros2Server:
                 self._participant.changed.wait(min(remaining_s, _POLL_S))
 
     # ---- closing
-
-    def begin_close(self) -> None:
-        """Reject queued and new calls."""
-        for call in self.calls.close():
-            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
         """Close the server; wait up to `timeout_s` seconds for acknowledgements of responses. Idempotent."""

@@ -15,20 +15,14 @@ from functools import partial
 
 import zmq
 
-from nep.backends.bases.rejections import RejectionCounter
+from nep.backends.bases.server import BaseServer
 from nep.backends.services import (
-    CallQueue,
     IncomingCall,
     ServerSpec,
-    ServerStats,
-    limit_reply_size,
-    rejection_reply,
 )
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import Socket
-from nep.errors import WireError
-from nep.protocol.requests import PublisherCount, clamp_count
 from nep.protocol.service_wire import MAX_PAYLOAD_BYTES, Framing, Reply
 
 _logger = logging.getLogger("nep")
@@ -42,56 +36,7 @@ _REPLY_HIGH_WATER_MARK = 1000
 """High-water mark: maximum number of replies queued for a client that doesn't read."""
 
 
-class CallReader:
-    """Parser of calls. Malformed calls are counted, and logged at increasing intervals.
-
-    Not thread-safe: guarded by the server's lock.
-    """
-
-    def __init__(self, service: str, framing: Framing, stats: ServerStats) -> None:
-        self._service = service
-        self._framing = framing
-        self._stats = stats
-        self._rejections = RejectionCounter()
-
-    def read(
-        self,
-        parts: Sequence[bytes | memoryview],
-        now: float,
-        send_reply: Callable[[int, Reply], bool],
-    ) -> IncomingCall | None:
-        """Parse a call; return None if the call is malformed.
-
-        Args:
-            parts: Parts of the message.
-            now: Time at which the call was received (`time.monotonic`).
-            send_reply: Sends a reply; called with the number of the call and the reply.
-        """
-        try:
-            header = self._framing.read_call(parts)
-        except WireError as error:
-            self.reject(error)
-            return None
-        deadline = None if header.timeout_s is None else now + header.timeout_s
-        return IncomingCall(header.data, header.codec, deadline, partial(send_reply, header.number))
-
-    def reject(self, error: WireError) -> None:
-        """Count a malformed call, and log it if due."""
-        self._stats.add_unreadable()
-        if self._rejections.add(error.reason):
-            _logger.warning(
-                "malformed call to '%s' (%d so far): %s",
-                self._service,
-                self._rejections.count,
-                error,
-            )
-
-    def recent_message(self) -> str:
-        """Return the reason and the number of malformed calls; "" if there was none in the last seconds."""
-        return self._rejections.recent_message()
-
-
-class RouterServer:
+class RouterServer(BaseServer):
     """Server over a ROUTER socket.
 
     Args:
@@ -114,9 +59,7 @@ class RouterServer:
         unregister: Callable[[], object],
         closer: Callable[[RouterServer, float], None],
     ) -> None:
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
+        super().__init__(spec)
         self.fixed_endpoints: tuple[str, ...] = ()
         """Endpoints of a server without a master."""
         self.socket = socket
@@ -125,9 +68,7 @@ class RouterServer:
         self._unregister = unregister
         self._closer = closer
         self._lock = threading.Lock()
-        self._reader = CallReader(spec.service, framing, self.stats)
         self._unread_replies: deque[tuple[zmq.MessageTracker, int]] = deque()
-        self._is_closed = False
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # raise an error when a client has disconnected
         socket.setsockopt(zmq.MAXMSGSIZE, MAX_PAYLOAD_BYTES)
         socket.setsockopt(zmq.SNDHWM, _REPLY_HIGH_WATER_MARK)
@@ -143,26 +84,13 @@ class RouterServer:
         """All bound endpoints."""
         return self._bindings.endpoints or self.fixed_endpoints
 
-    @property
-    def is_closed(self) -> bool:
-        """True after `close`, or after the node was closed."""
-        return self._is_closed
-
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind these addresses of this computer and unbind all others; return the endpoints."""
         with self._lock:
-            return () if self._is_closed else self._bindings.move(hosts)
+            return () if self.is_closed else self._bindings.move(hosts)
 
     def unbind_local(self) -> None:
         """Do nothing, because servers have no Unix sockets."""
-
-    def counts(self) -> PublisherCount:
-        """Return the statistics that a renewal reports."""
-        stats = self.stats
-        calls, problem = clamp_count(stats.calls), self._reader.recent_message()
-        return PublisherCount(
-            self.spec.id, calls, clamp_count(stats.bytes), calls, None, problem, stats.errors
-        )
 
     # ---- in the I/O thread
 
@@ -170,12 +98,11 @@ class RouterServer:
         """Read and queue calls; reject calls while the queue is full. See `Pollable.serve`."""
         calls: list[IncomingCall] = []
         with self._lock:
-            if self._is_closed:
+            if self.is_closed:
                 return PollState()
             has_more = self._read_locked(calls, now)
         for call in calls:
-            if not self.calls.put(call):
-                self._reject(call)
+            self._enqueue(call)
         return PollState(due=now if has_more else None)
 
     def _read_locked(self, calls: list[IncomingCall], now: float) -> bool:
@@ -185,7 +112,7 @@ class RouterServer:
                 route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return False
-            call = self._reader.read(parts, now, partial(self._reply, route))
+            call = self._read_call(self._framing, parts, partial(self._reply, route), now)
             if call is not None:
                 calls.append(call)
         return True
@@ -193,10 +120,9 @@ class RouterServer:
     # ---- replying, in any thread
 
     def _reply(self, route: bytes, number: int, reply: Reply) -> bool:
-        reply = limit_reply_size(reply)
-        self.stats.add(reply)
+        reply = self._count_reply(reply)
         with self._lock:
-            if self._is_closed:
+            if self.is_closed:
                 return False
             if len(reply.data) >= _LARGE_BYTES and not self._has_room(len(reply.data)):
                 _logger.warning(
@@ -238,11 +164,7 @@ class RouterServer:
     def begin_close(self) -> None:
         """Unregister; reject queued and new calls. Idempotent."""
         self._unregister()
-        for call in self.calls.close():
-            self._reject(call)
-
-    def _reject(self, call: IncomingCall) -> None:
-        call.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
+        super().begin_close()
 
     def release(self, deadline: float) -> None:
         """Close the socket, which continues to send replies until `deadline` (`time.monotonic`).
@@ -250,6 +172,6 @@ class RouterServer:
         The I/O thread must have stopped serving the socket.
         """
         with self._lock:
-            if not self._is_closed:
-                self._is_closed = True
+            if not self.is_closed:
+                self.is_closed = True
                 self.socket.close(max(0, round((deadline - time.monotonic()) * 1000)))

@@ -12,16 +12,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
+from nep.backends.bases.server import BaseServer
 from nep.backends.services import (
-    CallQueue,
     IncomingCall,
     ServerSpec,
-    ServerStats,
-    limit_reply_size,
-    rejection_reply,
 )
 from nep.backends.zeromq.io_thread import IoThread, PollState
-from nep.backends.zeromq.services.server import CallReader
 from nep.backends.zeromq.services.tcp_stream import TcpStream, enable_keep_alive
 from nep.errors import AddressInUseError, WireError
 from nep.protocol.service_wire import NATIVE, Reply
@@ -43,7 +39,7 @@ _ACCEPT_PAUSE_S = 0.5
 """Pause in seconds before accepting connections again after the process ran out of file descriptors."""
 
 
-class TcpServer:
+class TcpServer(BaseServer):
     """Server on a listening TCP socket.
 
     The constructor raises `AddressInUseError` if the address can't be bound, and `TooManyFilesError` if
@@ -59,14 +55,10 @@ class TcpServer:
     def __init__(
         self, io: IoThread, spec: ServerSpec, address: str, closer: Callable[[TcpServer, float], None]
     ) -> None:
-        self.spec = spec
-        self.calls = CallQueue()
-        self.stats = ServerStats()
-        self.is_closed = False
+        super().__init__(spec)
         self._io = io
         self._closer = closer
         self._changed = threading.Condition(threading.Lock())
-        self._reader = CallReader(spec.service, NATIVE, self.stats)
         self._peers: set[_Peer] = set()
         self._rejected_count = 0
         self._listener = _create_listener(address, spec.service)
@@ -135,8 +127,7 @@ class TcpServer:
                 peer.stream.shut_down_sending()
                 self._changed.notify_all()
         for call in calls:
-            if not self.calls.put(call):
-                self._reject(call)
+            self._enqueue(call)
         return PollState(is_finished, now if has_more else None, wants_write=peer.stream.backlog_bytes > 0)
 
     def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
@@ -152,9 +143,9 @@ class TcpServer:
                 if parts is None:
                     return False
             except WireError as error:
-                self._reader.reject(error)
+                self._count_malformed(error)
                 return False
-            call = self._reader.read(parts, now, partial(self._reply, peer))
+            call = self._read_call(NATIVE, parts, partial(self._reply, peer), now)
             if call is not None:
                 calls.append(call)
                 peer.pending_replies += 1
@@ -170,8 +161,7 @@ class TcpServer:
     # ---- replying, in any thread
 
     def _reply(self, peer: _Peer, number: int, reply: Reply) -> bool:
-        reply = limit_reply_size(reply)
-        self.stats.add(reply)
+        reply = self._count_reply(reply)
         with self._changed:
             stream = peer.stream
             peer.pending_replies -= 1
@@ -188,19 +178,11 @@ class TcpServer:
             self._io.serve_soon(peer)
         return True
 
-    def _reject(self, call: IncomingCall) -> None:
-        call.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
-
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
         """Reject queued calls, flush replies for up to `timeout_s` seconds and close. Idempotent."""
         self._closer(self, timeout_s)
-
-    def begin_close(self) -> None:
-        """Reject queued and new calls."""
-        for call in self.calls.close():
-            self._reject(call)
 
     def release(self, deadline: float) -> None:
         """Stop listening, and wait until all clients have read their replies and disconnected.
