@@ -76,6 +76,19 @@ GROUPS = (
         ),
     ),
     Group(
+        "services of the example back end",  # every run includes its topics: test_example_backend.py
+        tests=("tests/nep/backends/test_example_backend_services.py",),
+        sources=(
+            "examples/backend/",
+            "nep/backends/bases/",
+            "nep/backends/base.py",
+            "nep/backends/services.py",
+            "nep/protocol/service_wire.py",
+            "tests/nep/backends/example_backend.py",
+            "tests/nep/services/test_calls.py",
+        ),
+    ),
+    Group(
         "interop",  # every run includes tests/interop/gateway and the programs of test_javascript.py
         tests=(
             "tests/interop/test_matrix.py",
