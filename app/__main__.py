@@ -179,7 +179,7 @@ def restart(theme: str | None) -> None:
     Args:
         theme: Value of the option ``--theme``; None for the theme in the settings.
     """
-    from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
+    from app.core.reports.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
     from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  needed only here
 
     subprocess.Popen(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from app.core.console import Console
+from app.core.world.console import Console
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE, LogHandler
 

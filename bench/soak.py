@@ -121,7 +121,7 @@ def hands(opened: Studio) -> Iterator[Callable[[], object]]:
     panels, topics = cycle(PANELS), cycle(range(7))
 
     def inspect() -> object:
-        live = sorted(topic.name for topic in session.topics.existing_topics())
+        live = sorted(topic.name for topic in session.live.topics.existing_topics())
         return commands.run(f"inspect:{live[next(topics) * 5 % len(live)]}") if live else None
 
     def toggle() -> object:

@@ -136,8 +136,8 @@ class Runs:
 
 def opened_graph(opened: Studio) -> GraphPanel:
     """Return the window's Graph panel, disconnected from the master so that only posted graphs are shown."""
-    until(lambda: opened.session.master.kind == "connected", "the master is there")
-    opened.session.source.close()  # its empty graphs would mix with the posted graphs
+    until(lambda: opened.session.live.master.kind == "connected", "the master is there")
+    opened.session.live.source.close()  # its empty graphs would mix with the posted graphs
     opened.commands.run("panel:graph")
     bench = opened.window.bench
     assert bench is not None

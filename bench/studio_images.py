@@ -123,7 +123,7 @@ def case(address: str, bare: Child, shape: tuple[int, int, int], seconds: float)
             **{f"image{n}": replace(image, name=f"image{n}") for n in range(1, count)},
         }
         topics = [f"/camera/{width}/{number}" for number in range(count)]
-        until(lambda: all(topic in opened.session.topics for topic in topics), "the cameras are listed")
+        until(lambda: all(topic in opened.session.live.topics for topic in topics), "the cameras are listed")
         views = open_views(opened, topics)
         cameras.tell("2")
         cameras.answer()

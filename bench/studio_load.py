@@ -79,7 +79,7 @@ class Load:
 
     def counted(self) -> tuple[int, int, int]:
         """Return the numbers of kept, dropped and lost messages of all topics."""
-        known = [self.opened.session.topics[topic] for topic in self.topics]
+        known = [self.opened.session.live.topics[topic] for topic in self.topics]
         kept = sum(topic.received - topic.dropped for topic in known)
         return kept, sum(topic.dropped for topic in known), sum(topic.missed for topic in known)
 
@@ -137,10 +137,10 @@ def main() -> int:
         for each in (bare, *publishers):
             each.answer()
         opened = stack.enter_context(studio(address))
-        until(lambda: all(topic in opened.session.topics for topic in topics), "the topics are listed")
+        until(lambda: all(topic in opened.session.live.topics for topic in topics), "the topics are listed")
         opened.commands.run(f"inspect:{topics[0]}")
         for topic in topics:
-            opened.session.watch(topic)
+            opened.session.live.watch(topic)
         run_for(3.0)
         load = Load(opened, publishers, topics, bare)
         reached = load.measure(arguments.rates, arguments.seconds)

@@ -173,7 +173,7 @@ def main() -> int:
         opened = stack.enter_context(studio(address, "behaviour"))  # the editor makes the driver composite
         opened.session.launcher.start_virtual_robot(ROBOT)
         until(lambda: opened.session.fleet.connected, "the virtual robot is there", 60.0)
-        until(lambda: CAMERA in opened.session.topics, "the topics are listed")
+        until(lambda: CAMERA in opened.session.live.topics, "the topics are listed")
         opened.commands.run("layout.developer")
         names = arguments.panels or sorted(set(opened.window.panels) - {PLAIN, "behaviour", "timeline"})
         same, late_ms = rows(opened, bare, names, arguments.seconds)

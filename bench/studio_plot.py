@@ -75,7 +75,7 @@ def opened_plot(opened: Studio) -> PlotPanel:
 
 def fill(plot: PlotPanel, points: int) -> None:
     """Append `points` past samples to each curve, 1 ms apart, up to the current time."""
-    now_s = plot.session.series.now_s()
+    now_s = plot.session.live.series.now_s()
     times = now_s - np.arange(points, 0, -1) / HZ
     for number, shown in enumerate(plot.shown):
         noise = np.random.default_rng(number).normal(size=points) * 0.1
@@ -116,7 +116,7 @@ def main() -> int:
         sender = stack.enter_context(child(SENDER, (), address))
         sender.answer()
         opened = stack.enter_context(studio(address))
-        until(lambda: "/many/9" in opened.session.topics, "the topics are there")
+        until(lambda: "/many/9" in opened.session.live.topics, "the topics are there")
         plot = opened_plot(opened)
         meter, drawings = Meter(opened), Drawings(plot)
         run_for(SETTLE_S)

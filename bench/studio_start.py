@@ -79,7 +79,7 @@ def usable():
     if sys.argv[1] == "editor":
         window.commands.run("layout.behaviour")
 def look():
-    if "master" not in at and session.master.kind == "connected":
+    if "master" not in at and session.live.master.kind == "connected":
         at["master"] = now()
     bench = window.benches.get("behaviour")
     panel = bench.docks["behaviour"].panel if bench is not None else None

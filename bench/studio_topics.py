@@ -89,9 +89,9 @@ def main() -> int:
         bare = stack.enter_context(child(BARE, (), address))
         bare.answer()
         opened = stack.enter_context(studio(address))
-        until(lambda: opened.session.master.kind == "connected", "the master is there")
-        opened.session.source.close()  # its empty graphs would mix with the posted graphs
-        opened.session._clock_ns = lambda: time_ns() % 100_000_000  # noqa: SLF001
+        until(lambda: opened.session.live.master.kind == "connected", "the master is there")
+        opened.session.live.source.close()  # its empty graphs would mix with the posted graphs
+        opened.session.live.now_ns = lambda: time_ns() % 100_000_000
         meter = Meter(opened)
         print(
             f"{'':>14} {'process':>8} {'GUI':>7} {'tick':>7} {'panels':>7} {'late p99':>9} {'max':>6} "

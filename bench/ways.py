@@ -131,7 +131,7 @@ def message(heard: Heard, studio: Studio, address: str) -> list[str]:
         other.answer()
 
         def topic() -> object:
-            return next((each for each in studio.session.topics if each.name == "pose"), None)
+            return next((each for each in studio.session.live.topics if each.name == "pose"), None)
 
         until(topic, "the topic")
         studio.window.open_topic("pose")

@@ -185,7 +185,9 @@ class GuidePictures(SelfDrive):
             ),
             *self._add_to_backpack(),
             Step("add a robot", lambda: run("robots.turtle"), self._are_two_robots_ready, 40, "room", 3.0),
-            Step("Developer", lambda: run("layout.developer"), lambda: len(window.session.topics) > 3, 20),
+            Step(
+                "Developer", lambda: run("layout.developer"), lambda: len(window.session.shown.topics) > 3, 20
+            ),
             Step("open the topics", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
         ]
 

@@ -138,7 +138,7 @@ class Pictures(SelfDrive):
             *self._stop(),
             *self._run_to(TOUCH, "behaviour-light", settle_s=0.5),
             *self._stop("theme.dark", "behaviour-dark"),
-            Step("Developer", lambda: run("layout.developer"), lambda: len(session.topics) > 3, 20),
+            Step("Developer", lambda: run("layout.developer"), lambda: len(session.shown.topics) > 3, 20),
             Step("inspect a message", self._inspect, lambda: True, settle_s=1.0),
             *self._run_to(TURN, "developer-dark", settle_s=0.4),
             *self._stop(),

@@ -11,9 +11,7 @@ from typing import Protocol
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import ShowAlarms
-from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.network.source import Source
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import PermissionQuestion
@@ -23,6 +21,9 @@ from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.settings import Settings
 from app.core.storage.user_file import read_stored
+from app.core.world.console import Console
+from app.core.world.live import LiveWorld
+from app.core.world.part import SessionPart
 from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -36,7 +37,6 @@ from nep.programs.alarms.sentences import duration_text, event_text, subject_tex
 from nep.protocol.graph_view import GraphView
 
 FILE_NAME = "alarms.json"
-"""Name of the window command that shows the alarms panel."""
 MAX_MESSAGE_AGE_S = 10.0
 """Maximum age in seconds of an unsent message. Older messages may be outdated and are discarded."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
@@ -58,13 +58,10 @@ class AlarmSession(Protocol):
     settings: Settings
     alerts: Alerts
     console: Console
-    source: Source
+    live: LiveWorld
     fleet: Fleet
     voices: RobotVoices
     runs: Runs
-
-    def watch(self, topic: str) -> Watch:
-        """Open a watch, which subscribes to the topic until it is closed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +72,7 @@ class _PendingSend:
     on_done: DoneCallback
 
 
-class SessionAlarms:
+class SessionAlarms(SessionPart):
     """Alarms of a session. Not thread-safe, except `evaluate`; use it from the main thread.
 
     Attributes:
@@ -84,6 +81,8 @@ class SessionAlarms:
             None, the action fails.
         on_event: Callback for each alarm that was raised or cleared, or that is still active.
     """
+
+    task = lazy("monitor the alarms")
 
     def __init__(
         self,
@@ -224,7 +223,9 @@ class SessionAlarms:
         self._update_watches()
 
     def tick(self) -> None:
-        """Process pending alarm events and run the actions that are due."""
+        """Apply a new graph, process pending alarm events and run the actions that are due."""
+        if self._session.live.new_graph is not None:
+            self.update_graph(self._session.live.new_graph)
         for event in self.alarms.tick():
             self._show_event(event)
         self.alarms.take_action_results()
@@ -274,7 +275,7 @@ class SessionAlarms:
         for topic in self._watches.keys() - required_topics:
             self._watches.pop(topic).close()
         for topic in required_topics - self._watches.keys():
-            self._watches[topic] = self._session.watch(topic)
+            self._watches[topic] = self._session.live.watch(topic)
         if self._view is not None:
             self.alarms.evaluator.update_graph(self._view)
 
@@ -379,7 +380,7 @@ class SessionAlarms:
             else:
                 self._commands.start_action(node, action, on_done)
 
-        self._session.source.submit(ACTION_FAILED_MESSAGE, job)
+        self._session.live.source.submit(ACTION_FAILED_MESSAGE, job)
 
     # ---- file
 

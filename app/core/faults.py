@@ -12,7 +12,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from logging.handlers import RotatingFileHandler
@@ -234,17 +234,34 @@ class FaultAlerts:
         try:
             yield
         except Exception as error:  # noqa: BLE001  the following steps must run after any error
-            english, translated = (
-                operation.format(**placeholder_values),
-                _(operation).format(**placeholder_values),
-            )
-            _log.exception("can't %s", english)
-            self._record_failure(
-                english, _("Studio can't {what}: {error}").format(what=translated, error=error_text(error))
-            )
+            self._on_failed(operation, placeholder_values, error)
         else:
-            if self._faults and operation in self._faults:
-                self._faults[operation].has_recovered = True
+            self._on_succeeded(operation)
+
+    def run(self, operation: str, step: Callable[[], object]) -> None:
+        """Run one step with `guarded`, in a third of the time.
+
+        Args:
+            operation: Translatable phrase that completes "can't ..."; mark it with `lazy`.
+            step: Function to call.
+        """
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001  the following steps must run after any error
+            self._on_failed(operation, {}, error)
+        else:
+            self._on_succeeded(operation)
+
+    def _on_failed(self, operation: str, placeholder_values: Mapping[str, object], error: Exception) -> None:
+        english = operation.format(**placeholder_values)
+        translated = _(operation).format(**placeholder_values)
+        _log.exception("can't %s", english)
+        message = _("Studio can't {what}: {error}").format(what=translated, error=error_text(error))
+        self._record_failure(english, message)
+
+    def _on_succeeded(self, operation: str) -> None:
+        if self._faults and operation in self._faults:
+            self._faults[operation].has_recovered = True
 
     def check(self) -> None:
         """Remove resolved faults, and resolve the alert if none is left. Called once a second."""

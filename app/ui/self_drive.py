@@ -133,7 +133,7 @@ class SelfDrive(QObject):
             return session.runs.view().state == "running" and bool(session.runs.running_blocks)
 
         def has_inspected_topic() -> bool:
-            return any(topic.is_watched and topic.newest is not None for topic in session.topics)
+            return any(topic.is_watched and topic.newest is not None for topic in session.shown.topics)
 
         return [
             Step("the start page", self._show_start_page, window.isVisible, picture="start-light"),
@@ -173,10 +173,10 @@ class SelfDrive(QObject):
         self._commands.behaviours.start_demo()
 
     def _has_demo_topics(self) -> bool:
-        return len(self._window.session.topics) > 3
+        return len(self._window.session.shown.topics) > 3
 
     def _inspect(self) -> None:
-        topics = self._window.session.topics
+        topics = self._window.session.shown.topics
         poses = [topic.name for topic in topics if topic.name.endswith(("/pose", "/state"))]
         cameras = [topic.name for topic in topics if topic.codec == "image"]
         if cameras:

@@ -136,7 +136,7 @@ class WindowSteps:
         link = session.fleet.link(ROBOT)
         match name:
             case "master":
-                return session.master.address
+                return session.live.master.address
             case "robot":
                 return link.state_label if link is not None else ""
             case "behaviour":
@@ -156,7 +156,7 @@ class WindowSteps:
         self._test.report.record_time("first_paint")
 
     def _has_master(self) -> bool:
-        return self._session.master.kind == "connected" and self._session.launcher.has_started_master
+        return self._session.live.master.kind == "connected" and self._session.launcher.has_started_master
 
     def _master_problem(self) -> str:
         return self._alert_text("companion:master")
@@ -177,7 +177,7 @@ class WindowSteps:
     def _has_robot(self) -> bool:
         if not self._is_watching_state and self._robot_link() is not None:
             self._is_watching_state = True
-            self._session.watch(STATE_TOPIC)  # watched until the session ends
+            self._session.live.watch(STATE_TOPIC)  # watched until the session ends
         return bool(self._state())
 
     def _robot_problem(self) -> str:
@@ -235,12 +235,12 @@ class WindowSteps:
         return is_confirmed and is_idle and self._newest_message() is not self._message_before_stop
 
     def _newest_message(self) -> object:
-        topic = self._session.topics.get(STATE_TOPIC)
+        topic = self._session.shown.topics.get(STATE_TOPIC)
         return topic.newest if topic is not None else None
 
     def _state(self) -> Mapping[str, object]:
         # The last state published by the robot.
-        topic = self._session.topics.get(STATE_TOPIC)
+        topic = self._session.shown.topics.get(STATE_TOPIC)
         payload = topic.newest.payload if topic is not None and topic.newest is not None else None
         return payload if isinstance(payload, Mapping) else {}
 

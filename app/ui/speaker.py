@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from PySide6.QtCore import QBuffer, QByteArray, QCoreApplication, QEventLoop, QLocale, QObject, Qt, Signal
 
-from app.core.own_process import module_command
+from app.core.reports.own_process import module_command
 from app.core.robots.voices import Notes
 from nep.i18n import _, lazy
 from nep.masters.process import NO_CONSOLE

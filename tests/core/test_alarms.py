@@ -209,7 +209,7 @@ def test_alarm_message_expires_if_no_master_is_found_in_time(tmp_path: Path) -> 
     now = [0.0]
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False, clock=lambda: now[0])
     jobs = []
-    session.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
+    session.live.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
     told: list[tuple[bool, str]] = []
     session.alarms._submit_command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
     now[0] += MAX_MESSAGE_AGE_S + 1

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -195,7 +196,7 @@ def test_event_handler_that_raises_does_not_block_other_events(
             session._mailbox.post_event(event)
         session.tick()
     assert stopped == [done] * 29
-    assert session.master.kind == "connected"
+    assert session.live.master.kind == "connected"
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
     assert alert.detail.startswith("Studio can't handle RunnerEvent: ValueError")
     assert alert.intent == ShowLog()
@@ -206,9 +207,10 @@ def test_event_handler_that_raises_does_not_block_other_events(
 @pytest.mark.parametrize(
     "place",
     [
-        "topics.add",
-        "topics.update_ages",
-        "nodes.update_ages",
+        "live.topics.add",
+        "live.topics.update_ages",
+        "live.nodes.update_ages",
+        "live.series.dispatch",
         "traffic.add",
         "traffic.count_lost",
         "fleet.add",
@@ -217,19 +219,19 @@ def test_event_handler_that_raises_does_not_block_other_events(
         "launcher.check",
         "documents.set_topics",
         "runs.on_runner_event",
-        "_checks.pop_results",
+        "live.pop_check_results",
         "_health.update",
         "_health.check",
-        "source.lost_counts",
+        "live.source.lost_counts",
         "console.add_messages",
     ],
 )
 def test_stop_and_messages_are_processed_when_part_of_a_tick_raises(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
-    part, _, name = place.partition(".")
-    monkeypatch.setattr(getattr(session, part), name, raising)
-    watch = session.watch("/faces")
+    part, _, name = place.rpartition(".")
+    monkeypatch.setattr(attrgetter(part)(session), name, raising)
+    watch = session.live.watch("/faces")
     stopped: list[object] = []
     monkeypatch.setattr(session.runs, "on_stop", stopped.append)
     message = Message("/faces", b"{}", "json", "json", stamp_ns=1, seq=1, publisher=1)
@@ -240,8 +242,8 @@ def test_stop_and_messages_are_processed_when_part_of_a_tick_raises(
         session._mailbox.post_event(StopCompleted(1, StopReport((), 0.0)))
         session.tick()
     assert len(stopped) == 2
-    if place != "topics.add":
-        assert session.topics["/faces"].received == 2
+    if place != "live.topics.add":
+        assert session.live.topics["/faces"].received == 2
     watch.close()
 
 
@@ -263,7 +265,7 @@ def test_fault_alert_is_resolved_after_the_operation_succeeds_for_some_seconds(
             session.tick()
 
     with monkeypatch.context() as broken:
-        broken.setattr(session.nodes, "update_ages", raising)
+        broken.setattr(session.live.nodes, "update_ages", raising)
         broken.setattr(session.traffic, "add", raising)
         seconds(90)
         assert session.alerts.has("studio"), "it goes on"
@@ -296,12 +298,12 @@ def test_session_close_continues_if_closing_some_components_raises(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ended: list[str] = []
-    for part in ("fleet", "images", "doctor", "launcher", "remote_access"):
-        monkeypatch.setattr(getattr(session, part), "close", partial(ended.append, part))
+    for part in ("fleet", "live.images", "live.networks", "doctor", "launcher", "remote_access"):
+        monkeypatch.setattr(attrgetter(part)(session), "close", partial(ended.append, part))
     monkeypatch.setattr(session.runs, "close", raising)
-    monkeypatch.setattr(session.source, "close", raising)
+    monkeypatch.setattr(session.live.source, "close", raising)
     session.close()
-    assert ended == ["fleet", "images", "doctor", "launcher", "remote_access"]
+    assert ended == ["fleet", "live.images", "live.networks", "doctor", "launcher", "remote_access"]
 
 
 def test_source_thread_survives_exceptions_in_jobs_and_sinks(master: Master) -> None:

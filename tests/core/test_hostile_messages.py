@@ -8,8 +8,8 @@ from itertools import zip_longest
 import pytest
 
 import nep
-from app.core.console import ConsoleRecord
 from app.core.session import Session
+from app.core.world.console import ConsoleRecord
 from app.errors import DescriptionError
 from app.robots.description.description import parse_announcement, thing_description
 from app.robots.description.model import Robot
@@ -59,7 +59,7 @@ def evil(master):
 
 
 def test_session_survives_every_hostile_message(session: Session, evil: nep.Node, caplog) -> None:
-    watches = [session.watch("/watched"), session.watch("/Lamp/state")]
+    watches = [session.live.watch("/watched"), session.live.watch("/Lamp/state")]
     condition = AlarmCondition("above", "/watched", "pose.x", 3.0)
     session.alarms.set_rule(AlarmRule("1", condition, (AlarmAction("show"),)))
     publishers = [evil.new_pub(topic, msg_type) for topic, msg_type in MESSAGES]

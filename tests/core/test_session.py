@@ -15,7 +15,8 @@ import pytest
 import nep
 from app.core.alerts.intents import ConnectRobot
 from app.core.network.source import JobFailed
-from app.core.session import MONITORING_FAILED_MESSAGE, Session
+from app.core.parts.robots import MONITORING_FAILED_MESSAGE
+from app.core.session import Session
 from app.errors import RobotInputError, UnknownRobotError
 from app.robots.description.description import thing_description
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
@@ -49,51 +50,51 @@ LAMP = Kind("lamp", "Lamp", Lamp)
 def test_topics_appear_with_their_statistics_and_disappear(session: Session) -> None:
     with nep.node("talker") as node:
         publisher = node.new_pub("/hello", "json")
-        tick_until(session, lambda: "/hello" in session.topics)
-        assert session.master.kind == "connected"
+        tick_until(session, lambda: "/hello" in session.live.topics)
+        assert session.live.master.kind == "connected"
 
         def rate() -> float | None:
             publisher.publish({"n": 1})
-            return session.topics["/hello"].rate_hz
+            return session.live.topics["/hello"].rate_hz
 
         tick_until(session, rate)
         assert session.traffic.messages_per_s
-        assert session.topics["/hello"].publisher_nodes == ("talker",)
-    tick_until(session, lambda: session.topics["/hello"].gone_s is not None)
+        assert session.live.topics["/hello"].publisher_nodes == ("talker",)
+    tick_until(session, lambda: session.live.topics["/hello"].gone_s is not None)
 
 
 def test_topics_are_subscribed_only_while_watched(session: Session) -> None:
     with nep.node("talker") as node:
         publisher = node.new_pub("/hello", "json")
-        tick_until(session, lambda: "/hello" in session.topics)
+        tick_until(session, lambda: "/hello" in session.live.topics)
         assert publisher.subscribers == 0
-        watch = session.watch("/hello")
+        watch = session.live.watch("/hello")
         tick_until(session, lambda: publisher.subscribers == 1)
         publisher.publish({"say": "hé"})
-        tick_until(session, lambda: session.topics["/hello"].newest is not None)
-        newest = session.topics["/hello"].newest
+        tick_until(session, lambda: session.live.topics["/hello"].newest is not None)
+        newest = session.live.topics["/hello"].newest
         assert newest is not None
         assert newest.payload == {"say": "hé"}
         watch.close()
         tick_until(session, lambda: publisher.subscribers == 0)
-        assert session.topics["/hello"].newest is None
+        assert session.live.topics["/hello"].newest is None
 
 
 def test_topic_can_be_watched_before_it_exists(session: Session) -> None:
-    with session.watch("/later"), nep.node("talker") as node:
+    with session.live.watch("/later"), nep.node("talker") as node:
         publisher = node.new_pub("/later", "json")
         tick_until(session, lambda: publisher.subscribers == 1)
         publisher.publish(5)
-        tick_until(session, lambda: session.topics["/later"].received == 1)
+        tick_until(session, lambda: session.live.topics["/later"].received == 1)
 
 
 def test_undecodable_messages_raise_one_alert_that_a_valid_message_resolves(session: Session) -> None:
-    with session.watch("/bad"), nep.node("talker") as node:
+    with session.live.watch("/bad"), nep.node("talker") as node:
         publisher = node.new_pub("/bad", "json")
         tick_until(session, lambda: publisher.subscribers == 1)
         for _ in range(7):
             publisher.publish_bytes(b"{not json")
-        tick_until(session, lambda: session.topics["/bad"].received == 7)
+        tick_until(session, lambda: session.live.topics["/bad"].received == 7)
         (alert,) = session.alerts.active
         assert alert.id == "message:/bad"
         assert alert.count == 7
@@ -111,7 +112,7 @@ def test_virtual_robot_connects_runs_an_action_and_stops(session: Session) -> No
     tick_until(session, lambda: link.chip_text == "virtual, ready")
     with session.fleet.watch_sensors("Pepper"):
         tick_until(session, lambda: "distance" in link.values and link.drawing is not None)
-        stream = session.images.stream("/Pepper/camera")
+        stream = session.live.images.stream("/Pepper/camera")
         tick_until(session, lambda: stream.picture is not None)
         stream.close()
         said = session.fleet.invoke("Pepper", "say", {"text": "hi"})
@@ -309,8 +310,8 @@ def _number(value: float) -> dict[str, object]:
 
 
 def test_failed_network_job_is_reported_only_if_it_has_a_message_template(session: Session) -> None:
-    session._on_event(JobFailed(MONITORING_FAILED_MESSAGE, "the master has gone"), 0.0)
-    session._on_event(JobFailed("", "nobody asked"), 0.0)
+    session._on_event(JobFailed(MONITORING_FAILED_MESSAGE, "the master has gone"))
+    session._on_event(JobFailed("", "nobody asked"))
     texts = [record.text for record in session.console.records]
     assert "can't monitor the robots: the master has gone" in texts
     assert not [text for text in texts if "nobody asked" in text]

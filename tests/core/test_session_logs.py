@@ -45,7 +45,7 @@ def test_first_log_record_of_a_node_arrives_and_the_log_topic_is_not_reported_as
         listening(session, node)
         node.log.warning("low battery")
         tick_until(session, lambda: told(session, "driver"))
-        tick_until(session, lambda: "/nep/log" in session.topics)
+        tick_until(session, lambda: "/nep/log" in session.live.topics)
         assert told(session, "driver") == ["low battery"]
         assert not any("/nep/log" in line for line in told(session, "master"))
     tick_until(session, lambda: "driver left" in told(session, "master"))
@@ -99,7 +99,7 @@ def test_program_output_is_shown_once_even_if_it_is_also_published_as_log(sessio
         return [(line.origin, line.text) for line in session.console.records if line.text in {"hello", "7"}]
 
     with nep.node("page") as page, page.new_sub("/nep/log", "nep/log") as records:
-        tick_until(session, lambda: session.master.kind == "connected")
+        tick_until(session, lambda: session.live.master.kind == "connected")
         session.document.apply_edit(
             workspace(stack(started(), write(text("hello")), write(number(7)), waits))
         )
@@ -123,9 +123,9 @@ def test_connection_alerts_link_to_the_doctor(session: Session) -> None:
     def next_steps(alerts: Alerts) -> dict[str, Intent | None]:
         return {alert.id: alert.intent for alert in alerts.active}
 
-    session._on_event(MasterFound("127.0.0.1:1"), 0.0)
-    session._on_event(MasterLost("127.0.0.1:1", "no master answers"), 0.0)
-    session._on_event(LaunchFailed("master", "The master can't be started.", "Port …", False), 0.0)
+    session._on_event(MasterFound("127.0.0.1:1"))
+    session._on_event(MasterLost("127.0.0.1:1", "no master answers"))
+    session._on_event(LaunchFailed("master", "The master can't be started.", "Port …", False))
     assert next_steps(session.alerts) == {"master": OpenDoctor(), "companion:master": OpenDoctor()}
     assert {alert.button for alert in session.alerts.active} == {"Open the connection doctor"}
 

@@ -136,17 +136,17 @@ def prepare(name: str, widget: PanelWidget) -> None:
     if (
         name == "inspector"
         and isinstance(widget, inspector.InspectorPanel)
-        and "/blackboard" in widget.session.topics
+        and "/blackboard" in widget.session.shown.topics
     ):
         widget.show_topic("/blackboard")
         widget.session.send("/blackboard", blackboard())  # type: ignore[attr-defined]
         widget.refresh()
         widget.tree.setCurrentIndex(widget.model.index_of_path(("robots", "Pepper", "pose", "y")))
-    if name == "nodes" and isinstance(widget, nodes.NodesPanel) and len(widget.session.nodes):
+    if name == "nodes" and isinstance(widget, nodes.NodesPanel) and len(widget.session.shown.nodes):
         widget.refresh()
         widget.table.opened.emit(widget.model.key_of(widget.model.row_at(widget.model.index(1, 0))))  # type: ignore[arg-type]
         widget.table.setCurrentIndex(widget.model.index(5, 0))
-    if name == "plot" and "/blackboard" in widget.session.topics:
+    if name == "plot" and "/blackboard" in widget.session.shown.topics:
         for path in ("robots.Pepper.pose.x", "robots.Pepper.pose.y", "robots.Pepper.emotion"):
             widget.plot_field("/blackboard", path)  # type: ignore[attr-defined]
         widget.session.send("/blackboard", blackboard())  # type: ignore[attr-defined]
@@ -155,7 +155,11 @@ def prepare(name: str, widget: PanelWidget) -> None:
     if name == "topics" and isinstance(widget, topics.TopicsPanel):
         widget.refresh()
         widget.show_topic("/blackboard")
-    if name == "alarms" and isinstance(widget, alarms.AlarmsPanel) and "/blackboard" in widget.session.topics:
+    if (
+        name == "alarms"
+        and isinstance(widget, alarms.AlarmsPanel)
+        and "/blackboard" in widget.session.shown.topics
+    ):
         for rule in ALARMS:
             widget.session.alarms.set_rule(rule)
         widget.session.send("/blackboard", {"robots": {"Pepper": {"battery": 12}}})  # type: ignore[attr-defined]

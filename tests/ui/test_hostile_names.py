@@ -64,7 +64,7 @@ def test_every_dynamic_tooltip_uses_the_escaping_function() -> None:
 def hostile() -> Window:
     """Return a window on a session in which all names from the network look like markup."""
     session = Session.full()
-    for topic in list(session.topics):
+    for topic in list(session.shown.topics):
         topic.name = f"{topic.name}{NAME}"
         topic.msg_type = f"{NAME}{topic.msg_type}"
         topic.publisher_nodes = (NAME,)
@@ -103,7 +103,7 @@ def test_no_panel_interprets_a_name_as_markup(qtbot, name: str) -> None:
     dock.resize(900, 600)
     dock.show()
     ticks(window, panel, 2)
-    for topic in list(window.session.topics)[:2]:
+    for topic in list(window.session.shown.topics)[:2]:
         panel.show_topic(topic.name)
         ticks(window, panel)
     for widget in dock.findChildren(QWidget):

@@ -5,6 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from nep.i18n import lazy
+
+OPEN_DOCTOR_LABEL = lazy("Open the connection doctor")
+"""Label of a button for `OpenDoctor`."""
+
 
 @dataclass(frozen=True)
 class OpenDoctor:

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from app.core.graph.layout import GraphLayout, LayoutSizes, arrange
 from app.core.graph.node_graph import NodeGraph
-from app.core.own_process import module_command
+from app.core.reports.own_process import module_command
 from nep.masters.process import NO_CONSOLE
 
 TIMEOUT_S = 60.0

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.core.own_process import module_command
 from app.core.reports.crash import crash_extra, exit_text, is_crash
+from app.core.reports.own_process import module_command
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
 from nep.protocol.graph_view import GraphView

@@ -135,32 +135,11 @@ class OtherNetwork:
             )
 
 
-class Networks:
-    """All kinds of networks that can be shown. Not thread-safe; use it from the main thread.
+class NetworkList:
+    """Networks that are shown in addition to the native one; none by default. Not thread-safe."""
 
-    Each shown network has its own background thread.
-    """
-
-    def __init__(
-        self,
-        settings: Settings,
-        sinks: Sequence[Sink],
-        post_event: Callable[[object], None],
-        alerts: Alerts,
-        create_source: NetworkSourceFactory = OtherSource,
-    ) -> None:
-        # `sinks` get messages by topic key (`key_of`); `post_event` gets the sources' events.
-        self._alerts = alerts
-        self._settings, self._sinks, self._post_event, self._create_source = (
-            settings,
-            tuple(sinks),
-            post_event,
-            create_source,
-        )
+    def __init__(self) -> None:
         self._networks = {kind.name: OtherNetwork(kind) for kind in KINDS}
-        self._watched_topics: dict[str, set[str]] = {kind.name: set() for kind in KINDS}
-        self._numbers = count(1)
-        self._ending_sources: list[NetworkSource] = []
         self._change_count = 0
 
     def __iter__(self) -> Iterator[OtherNetwork]:
@@ -206,6 +185,34 @@ class Networks:
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.read_problems.get(topic, "") if network is not None else ""
+
+
+class Networks(NetworkList):
+    """Networks that the user can join. Not thread-safe; use it from the main thread.
+
+    Each shown network has its own background thread.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        sinks: Sequence[Sink],
+        post_event: Callable[[object], None],
+        alerts: Alerts,
+        create_source: NetworkSourceFactory = OtherSource,
+    ) -> None:
+        # `sinks` get messages by topic key (`key_of`); `post_event` gets the sources' events.
+        super().__init__()
+        self._alerts = alerts
+        self._settings, self._sinks, self._post_event, self._create_source = (
+            settings,
+            tuple(sinks),
+            post_event,
+            create_source,
+        )
+        self._watched_topics: dict[str, set[str]] = {kind.name: set() for kind in KINDS}
+        self._numbers = count(1)
+        self._ending_sources: list[NetworkSource] = []
 
     # -- choosing --------------------------------------------------------------------------------------------
 

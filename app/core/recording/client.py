@@ -21,7 +21,7 @@ from typing import IO, Protocol
 import orjson
 
 from app.core.alerts.alerts import Alerts
-from app.core.own_process import module_command
+from app.core.reports.own_process import module_command
 from nep.i18n import _, ngettext
 from nep.masters.process import NO_CONSOLE
 from nep.recordings.formats.message_counts import TopicStats, parse_stats

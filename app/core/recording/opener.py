@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from app.core.own_process import module_command
+from app.core.reports.own_process import module_command
 from nep.recordings.apart.remote import ReaderProcess
 from nep.recordings.file_reader import CACHE_BYTES, FileReader
 from nep.recordings.formats.limits import ReadBudget

@@ -32,8 +32,9 @@ from app.core.recording.topic_choice import (
     ring_settings_to_json,
 )
 from app.core.storage.settings import Settings, data_home
+from app.core.world.part import SessionPart
 from app.errors import SettingsError
-from nep.i18n import _
+from nep.i18n import _, lazy
 from nep.programs.alarms import AlarmAction, AlarmEvent
 from nep.programs.alarms.alarms import DoneCallback
 from nep.programs.alarms.sentences import event_text
@@ -55,13 +56,15 @@ _SAVED_FILE_PATTERN = re.compile(r"[\w.-]+\.mcap\b")
 def _ignore_created(_path: Path, _kind: str) -> None: ...
 
 
-class SessionRecordings:
+class SessionRecordings(SessionPart):
     """Recordings of a session. Not thread-safe; use it from the main thread, including `on_event`.
 
     Attributes:
         on_created: Callback for each finished file, with its path and "recorded" or "kept" (flight
             recorder).
     """
+
+    task = lazy("monitor the recorder")
 
     def __init__(
         self,

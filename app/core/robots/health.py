@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import (
+    OPEN_DOCTOR_LABEL,
     ConnectRobot,
     Inspect,
     OpenDoctor,
@@ -16,7 +17,7 @@ from app.core.alerts.intents import (
 )
 from app.core.network.decode_checks import CheckResult
 from app.core.network.topics import Topics
-from app.core.own_process import ExecutableState
+from app.core.reports.own_process import ExecutableState
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
 from nep.i18n import _, format_list, lazy, ngettext
@@ -27,7 +28,6 @@ RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
 """Time limit in seconds for a restarted driver to connect again."""
 PORTS_ALERT = "ports"
-OPEN_DOCTOR_LABEL = lazy("Open the connection doctor")
 DISCARD_ALERT = "leaving"
 INSTALLATION_ALERT = "installation"
 """Id of the alert about Studio's installation. The id "program" belongs to the program of a behaviour."""

@@ -16,8 +16,8 @@ from typing import IO, Protocol
 
 from app.core.faults import CONSOLE_EXTRA
 from app.core.network.master import MasterStarter
-from app.core.own_process import module_command
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
+from app.core.reports.own_process import module_command
 from app.robots.identity import Identity
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE

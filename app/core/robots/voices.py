@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
-from nep.i18n import _
+from app.core.world.part import SessionPart
+from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
     from app.core.network.watches import Watch
@@ -122,12 +123,14 @@ class RobotSound:
         )
 
 
-class RobotVoices:
+class RobotVoices(SessionPart):
     """Playback of the speech and the sounds of virtual robots on `speaker`, which may be None.
 
     Robots speak one after the other; interrupted speech stops immediately. Not thread-safe; use it from
     the main thread.
     """
+
+    task = lazy("play the robots' voices")
 
     def __init__(
         self,
@@ -178,7 +181,7 @@ class RobotVoices:
         """Text that is currently spoken, or None."""
         return self._current
 
-    def update(self) -> None:
+    def tick(self) -> None:
         """Play new speech and sounds of the connected robots. Called at each tick."""
         if self.speaker is None:
             return

@@ -14,7 +14,6 @@ from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts.alerts import Alerts
-from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import actions_by_robot
@@ -38,6 +37,7 @@ from app.core.run.view import (
     result_text,
     view_of,
 )
+from app.core.world.console import Console
 from app.errors import AppError
 from nep.i18n import _
 

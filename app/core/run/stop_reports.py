@@ -6,10 +6,10 @@ import time
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import StopRobots
-from app.core.console import Console
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.report import StopReport
 from app.core.run.view import STOP_AGAIN, clock_text, result_text, stop_text, unconfirmed_texts
+from app.core.world.console import Console
 from nep.i18n import _
 
 

@@ -85,16 +85,16 @@ class ArmedStrip(QWidget):
         """Update the switch, the targets and the summary."""
         acting = self.acting
         arming, question = acting.arming, acting.question
-        remaining, is_replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
+        remaining, is_live = remaining_text(arming.remaining_s), self._context.session.shown.is_live
         targets = arming.targets if arming.is_on else ()
         summary = self.summary_text()
-        state = (arming.is_on, remaining, targets, question, is_replaying, summary)
+        state = (arming.is_on, remaining, targets, question, is_live, summary)
         if state == self._last_state:
             return
         self._last_state = state
         self._is_on = arming.is_on
         self.switch.setChecked(arming.is_on)
-        can_arm = self.is_for_replay or not is_replaying
+        can_arm = self.is_for_replay or is_live
         self.switch.setEnabled(can_arm or arming.is_on)
         disarmed_text = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
         self.text_label.setText(_("{time} left").format(time=remaining) if arming.is_on else disarmed_text)

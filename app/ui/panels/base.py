@@ -23,6 +23,7 @@ from nep.i18n import _
 if TYPE_CHECKING:
     from app.core.network.watches import Suspendable
     from app.core.session import Session
+    from app.core.world.world import World
 
 Density = Literal["compact", "comfortable"]
 ANY_TYPE = "*"
@@ -183,6 +184,11 @@ class PanelWidget(QWidget):
         self._number = 1
         self.setAccessibleName(title)
         self.theme.changed.connect(self.theme_changed)
+
+    @property
+    def world(self) -> World:
+        """World that the panels show: the live network, or another one such as a recording."""
+        return self.session.shown
 
     def make_page_stack(self, *pages: QWidget) -> QStackedWidget:
         """Fill the panel with a stack of pages, of which the first one is visible.

@@ -127,9 +127,9 @@ class DoctorPanel(PanelWidget):
 
     def refresh(self) -> None:
         doctor = self.session.doctor
-        if self.session.master.kind != self._master:
+        if self.session.live.master.kind != self._master:
             # the master changed while the panel is open: earlier findings are outdated
-            self._master = self.session.master.kind
+            self._master = self.session.live.master.kind
             doctor.start()
         elif doctor.checked_topic != doctor.expected_topic and not doctor.is_running:
             doctor.start()
@@ -182,7 +182,7 @@ class DoctorPanel(PanelWidget):
     def _waiting_blockers(self) -> Iterator[Blocker]:
         # Without the missing topic, which the other findings are about.
         expected_topic, now = self.session.doctor.expected_topic, time.monotonic()
-        panels = self.context.panels() if self.session.replay is None else ()
+        panels = self.context.panels() if self.world.is_live else ()
         waiting = {
             (panel, topic) for panel in panels if (topic := panel.awaited_topic()) and topic != expected_topic
         }
@@ -217,7 +217,7 @@ class DoctorPanel(PanelWidget):
         )
 
     def _replay_blocker(self, topic: str) -> Blocker:
-        is_recorded = not topic or self.session.topics.get(topic) is not None
+        is_recorded = not topic or self.world.topics.get(topic) is not None
         message = _("A recording is open, so panels show recorded data instead of live data.")
         if not is_recorded:
             message = _("The open recording doesn't contain {topic}.").format(topic=topic_label(topic))
@@ -240,7 +240,7 @@ class DoctorPanel(PanelWidget):
         if state == self._last_topic_state or self.topic_choice.view().isVisible():
             return
         self._last_topic_state = state
-        names = [topic.key for topic in (*live.topics, *live.networks.topics)]
+        names = [topic.key for topic in live.all_topics]
         self.topic_choice.clear()
         self.topic_choice.addItem(_("no specific topic"), "")
         for name in sorted({*names[:MAX_TOPICS], expected_topic} - {""}):

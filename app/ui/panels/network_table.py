@@ -37,13 +37,13 @@ class NetworkTable(TablePanel[Row]):
 
     def has_other_networks(self) -> bool:
         """Return True if the table shows other networks in addition to Studio's own."""
-        return bool(self.session.networks.selected_networks)
+        return bool(self.world.networks.selected_networks)
 
     def show_networks(self) -> None:
         """Update the line with unreachable networks and the visibility of the network column."""
-        self.networks.set_messages([lost_message(each) for each in self.session.networks.selected_networks])
-        if self._network_count != len(self.session.networks.selected_networks):
-            self._network_count = len(self.session.networks.selected_networks)
+        self.networks.set_messages([lost_message(each) for each in self.world.networks.selected_networks])
+        if self._network_count != len(self.world.networks.selected_networks):
+            self._network_count = len(self.world.networks.selected_networks)
             self.table.fit_columns()
 
     def more_actions(self) -> list[QAction]:

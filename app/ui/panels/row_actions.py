@@ -93,11 +93,11 @@ def copy_action(context: PanelContext, name: str) -> RowAction:
 
 def show_messages(context: PanelContext, key: str) -> None:
     """Show the messages of a topic and mark the topic as no longer new."""
-    context.session.mark_seen(key)
+    context.session.shown.mark_seen(key)
     context.open_topic(key)
 
 
 def has_fields(context: PanelContext, key: str) -> bool:
     """Return False for topics with images, which have no fields to plot, else True."""
-    topic = context.session.topic(key)
+    topic = context.session.shown.topic(key)
     return topic is None or topic.codec != "image"

@@ -136,11 +136,11 @@ class TablePanel(PanelWidget, Generic[Row]):
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
             topic = self.missing_topic()
             self.empty.set_actions([clear, self.doctor_action(topic)] if topic else [clear])
-        elif self.session.replay is not None and self._table_texts.not_recorded:
+        elif not self.world.is_live and self._table_texts.not_recorded:
             self.doctor.hide()
             self.empty.set_texts(_(self._table_texts.not_recorded), "", "film")
             self.empty.set_actions([])
-        elif self.session.master.kind == "none":
+        elif self.session.live.master.kind == "none":
             text = _("A master lets programs find each other.")
             self.empty.set_texts(_("No master is running"), text, "radio-tower")
             start = self.session.launcher.ensure_master

@@ -345,7 +345,7 @@ class MainWindow(QMainWindow):
             topic: Key of the topic.
             beside: True to open an additional panel, unless the existing one is empty.
         """
-        topic_state = self.session.topic(topic)
+        topic_state = self.session.shown.topic(topic)
         kinds = {topic_state.codec, topic_state.msg_type} if topic_state is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = dock_for_kinds(bench.docks, bench.recently_used(), kinds)

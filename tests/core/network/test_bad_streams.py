@@ -42,7 +42,7 @@ def bad_count(session: Session, topic: str) -> int:
 def test_malformed_messages_at_1000_hz_are_one_alert_with_exact_count(
     session: Session, talker: nep.Node
 ) -> None:
-    with session.watch("/bad"):
+    with session.live.watch("/bad"):
         publisher = publisher_of(session, talker, "/bad")
         pause, began = threading.Event(), time.perf_counter()
         for number in range(1500):
@@ -59,19 +59,19 @@ def test_malformed_messages_at_1000_hz_are_one_alert_with_exact_count(
 
 
 def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker: nep.Node) -> None:
-    with session.watch("/bad"):
+    with session.live.watch("/bad"):
         publisher = publisher_of(session, talker, "/bad")
         sent = 10 * MAX_MESSAGES_PER_TOPIC
         for _ in range(sent):
             publisher.publish_bytes(BAD)
-        tried = session._checks._results
+        tried = session.live._decode_checker._results
         until(
             lambda: "/bad" in tried and tried["/bad"].checked_count == sent, "all arrive while nobody ticks"
         )
-        tick_until(session, lambda: session.topics["/bad"].received == sent)
+        tick_until(session, lambda: session.live.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
         assert f"{sent} messages on /bad" in session.alerts.active[0].title
-        assert session.topics["/bad"].displayed_and_sent_counts == (
+        assert session.live.topics["/bad"].displayed_and_sent_counts == (
             MAX_MESSAGES_PER_TOPIC,
             sent,
         )  # although the ring buffer was full
@@ -91,17 +91,17 @@ def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int
 
 def test_100_000_malformed_messages_are_all_counted(session: Session, talker: nep.Node) -> None:
     sent = 100_000
-    with session.watch("/good"):
+    with session.live.watch("/good"):
         good_s = ticking_s(session, publisher_of(session, talker, "/good"), GOOD, sent)
-    with session.watch("/bad"):
+    with session.live.watch("/bad"):
         publisher = publisher_of(session, talker, "/bad")
         bad_s = ticking_s(session, publisher, BAD, sent)
         publisher.publish_bytes(BAD)
-        topic = session.topics["/bad"]
+        topic = session.live.topics["/bad"]
 
         def all_told() -> bool:
             publisher.publish_bytes(BAD)  # a loss is detected by the next message that arrives
-            session.traffic.count_lost(session.source.lost_counts(), time.monotonic())
+            session.traffic.count_lost(session.live.source.lost_counts(), time.monotonic())
             return topic.received + topic.missed >= sent
 
         tick_until(session, all_told, 30)
@@ -114,45 +114,45 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
 
 
 def test_topic_can_change_its_type(session: Session, talker: nep.Node) -> None:
-    with session.watch("/thing"):
+    with session.live.watch("/thing"):
         first = publisher_of(session, talker, "/thing", "json")
         first.publish({"n": 1})
-        tick_until(session, lambda: session.topics["/thing"].newest is not None)
+        tick_until(session, lambda: session.live.topics["/thing"].newest is not None)
         first.close()
         second = talker.new_pub("/thing", "string")
         tick_until(session, lambda: second.subscribers == 1)
         second.publish("hello")
 
         def newest() -> object:
-            message = session.topics["/thing"].newest
+            message = session.live.topics["/thing"].newest
             return message is not None and message.codec == "string" and message.payload == "hello"
 
         tick_until(session, newest)
-        tick_until(session, lambda: session.topics["/thing"].msg_type == "string")
+        tick_until(session, lambda: session.live.topics["/thing"].msg_type == "string")
         tick_until(session, lambda: not session.alerts.active)
 
 
 def test_messages_of_50_mb_are_received_or_counted_as_lost(session: Session, talker: nep.Node) -> None:
-    with session.watch("/huge"):
+    with session.live.watch("/huge"):
         publisher = publisher_of(session, talker, "/huge", "bytes")
         data = bytes(50_000_000)
         for _ in range(3):
             publisher.publish_bytes(data)
 
         def arrived() -> bool:
-            session.traffic.count_lost(session.source.lost_counts(), time.monotonic())
-            topic = session.topics.get("/huge")
+            session.traffic.count_lost(session.live.source.lost_counts(), time.monotonic())
+            topic = session.live.topics.get("/huge")
             return topic is not None and topic.received + topic.missed == 3
 
         tick_until(session, arrived)
-        newest = session.topics["/huge"].newest
+        newest = session.live.topics["/huge"].newest
         assert newest is not None
         assert newest.size_bytes == len(data)
 
 
 def test_publisher_can_restart_100_times(session: Session, master: Master) -> None:
     threads = threading.active_count()
-    with session.watch("/phoenix"):
+    with session.live.watch("/phoenix"):
         sent = 0
         for life in range(100):
             node = nep.node("phoenix", master=master.address)
@@ -166,15 +166,15 @@ def test_publisher_can_restart_100_times(session: Session, master: Master) -> No
             tick_until(session, lambda: publisher.subscribers == 1)
             publisher.publish({"life": "last"})
             tick_until(session, lambda: _last_life(session) == "last")
-            tick_until(session, lambda: session.topics["/phoenix"].publisher_nodes == ("phoenix",))
-        assert session.source._subscribers.keys() <= {"/phoenix", LOG_TOPIC, LAST_ERRORS_TOPIC}
-        tick_until(session, lambda: len(session.nodes) < 20)
+            tick_until(session, lambda: session.live.topics["/phoenix"].publisher_nodes == ("phoenix",))
+        assert session.live.source._subscribers.keys() <= {"/phoenix", LOG_TOPIC, LAST_ERRORS_TOPIC}
+        tick_until(session, lambda: len(session.live.nodes) < 20)
     assert threading.active_count() <= threads + 2
     assert not session.alerts.active
 
 
 def _last_life(session: Session) -> object:
-    topic = session.topics.get("/phoenix")
+    topic = session.live.topics.get("/phoenix")
     payload = topic.newest.payload if topic is not None and topic.newest is not None else None
     return payload.get("life") if isinstance(payload, dict) else None
 
@@ -199,9 +199,11 @@ def test_session_closes_during_a_message_flood(session: Session, master: Master)
     try:
         assert flood.stdout is not None
         assert flood.stdout.readline().strip() == b"ready"
-        session.watch("/flood")
+        session.live.watch("/flood")
         tick_until(
-            session, lambda: "/flood" in session.topics and session.topics["/flood"].dropped > 1000, 20
+            session,
+            lambda: "/flood" in session.live.topics and session.live.topics["/flood"].dropped > 1000,
+            20,
         )
         session.close()
         assert flood.poll() is None  # the publisher was still running

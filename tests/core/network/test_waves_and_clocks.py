@@ -71,14 +71,14 @@ def test_10_000_short_lived_topics_and_their_nodes_are_removed_without_alerts(
         post(GraphReceived(graph(wave + 2, names, clocks.wall_ns), 0.001))
         quiet.tick()
         clocks.go_on(0.5)
-        most = max(most, len(quiet.topics))
+        most = max(most, len(quiet.live.topics))
     assert most <= 100 * (10 / 0.5 + 3)  # removed topics are shown for only ten seconds
     post(GraphReceived(graph(1000, {}, 0), 0.001))
     quiet.tick()
     for _ in range(4):
         clocks.go_on(11.0)
         quiet.tick()
-    assert len(quiet.topics) == len(quiet.nodes) == 0
+    assert len(quiet.live.topics) == len(quiet.live.nodes) == 0
     assert len(quiet.console.records) < 10_000
     assert not quiet.alerts.active
 
@@ -95,8 +95,8 @@ def test_clock_jump_causes_no_negative_age_no_removed_topic_and_no_alert(
         clocks.go_on(0.5)
         quiet._mailbox.post_event(GraphReceived(graph(2, names, clocks.wall_ns), 0.001))
         quiet.tick()
-        age = quiet.topics["/steady"].age_s
+        age = quiet.live.topics["/steady"].age_s
         assert age is not None, number
         assert age >= 0.0
-    assert quiet.topics["/steady"].gone_s is None
+    assert quiet.live.topics["/steady"].gone_s is None
     assert not quiet.alerts.active

@@ -242,25 +242,25 @@ def test_zenoh_network_is_observed_beside_the_native_network(session: Session) -
     place = f"local/{uuid.uuid4().hex}"
     with nep.node("talker") as native, nep.node("arm", "zenoh", master=place) as arm:
         ours, theirs = native.new_pub("/pose"), arm.new_pub("/pose")
-        watches = [session.watch("/pose"), session.watch("zenoh /pose")]
-        session.networks.select("zenoh", place)
+        watches = [session.live.watch("/pose"), session.live.watch("zenoh /pose")]
+        session.live.networks.select("zenoh", place)
         until(lambda: theirs.subscribers == 1, "Studio hears it")
         until(lambda: ours.subscribers == 1, "and this")
         ours.publish({"x": 1})
         theirs.publish({"x": 2})
 
         def shown(key: str) -> object:
-            topic = session.topic(key)
+            topic = session.shown.topic(key)
             return topic.newest.payload if topic is not None and topic.newest is not None else None
 
         tick_until(session, lambda: shown("/pose") == {"x": 1})
         tick_until(session, lambda: shown("zenoh /pose") == {"x": 2})
-        assert session.networks.topic("zenoh /pose") is not session.topics.get("/pose")
-        tick_until(session, lambda: {"arm", "studio"} <= {node.name for node in session.networks.nodes})
-        assert "arm" not in {node.name for node in session.nodes}
-        session.networks.deselect("zenoh")
+        assert session.live.networks.topic("zenoh /pose") is not session.live.topics.get("/pose")
+        tick_until(session, lambda: {"arm", "studio"} <= {node.name for node in session.live.networks.nodes})
+        assert "arm" not in {node.name for node in session.live.nodes}
+        session.live.networks.deselect("zenoh")
         until(lambda: theirs.subscribers == 0, "its thread has left the network")
-        assert session.networks.topics == []
+        assert session.live.networks.topics == []
         for watch in watches:
             watch.close()
 
@@ -297,8 +297,8 @@ def test_missing_package_is_reported_in_one_sentence(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "zenoh", None)
-    session.networks.select("zenoh", "local/nobody")
-    network = session.networks.get("zenoh")
+    session.live.networks.select("zenoh", "local/nobody")
+    network = session.live.networks.get("zenoh")
     assert network is not None
     tick_until(session, lambda: network.state == "lost")
     assert "nep-studio[zenoh]" in network.sentence

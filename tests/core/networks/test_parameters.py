@@ -35,7 +35,7 @@ def robot(master: Master) -> Iterator[nep.Node]:
 
 @pytest.fixture
 def shown(session: Session, robot: nep.Node) -> Iterator[NodeParameters]:
-    made = NodeParameters(session.watch, session.topic, session.parameters)
+    made = NodeParameters(session.live.watch, session.shown.topic, session.parameters)
     tick_until(session, lambda: entry(session, robot) is not None)
     tick_until(session, lambda: entry_of(session, robot).can_set_parameters)
     made.show(entry(session, robot))
@@ -45,7 +45,7 @@ def shown(session: Session, robot: nep.Node) -> Iterator[NodeParameters]:
 
 
 def entry(session: Session, node: nep.Node) -> NodeEntry | None:
-    return session.nodes.get(node.id)
+    return session.live.nodes.get(node.id)
 
 
 def entry_of(session: Session, node: nep.Node) -> NodeEntry:
@@ -167,7 +167,7 @@ def test_showing_another_node_or_none_clears_parameters(session: Session, shown:
     assert (shown.node, shown.all, shown.watch_handle, shown.has_received) == (None, (), None, False)
     assert shown.revision > revision
     assert watching is not None
-    assert not session._watches.is_watched(watching.topics[0])  # type: ignore[attr-defined]
+    assert not session.live.watches.is_watched(watching.topics[0])  # type: ignore[attr-defined]
     shown.show(None)
     shown.refresh(0.0)
     shown.set("speed", "1")

@@ -56,18 +56,18 @@ def look(kind: str, folder: Path) -> dict[str, object]:
 
 
 def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[str, object]:
-    network = session.networks.get(kind)
+    network = session.live.networks.get(kind)
     assert network is not None
     keys = [f"{kind} /fast", f"{kind} /chatter"]
 
     def topic(key: str) -> Topic:
-        return session.topic(key) or Topic(key)
+        return session.shown.topic(key) or Topic(key)
 
     with running(TALKER, kind, address) as talker:
         assert talker.line() == "ready"
-        session.networks.select(kind, address)
+        session.live.networks.select(kind, address)
         for key in keys:
-            session.watch(key)
+            session.live.watch(key)
         tick_until(session, lambda: all(topic(key).newest for key in keys))
         tick_until(session, lambda: topic(keys[0]).measured_rates is not None and topic(keys[0]).rate_hz)
         tick_until(session, lambda: any("robot" in node.name for node in network.nodes))
@@ -79,7 +79,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
             "nodes": sorted(node.name for node in network.nodes),
             "generations": sorted({node.generation for node in network.nodes}),
             "cpu": [node.cpu_ratio for node in network.nodes if "robot" in node.name],
-            "native": [each.name for each in session.topics if each.name in {"/fast", "/chatter"}],
+            "native": [each.name for each in session.live.topics if each.name in {"/fast", "/chatter"}],
         }
         talker.end()
     tick_until(session, lambda: topic(keys[0]).gone_s is not None)
@@ -88,8 +88,8 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
         ends.close()  # also kills the master
         tick_until(session, lambda: network.state == "lost")
         seen["lost"] = network.sentence
-    session.networks.deselect(kind)
-    seen["left"] = [network.state, len(session.networks.topics)]
+    session.live.networks.deselect(kind)
+    seen["left"] = [network.state, len(session.live.networks.topics)]
     return seen
 
 

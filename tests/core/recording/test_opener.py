@@ -69,10 +69,10 @@ def test_file_too_expensive_to_read_is_listed_as_not_scanned(path: Path) -> None
 @pytest.mark.parametrize("opened", [0, 1])
 def test_dead_reader_process_is_an_alert_and_ends_the_replay(tmp_path: Path, path: Path, opened: int) -> None:
     alerts, opener = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
-    replay = Replay(path, Settings(tmp_path / "home"), alerts, opener=opener)
+    replay = Replay(path, alerts, opener=opener)
     replay.start()
     eventually(lambda: replay.has_ended)
-    replay.tick(1.0)
+    replay.tick()
     (alert,) = (each for each in alerts.active if each.id == FAILED)
     assert "process has ended" in alert.detail
     replay.close()
@@ -80,13 +80,13 @@ def test_dead_reader_process_is_an_alert_and_ends_the_replay(tmp_path: Path, pat
 
 
 def test_recording_is_played_by_a_separate_process(tmp_path: Path, path: Path) -> None:
-    replay = Replay(path, Settings(tmp_path / "home"), Alerts(), opener=process_opener())
+    replay = Replay(path, Alerts(), opener=process_opener())
     replay.start()
     watch = replay.watch("/odom")
 
     def seen(condition: Callable[[], bool]) -> Callable[[], bool]:
         def look() -> bool:
-            replay.tick(1.0)
+            replay.tick()
             return condition()
 
         return look

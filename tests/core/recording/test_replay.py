@@ -10,7 +10,6 @@ import pytest
 from app.core.alerts.alerts import Alerts
 from app.core.network.mailbox import Batch
 from app.core.recording.replay.replay import Replay, create_graph
-from app.core.storage.settings import Settings
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 from nep.recordings.reader import Recording
@@ -52,14 +51,14 @@ class Shown:
 
     def __init__(self, path) -> None:
         self.now, self.alerts = 10.0, Alerts()
-        self.replay = Replay(path, Settings(), self.alerts, clock=lambda: self.now)
+        self.replay = Replay(path, self.alerts, clock=lambda: self.now)
         self.replay.source.open()
         self.tick(), self.tick()
 
     def tick(self, passed_s: float = 0.03) -> None:
         self.now += passed_s
         self.replay.source.process()
-        self.replay.tick(self.now)
+        self.replay.tick()
 
     def seek(self, at_ns: int) -> None:
         self.replay.seek(at_ns)
@@ -205,7 +204,7 @@ def test_replay_speed_is_clamped_to_its_range_and_nan_becomes_normal_speed(shown
 def test_play_at_end_restarts_from_beginning(shown, whole):
     shown.seek(2**64 - 1)
     shown.replay.toggle()
-    shown.tick(0.0)
+    shown.tick()
     assert shown.replay.player.position_ns == whole[0][0]
     assert shown.replay.player.is_playing
 
@@ -224,12 +223,12 @@ def test_unplayable_recording_is_an_alert_and_ends_the_thread(tmp_path):
     path = tmp_path / "broken.mcap"
     path.write_bytes(b"no recording")
     alerts = Alerts()
-    replay = Replay(path, Settings(), alerts)
+    replay = Replay(path, alerts)
     replay.start()
     end = time.monotonic() + 60
     while not replay.has_ended:
         assert time.monotonic() < end
-    replay.tick(1.0)
+    replay.tick()
     assert replay.status.stage == "failed"
     assert [alert.severity for alert in alerts.active] == ["error"]
     replay.close()

@@ -111,7 +111,7 @@ class Studio:
 
     def knows(self, publisher: nep.Publisher) -> bool:
         """Return whether Studio's graph contains the publisher."""
-        graph = self.session.graph
+        graph = self.session.live.graph
         return graph is not None and publisher._spec.id in {
             each.id for each in graph.topics["/Pepper/answer"].publishers
         }
@@ -156,7 +156,7 @@ class TestStudioSenders(MessageSenderContract):
 
 
 def _subscribers(session: Session, topic: str) -> int:
-    info = session.graph.topics.get(topic) if session.graph is not None else None
+    info = session.live.graph.topics.get(topic) if session.live.graph is not None else None
     return len(info.subscribers) if info is not None else 0
 
 

@@ -138,7 +138,7 @@ def test_second_studio_uses_the_running_pepper(master: Master, tmp_path: Path) -
         second.start()
         try:
             second.launcher.start_virtual_robot()  # before the first graph, when no robot is known
-            assert second.graph is None
+            assert second.live.graph is None
             tick_until(second, lambda: second.fleet.connected)
             assert second.launcher._robots == {}
         finally:

@@ -81,7 +81,7 @@ def test_rejected_stop_is_shown_in_run_bar_chips_health_alert_and_console(
     assert (link.state, link.chip_text.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)
     assert (words, status) == ("Arm: may still move", "error")
-    (fact,) = (each for each in health_items(link, session.topics, 0.0, str) if each.title == "Stop")
+    (fact,) = (each for each in health_items(link, session.live.topics, 0.0, str) if each.title == "Stop")
     assert fact.status == "error"
     assert "the brake does not answer" in fact.text
     (alert,) = (each for each in session.alerts.active if each.id == "stop")
@@ -183,7 +183,7 @@ def test_pending_stop_is_shown_as_stopping_until_the_robot_replies(
     tick_until(patient, lambda: link.state == "stopping", LONG_S)
     assert link.chip_text.removeprefix("virtual, ") == "stopping"
     assert robots_chip(patient) == ("Pepper stopping", "running")
-    (fact,) = (each for each in health_items(link, patient.topics, 0.0, str) if each.title == "Stop")
+    (fact,) = (each for each in health_items(link, patient.live.topics, 0.0, str) if each.title == "Stop")
     assert (fact.status, fact.text) == ("off", "Stop sent; waiting for confirmation")
     answers(patient, pepper)
     tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)

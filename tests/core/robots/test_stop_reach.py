@@ -6,10 +6,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import pytest
 from msgspec.structs import replace
 
 import nep
 from app.core.network.master import DISCOVERY_TIMEOUT_S
+from app.core.network.source import GraphReceived
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until
@@ -100,23 +102,31 @@ def test_user_can_confirm_that_a_lost_robot_stands_still(session: Session) -> No
     tick_until(session, lambda: not within_reach(session))
 
 
-def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(session: Session) -> None:
+def test_robots_unknown_to_a_new_master_stay_connected_during_discovery(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with nep.node("lamps") as node:
         driver = Driver(LAMP, "Lamp", node)
         driver.start()
         tick_until(session, lambda: within_reach(session))
         driver.close()
-        graph = session.graph
-        session.source.close()  # from here on, the test passes the graphs in
+        graph = session.live.graph
+        session.live.source.close()  # from here on, the test passes the graphs in
         assert graph is not None
         empty = replace(graph, epoch=graph.epoch + 1, nodes={}, topics={})
         now = time.monotonic()
+
+        def receive_empty_graph(later_s: float) -> None:
+            monkeypatch.setattr(session.live, "_clock", lambda: now + later_s)
+            session._mailbox.post_event(GraphReceived(empty, 0.0))
+            session.tick()
+
         for later_s in (0.0, 1.0):
-            session._on_graph(empty, now + later_s)
-            assert session.graph is graph
+            receive_empty_graph(later_s)
+            assert session.live.graph is graph
             assert session.fleet.connected
-        session._on_graph(empty, now + DISCOVERY_TIMEOUT_S)
-        assert session.graph is empty
+        receive_empty_graph(DISCOVERY_TIMEOUT_S)
+        assert session.live.graph is empty
         assert not session.fleet.connected
 
 

@@ -88,13 +88,13 @@ def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
 
 
 def test_robot_state_is_not_watched_when_sound_is_off(case) -> None:
-    assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.source.wanted
+    assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.live.source.wanted
     case.session.voices.set_on(on=False)
     case.session.tick()
-    assert STATE.format("Pepper") not in case.session.source.wanted
+    assert STATE.format("Pepper") not in case.session.live.source.wanted
     case.session.voices.set_on(on=True)
     case.session.tick()
-    assert STATE.format("Pepper") in case.session.source.wanted
+    assert STATE.format("Pepper") in case.session.live.source.wanted
 
 
 def test_two_robots_speak_in_turn_and_caption_names_the_speaker(case) -> None:
@@ -208,6 +208,6 @@ def test_robot_state_is_not_watched_without_a_speaker() -> None:
     session = Session()
     session.join(parse(thing_description(PEPPER.thing_model, "Pepper")))
     voices: RobotVoices = session.voices
-    voices.update()
+    voices.tick()
     voices.silence()
-    assert STATE.format("Pepper") not in session.source.wanted
+    assert STATE.format("Pepper") not in session.live.source.wanted

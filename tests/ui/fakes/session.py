@@ -15,7 +15,6 @@ from functools import partial
 
 from app.core import session as session_module
 from app.core.alerts.intents import Inspect
-from app.core.console import Console
 from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import SavedTabs
 from app.core.network import doctor as doctor_module
@@ -23,7 +22,6 @@ from app.core.network.master import MasterState
 from app.core.network.topics import Topic
 from app.core.robots.robot_link import RobotLink, topics_of
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
 from app.robots.description.model import Robot
@@ -87,9 +85,7 @@ _open: list[Session] = []
 class Session(session_module.Session):
     """Session without master, topics and robots, with an empty behaviour. `close_sessions` closes it."""
 
-    source: Network
     documents: Documents
-    images: Images
     launcher: Launcher
     doctor: Doctor
 
@@ -104,8 +100,6 @@ class Session(session_module.Session):
             start_processes=False,
         )
         post = self._mailbox.post_event
-        self.console = Console(self.clock.epoch_s)
-        self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, self.clock)
         self.documents = Documents(Document)
         self.document.key = "behaviour-1"
         self.tabs = SavedTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
@@ -118,8 +112,8 @@ class Session(session_module.Session):
         self.runs.before_stop = self.acting.disarm
         self.doctor = Doctor()
         self.launcher = Launcher(ADDRESS, post, self.fleet.is_present, self.clock)
-        self.images = Images(self.watch, self.clock)
-        self.master = MasterState("none", ADDRESS)
+        self.live.images = Images(self.live.watch, self.clock)
+        self.live.master = MasterState("none", ADDRESS)
         self.alarms.path = self.acting.path = None  # stored in memory only
         self.ticks = 0
         self.runner: Runner | None = None
@@ -138,17 +132,23 @@ class Session(session_module.Session):
     def watched(self) -> list[str]:
         """Topics watched by panels, in the order of their first watch."""
         answers = {link.robot.topics.reply for link in self.fleet.links}
-        watched = self.source.wanted - answers
-        return [topic for topic in dict.fromkeys(self.source.asked) if topic in watched]
+        watched = self.live.source.wanted - answers
+        return [topic for topic in dict.fromkeys(self.live.source.asked) if topic in watched]
 
     @property
     def looked_at(self) -> list[str]:
         """Names of the robots whose sensors are watched."""
-        return [link.name for link in self.fleet.links if set(topics_of(link.robot)) <= self.source.wanted]
+        return [
+            link.name for link in self.fleet.links if set(topics_of(link.robot)) <= self.live.source.wanted
+        ]
 
     def _make_runner(self, on_event: Callable[[RunnerEvent], object]) -> Runner:
         self.runner = Runner(on_event)
         return self.runner
+
+    def update_parts(self) -> None:
+        """Include the parts that a test has replaced in ticks and checks."""
+        del self._parts
 
     # -- events that a test triggers
 
@@ -165,7 +165,7 @@ class Session(session_module.Session):
             if topic.rate_hz:
                 topic.last_stamp_ns = now_ns - round(self.ticks * 0.033 % (1 / topic.rate_hz) * 1e9)
         if self.ticks % 3 == 0:
-            self.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
+            self.live.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
         pictures: Images = self.live.images  # also while a recording is open
         for stream in pictures.streams:
             if not stream.is_suspended:
@@ -178,25 +178,25 @@ class Session(session_module.Session):
             topic.last_stamp_ns = self.clock.ns() - round(topic.age_s * 1e9)
         if topic.gone_s is not None:
             topic.gone_since_s = self.clock() - topic.gone_s
-        self.topics._topics[topic.name] = topic
-        self.topics.revision += 1
-        self.topics.values_revision += 1
+        self.live.topics._topics[topic.name] = topic
+        self.live.topics.revision += 1
+        self.live.topics.values_revision += 1
         return topic
 
     def remove(self, name: str) -> None:
         """Remove a topic."""
-        del self.topics._topics[name]
-        self.topics.revision += 1
+        del self.live.topics._topics[name]
+        self.live.topics.revision += 1
 
     def send(self, topic: str, payload: object) -> Message:
         """Deliver a message on a topic, if it is watched, and return the message."""
         message = self._message(topic, payload)
-        self.source.send(message)
+        self.live.source.send(message)
         self.take_over()
         return message
 
     def _message(self, topic: str, payload: object) -> Message:
-        known = self.topics.get(topic) or Topic(topic, "json", "json")
+        known = self.live.topics.get(topic) or Topic(topic, "json", "json")
         data = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
         seq = (known.newest.seq or 0) + 1 if known.newest is not None else 18204
         return Message(
@@ -207,8 +207,8 @@ class Session(session_module.Session):
         """Connect a robot whose last stop was confirmed; `asked` and `changes` return its commands."""
         topics = robot.topics
         self._ears[robot.name] = [
-            self.source.listen(topics.command, COMMAND_TYPE),
-            *([self.source.listen(topics.world, "json")] if topics.world is not None else []),
+            self.live.source.listen(topics.command, COMMAND_TYPE),
+            *([self.live.source.listen(topics.world, "json")] if topics.world is not None else []),
         ]
         self.fleet.connect(replace(robot, virtual=virtual), topics.description)
         self.fleet.apply_stop({robot.name: ("confirmed in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
@@ -232,12 +232,12 @@ class Session(session_module.Session):
         session = cls(Clock(behind_s=sample_data.LOG[0][0]))
         clock, end = session.clock, session.clock.now + sample_data.LOG[0][0]
         at_ns = clock.ns() + sample_data.LOG[0][0] * 1_000_000_000
-        session.source.find_master()
+        session.live.source.find_master()
         for revision, ago in ((1, 5.2), (2, 4.2)):
             clock.now = end - ago
-            session.source.tell(sample_data.graph(revision, at_ns))
+            session.live.source.tell(sample_data.graph(revision, at_ns))
             session.take_over()
-        for place, topic in enumerate(session.topics):
+        for place, topic in enumerate(session.live.topics):
             wave = 0.02 if place % 3 == 0 else 0.5
             usual = topic.rate_hz or 1.0
             topic.rates.clear()
@@ -247,7 +247,7 @@ class Session(session_module.Session):
         link.values.update(sample_data.VALUES)
         link.drawing = sample_data.drawing()
         session.doctor.found = sample_data.FOUND
-        session.images.camera = lambda _topic: sample_data.picture()
+        session.live.images.camera = lambda _topic: sample_data.picture()
         session.document.name = "Greeting"
         session.document.source = sample_data.PROGRAM
         session.document.workspace = sample_data.WORKSPACE

@@ -53,7 +53,7 @@ def test_undecodable_stream_raises_one_alert_with_exact_count_and_no_dialog(
     window.show()
     panel = window.show_layout("developer").open("alerts").panel
     assert isinstance(panel, AlertsPanel)
-    with nep.node("talker") as node, session.watch("/bad"):
+    with nep.node("talker") as node, session.live.watch("/bad"):
         publisher = node.new_pub("/bad", "json")
         qtbot.waitUntil(lambda: (window.tick(), publisher.subscribers == 1)[1])
         windows = [each for each in QApplication.topLevelWidgets() if each.isVisible()]

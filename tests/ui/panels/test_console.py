@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
-from app.core.console import Console
+from app.core.world.console import Console
 from app.ui.panels.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tooltip_text
 from app.ui.panels.console.panel import PANEL, ConsolePanel
 from app.ui.widgets import paint
@@ -55,7 +55,7 @@ def test_new_lines_are_inserted_without_a_model_reset(qtmodeltester, panel, wind
 
 def test_evicted_records_are_removed_from_the_console_list(qtbot, qapp) -> None:
     session = Session()
-    session.console = Console(capacity=3)
+    session.console = session.live.console = Console(capacity=3)
     window = Window(session)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
@@ -238,7 +238,7 @@ def test_larger_text_enlarges_rows_and_the_button_to_the_newest_line(qtbot, pane
 
 def test_twenty_thousand_lines_scroll_and_only_visible_rows_are_painted(qtbot, qapp, monkeypatch) -> None:
     session = Session()
-    session.console = Console(capacity=20_000)
+    session.console = session.live.console = Console(capacity=20_000)
     for number in range(20_000):
         session.console.add("info", "arm", f"line {number}")
     panel = Window(session).make(PANEL, (446, 200))

@@ -55,7 +55,7 @@ def test_doctor_runs_when_first_shown_and_lists_the_most_severe_finding_first(qt
 
 
 def test_findings_are_shown_incrementally_during_a_check(qtbot, window) -> None:
-    window.session.master = MasterState("none", "127.0.0.1:7780")
+    window.session.live.master = MasterState("none", "127.0.0.1:7780")
     doctor = window.session.doctor
     doctor.found = (FINE, ALSO_FINE, FULL)
     told = []
@@ -102,8 +102,8 @@ def test_panels_waiting_for_a_topic_are_listed_with_the_suggested_topic(
     near, far, silent = (window.make(INSPECTOR) for _ in range(3))
     for each in (near, far, silent):
         qtbot.addWidget(each)
-    published = next(each.name for each in window.session.topics if each.publisher_nodes)
-    window.session.topics[published].newest = None
+    published = next(each.name for each in window.session.shown.topics if each.publisher_nodes)
+    window.session.shown.topics[published].newest = None
     near.show_topic(f"{published}s"), far.show_topic("/zzzz/qqqqqqqqqq"), silent.show_topic(published)
     window.panels += [near, far, silent]
     panel.refresh()
@@ -145,7 +145,7 @@ def test_doctor_starts_the_master_and_checks_again_when_the_master_runs(qtbot, p
     qtbot.mouseClick(row.button, Qt.MouseButton.LeftButton)
     assert window.session.launcher.masters_asked_for == 1
     window.session.doctor.found = (Finding("master", "ok", "A master runs."),)
-    window.session.master = MasterState("searching", "127.0.0.1:7780")
+    window.session.live.master = MasterState("searching", "127.0.0.1:7780")
     panel.refresh()
     assert [each.id for each in panel.shown_findings] == ["master"]
     assert panel.chip.accessibleName() == "no problems"
@@ -311,7 +311,7 @@ def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
 
 
 def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
-    network = window.session.networks.get("ros2")
+    network = window.session.shown.networks.get("ros2")
     network.state, network.sentence = "lost", "no daemon answers"
     window.session.doctor.expect_topic("ros2 /camera")
     panel.refresh()
@@ -322,7 +322,7 @@ def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
 
 def test_empty_panels_open_the_doctor_with_their_topic_if_they_have_one(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.master = MasterState("connected", "127.0.0.1:7780")
+    window.session.live.master = MasterState("connected", "127.0.0.1:7780")
     for name in ("inspector", "image", "console", "services"):
         made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
         qtbot.addWidget(made)

@@ -89,7 +89,7 @@ def graph(revision: int = 1, count: int = 100, nodes: tuple[NodeInfo, ...] = NOD
 @pytest.fixture
 def window(qapp) -> Window:
     made = Window(Session())
-    made.session.master = MasterState("connected", "127.0.0.1:7780")
+    made.session.live.master = MasterState("connected", "127.0.0.1:7780")
     show(made, graph())
     return made
 
@@ -105,7 +105,8 @@ def panel(qtbot, window: Window) -> Iterator[GraphPanel]:
 
 
 def show(window: Window, view: GraphView) -> None:
-    window.session._on_graph(view, window.session.clock())
+    window.session.live.source.tell(view)
+    window.session.take_over()
 
 
 def settle(qtbot, panel: GraphPanel) -> None:
@@ -536,8 +537,8 @@ def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, windo
 def test_groups_of_a_graph_with_many_nodes_are_collapsed_initially(qtbot, window: Window) -> None:
     many = tuple(NodeInfo(f"{n:x}", f"n{n}", f"host{n % 3}", 1, "", "native", n) for n in range(1, 202))
     show(window, GraphView(1, 2, {node.id: node for node in many}))
-    window.session.nodes.update_ages(window.session.clock() + 100)
-    window.session.topics.update_ages(window.session.clock() + 100, 0)
+    window.session.shown.nodes.update_ages(window.session.clock() + 100)
+    window.session.shown.topics.update_ages(window.session.clock() + 100, 0)
     made = window.make(PANEL, (900, 600))
     qtbot.addWidget(made)
     assert isinstance(made, GraphPanel)
@@ -617,7 +618,7 @@ def test_export_menu_opens_a_file_dialog(panel: GraphPanel, window: Window, tmp_
 
 def test_empty_graph_suggests_next_steps(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.master = MasterState("connected", "127.0.0.1:7780")
+    window.session.live.master = MasterState("connected", "127.0.0.1:7780")
     made = window.make(PANEL)
     qtbot.addWidget(made)
     assert isinstance(made, GraphPanel)
@@ -628,7 +629,7 @@ def test_empty_graph_suggests_next_steps(qtbot, qapp) -> None:
     assert made.to_svg() == b"", "also once nothing was laid out"
     made.save(Path("nowhere.svg"), SVG_KIND)
     assert window.toasts == []
-    window.session.master = MasterState("none", "127.0.0.1:7780")
+    window.session.live.master = MasterState("none", "127.0.0.1:7780")
     made.refresh()
     button(made, "Start a master here")
     made.dispose()

@@ -52,8 +52,8 @@ class Case:
             journal_folder=home / "journal",
             start_processes=False,
         )
-        assert isinstance(self.session.source, Network)
-        self.source = self.session.source
+        assert isinstance(self.session.live.source, Network)
+        self.source = self.session.live.source
         self.session.fleet.connect(
             parse(thing_description(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description"
         )

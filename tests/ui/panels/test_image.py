@@ -233,12 +233,12 @@ def test_image_panel_shows_the_first_image_topic_and_another_topic_on_request(qt
     assert panel.topics() == ["/robot/camera", "/robot/depth"]
     panel.show_topic("/robot/depth")
     panel.refresh()
-    assert [(one.topic, one.is_closed) for one in window.session.images.streams] == [
+    assert [(one.topic, one.is_closed) for one in window.session.shown.images.streams] == [
         ("/robot/camera", True), ("/robot/depth", False),
     ]  # fmt: skip
     assert panel.view.isVisible()
     panel.dispose()
-    assert all(one.is_closed for one in window.session.images.streams)
+    assert all(one.is_closed for one in window.session.shown.images.streams)
 
 
 def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
@@ -258,20 +258,20 @@ def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
 
 def test_image_panel_without_images_shows_an_empty_state_with_the_reason(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.camera = lambda _topic: None
+    window.session.shown.images.camera = lambda _topic: None
     panel = made(qtbot, window)
     assert panel.empty.isVisible()
     window.session.put(Topic("/cam", "image", "image"))
     panel.refresh()
     assert panel.empty._text.text() == "The next image on /cam appears here."
-    window.session.images.streams[0].error = "'/cam' does not send pictures"
+    window.session.shown.images.streams[0].error = "'/cam' does not send pictures"
     panel.refresh()
     assert panel.empty._text.text() == "'/cam' does not send pictures."
 
 
 def test_camera_panel_shows_a_robot_and_keeps_its_last_image_after_disconnection(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.camera = lambda _topic: picture(32, 24)
+    window.session.shown.images.camera = lambda _topic: picture(32, 24)
     panel = window.make(CAMERA)
     for widget in (panel, *panel.header_widgets()):
         qtbot.addWidget(widget)
@@ -291,7 +291,7 @@ def test_camera_panel_shows_a_robot_and_keeps_its_last_image_after_disconnection
     assert panel.rate_label.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.dispose()
-    assert window.session.images.streams[0].is_closed
+    assert window.session.shown.images.streams[0].is_closed
     assert window.session.looked_at == []
 
 
@@ -433,7 +433,7 @@ def test_zoom_rotation_flip_and_freeze_have_shortcuts_while_the_image_has_focus(
     assert panel.actions_of["across"].isChecked()
     QTest.keyClick(view, Qt.Key.Key_Space)
     assert panel.freeze.isChecked()
-    assert window.session.images.streams[0].is_frozen
+    assert window.session.shown.images.streams[0].is_frozen
     words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
     assert words == [*(row.text for row in ACTION_SPECS), "Record a sequence", "Open in the Inspector"]
 
@@ -556,7 +556,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     window = Window(Session())
     window.session.put(Topic("/cam", "image", "image"))
     panel = made(qtbot, window)
-    window.session.images.streams[0].error = "they are no picture"
+    window.session.shown.images.streams[0].error = "they are no picture"
     panel.refresh()
     assert panel.empty._title.text() == "Can't show the message as an image"
     next(each for each in panel.empty._buttons).click()
@@ -566,7 +566,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
 
 def test_camera_panel_shows_the_selected_robot(qtbot, qapp) -> None:
     window = Window(Session())
-    window.session.images.camera = lambda _topic: picture()
+    window.session.shown.images.camera = lambda _topic: picture()
     for name in ("Pepper", "Nao"):
         described = replace(pepper(), name=name)
         sensors = [

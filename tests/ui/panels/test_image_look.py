@@ -46,7 +46,9 @@ def panel(qtbot, window) -> Iterator[ImagePanel]:
 
 def sends(window: Window, panel: ImagePanel, topic: str, frame: np.ndarray, encoding: str) -> None:
     extension = {"shape": list(frame.shape), "encoding": encoding}
-    window.session.images.offer([Message(topic, frame.tobytes(), "image", "image", extension=extension)])
+    window.session.shown.images.offer(
+        [Message(topic, frame.tobytes(), "image", "image", extension=extension)]
+    )
     ticks(window, panel)
 
 

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.run.acting.arming import Target
 from app.core.run.acting.picture_point import MESSAGE_TYPES, PicturePoint
+from app.core.world.world import World
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
@@ -31,7 +32,7 @@ STAMP_NS = 1_795_164_093_000_000_007
 @pytest.fixture
 def window(qapp) -> Window:
     made = Window(Session.full())
-    made.session.images.camera = lambda _topic: None
+    made.session.shown.images.camera = lambda _topic: None
     return made
 
 
@@ -44,7 +45,7 @@ def panel(qtbot, window) -> Iterator[ImagePanel]:
     frame = np.zeros((240, 320, 3), np.uint8)
     extension = {"shape": list(frame.shape), "encoding": "bgr8"}
     sent = Message(CAMERA, frame.tobytes(), "image", "image", stamp_ns=STAMP_NS, extension=extension)
-    window.session.images.offer([sent])
+    window.session.shown.images.offer([sent])
     ticks(window, made)
     assert made.view.picture is not None
     yield made
@@ -56,7 +57,7 @@ SHIFT = Qt.KeyboardModifier.ShiftModifier
 
 def arm(window: Window, panel: ImagePanel) -> Subscriber:
     """Arm the publishing of points and return a subscriber to them."""
-    heard = window.session.source.listen(POINTS, "json")
+    heard = window.session.live.source.listen(POINTS, "json")
     panel.actions_of["point"].trigger()
     press(panel.point_bar.strip.switch)
     ticks(window, panel)
@@ -174,7 +175,7 @@ def test_arrow_keys_move_the_pixel_cursor_and_enter_publishes_its_point(qtbot, w
         CAMERA, small.tobytes(), "image", "image", stamp_ns=STAMP_NS + 1,
         extension={"shape": list(small.shape), "encoding": "bgr8"},
     )  # fmt: skip
-    window.session.images.offer([sent])
+    window.session.shown.images.offer([sent])
     ticks(window, panel)
     QTest.keyClick(view, Qt.Key.Key_Return)
     ticks(window, panel)
@@ -250,7 +251,7 @@ def test_arming_elsewhere_does_not_arm_the_image_panel_and_closing_disarms(qtbot
     press(button(panel, f"Send the points to {POINTS}"))
     ticks(window, panel)
     assert points.is_armed
-    heard = window.session.source.listen(POINTS, MESSAGE_TYPES[1])
+    heard = window.session.live.source.listen(POINTS, MESSAGE_TYPES[1])
     click(qtbot, window, panel, 16.5, 8.5)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 16.0, "y": 8.0, "z": 0.0})
     kept = panel.save_state()
@@ -293,7 +294,7 @@ def test_robot_command_topic_requires_confirmation_and_a_source_change_disarms(q
     press(points.strip.switch)
     ticks(window, panel)
     assert points.is_armed
-    window.session.source_revision += 1
+    window.session.show(World())
     ticks(window, panel)
     assert not points.is_armed
 

@@ -110,9 +110,9 @@ def test_latency_of_another_computer_is_shown_with_its_uncertainty(took_ns, know
 def test_latched_message_shows_no_latency(panel, window) -> None:
     latched = Message("/blackboard", b"1", "json", "json", stamp_ns=time.time_ns() - 1800 * 10**9, seq=1)
     latched.kind = message_kind("/blackboard", "json", "json", is_latched=True)
-    topic = window.session.topics["/blackboard"]
+    topic = window.session.shown.topics["/blackboard"]
     topic.newest, topic.received = latched, topic.received + 1
-    window.session.topics.values_revision += 1
+    window.session.shown.topics.values_revision += 1
     panel.show_topic("/blackboard")
     panel.refresh()
     assert "seq 1" in panel.foot.info.text()
@@ -325,7 +325,7 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
         panel.reader.clear()
         window.session.send("/blackboard", {"n": number, "data": ["x" * 90] * 110_000})
         qtbot.waitUntil(lambda wanted=number: (panel.refresh(), shown_number(panel) == wanted)[1])
-    window.session.topics["/speech/words"].newest = Message(
+    window.session.shown.topics["/speech/words"].newest = Message(
         "/speech/words", b"y" * 2_000_000, "string", "string"
     )
     panel.show_topic("/speech/words")
@@ -343,7 +343,7 @@ def shown_number(panel: InspectorPanel) -> object:
 
 
 def test_large_messages_that_are_not_json_are_decoded_only_on_request(qtbot, panel, window) -> None:
-    topic = window.session.topics["/speech/words"]
+    topic = window.session.shown.topics["/speech/words"]
     topic.newest = Message("/speech/words", b"x" * 1_200_000, "string", "string", seq=1)
     panel.show_topic("/speech/words")
     panel.refresh()
@@ -374,7 +374,7 @@ def test_images_are_summarised() -> None:
 
 def test_images_are_not_decoded_to_be_summarised(panel, window) -> None:
     panel.show_topic("/robot/camera")
-    topic = window.session.topics["/robot/camera"]
+    topic = window.session.shown.topics["/robot/camera"]
     told = {"shape": [480, 640, 3], "encoding": "jpeg"}
     topic.newest = Message("/robot/camera", b"no picture at all", "image", "image", seq=1, extension=told)
     panel.refresh()
@@ -390,7 +390,7 @@ def test_string_is_shown_as_one_value(panel, window) -> None:
     window.session.send("/speech/words", b"hello")
     panel.refresh()
     assert panel.model.value() == {"value": "hello"}
-    assert not window.session.topics["/speech/words"].is_new
+    assert not window.session.shown.topics["/speech/words"].is_new
 
 
 def test_search_finds_keys_and_values(panel, window) -> None:
@@ -414,7 +414,7 @@ def test_removed_topic_shows_the_time_since_removal_and_keeps_its_last_message(p
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {"n": 1})
     panel.refresh()
-    window.session.topics["/blackboard"].gone_s = 3.2
+    window.session.shown.topics["/blackboard"].gone_s = 3.2
     panel.refresh()
     assert panel.live.text == "gone for 3 s"
     window.session.remove("/blackboard")
@@ -552,7 +552,7 @@ def test_topic_without_publisher_is_reported_while_waiting(panel, window) -> Non
     panel.show_topic("/odom")
     panel.refresh()
     assert panel.body.empty._text.text() == "The next message on /odom appears here."
-    window.session.topics["/odom"].publishers = 0
+    window.session.shown.topics["/odom"].publishers = 0
     panel.refresh()
     assert panel.body.empty._text.text().startswith("There is no publisher at the moment.")
 

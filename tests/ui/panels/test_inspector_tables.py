@@ -256,4 +256,4 @@ def test_history_omits_messages_received_while_suspended_and_is_cleared_for_anot
     assert len(panel.history.history) == 0
     assert not panel.history.isVisible()
     panel.dispose()
-    assert window.session.series.topics == ()
+    assert window.session.shown.series.topics == ()

@@ -42,10 +42,10 @@ def look(window: Window) -> Look:
         made.append(Fake(*told))  # type: ignore[arg-type]
         return made[-1]
 
-    window.session.networks._create_source = make  # type: ignore[assignment]
+    window.session.shown.networks._create_source = make  # type: ignore[assignment]
 
     def choose(kind: str) -> Fake:
-        window.session.networks.select(kind, "")
+        window.session.shown.networks.select(kind, "")
         return made[-1]
 
     return choose
@@ -94,7 +94,7 @@ def test_network_column_is_hidden_without_other_networks(qtbot, window: Window, 
     look("zenoh")
     ticks(window, panel, 2)
     assert not panel.table.isColumnHidden(place)
-    window.session.networks.deselect("zenoh")
+    window.session.shown.networks.deselect("zenoh")
     ticks(window, panel, 2)
     assert panel.table.isColumnHidden(place)
 
@@ -133,7 +133,7 @@ def test_messages_of_watched_topics_on_another_network_are_counted_locally(
     assert isinstance(panel, TopicsPanel)
     ros = look("ros")
     ros.tell(GraphReceived(ros_graph(), 0.0))
-    watch = session.watch("ros /blackboard")
+    watch = session.live.watch("ros /blackboard")
     ticks(window, panel, 40)
     for _ in range(60):
         for sink in ros.sinks:

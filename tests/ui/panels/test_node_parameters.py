@@ -34,10 +34,12 @@ class World:
     def hear(self) -> None:
         """Pass the robot's latched parameters to the session and refresh the panel."""
         topic = parameters_topic(self.robot.id)
-        with self.window.session.source.node.new_sub(topic, "json") as kept:
+        with self.window.session.live.source.node.new_sub(topic, "json") as kept:
             message = kept.receive(5.0)
         assert message is not None
-        self.window.session.source.send(Message(topic, bytes(message.data), "json", "json", seq=message.seq))
+        self.window.session.live.source.send(
+            Message(topic, bytes(message.data), "json", "json", seq=message.seq)
+        )
         ticks(self.window, self.panel, 2)
 
     def choose(self, node: str) -> None:
@@ -78,14 +80,14 @@ def graph(robot: nep.Node, *, may_set: bool = True) -> GraphView:
 @pytest.fixture
 def robot(qapp, request: pytest.FixtureRequest) -> Iterator[tuple[Window, nep.Node]]:
     session = Session()
-    with nep.node("robot", "memory", master=session.source._master) as node:
+    with nep.node("robot", "memory", master=session.live.source._master) as node:
         node.parameters.declare("speed", 0.5, min=0, max=2, description="in m/s")
         node.parameters.declare("gait", "walk", choices=("walk", "run"))
         node.parameters.declare("lights", True)
         node.parameters.declare("serial", "7", read_only=True)
         node.parameters.declare("<b>long</b>", "x" * 5000)
-        session.source.find_master()
-        session.source.tell(graph(node))
+        session.live.source.find_master()
+        session.live.source.tell(graph(node))
         session.take_over()
         yield Window(session), node
 
@@ -184,7 +186,7 @@ def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> 
     assert not part.field.isEnabled()
     assert not part.set_button.isEnabled()
     assert part.status_label.text() == "Only the node itself can change this parameter."
-    world.window.session.source.tell(GraphView(1, 2, {}))
+    world.window.session.live.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.select_key("speed")
     assert (part.field.isEnabled(), part.status_label.text()) == (False, "The node has left.")

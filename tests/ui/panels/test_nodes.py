@@ -55,8 +55,8 @@ def graph(revision: int = 1, nodes: tuple[NodeInfo, ...] = NODES) -> GraphView:
 @pytest.fixture
 def window(qapp) -> Window:
     made = Window(Session.full())
-    made.session.nodes = Nodes()
-    made.session.nodes.update(graph(), 0.0)
+    made.session.shown.nodes = Nodes()
+    made.session.shown.nodes.update(graph(), 0.0)
     return made
 
 
@@ -87,14 +87,14 @@ def test_every_node_is_listed_with_its_details(panel) -> None:
 
 
 def test_expanded_node_shows_its_topics_and_a_click_opens_a_topic(panel, window) -> None:
-    panel.table.select_key(NodeRow(next(iter(window.session.nodes))).key)
+    panel.table.select_key(NodeRow(next(iter(window.session.shown.nodes))).key)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert [line[:2] for line in shown(panel)][:3] == [
         ["camera_driver", "native"],
         ["/odom", "publishes 50.0/s"],
         ["/robot/camera", "publishes 30.0/s"],
     ]
-    assert name_cell(NodeRow(window.session.nodes.get("1"), is_expanded=True)).icon == "chevron-down"
+    assert name_cell(NodeRow(window.session.shown.nodes.get("1"), is_expanded=True)).icon == "chevron-down"
     row = panel.table.rowViewportPosition(2)
     QTest.mouseClick(panel.table.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(60, row + 8))
     assert window.opened == ["/robot/camera"]
@@ -113,11 +113,11 @@ def test_arrow_keys_expand_and_collapse(panel, window) -> None:
     assert window.opened == ["/odom"]
     QTest.keyClick(panel.table, Qt.Key.Key_Left)
     assert len(shown(panel)) == 3
-    assert panel.table.selected_key() == NodeRow(window.session.nodes.get("1")).key
+    assert panel.table.selected_key() == NodeRow(window.session.shown.nodes.get("1")).key
 
 
 def test_node_without_topics_can_be_expanded(panel, window) -> None:
-    window.session.nodes.update(graph(2, (*NODES, NodeInfo("4", "idle", "h", 1, "", "native", 1))), 1.0)
+    window.session.shown.nodes.update(graph(2, (*NODES, NodeInfo("4", "idle", "h", 1, "", "native", 1))), 1.0)
     panel.refresh()
     place = [line[0] for line in shown(panel)].index("idle")
     panel.table.opened.emit(panel.model.key_of(panel.model.row_at(panel.model.index(place, 0))))
@@ -125,7 +125,7 @@ def test_node_without_topics_can_be_expanded(panel, window) -> None:
 
 
 def test_new_nodes_are_bold_until_expanded_unless_started_by_studio(panel, window) -> None:
-    nodes = window.session.nodes
+    nodes = window.session.shown.nodes
     more = (NodeInfo("4", "arm", "h", 1, "", "native", 1), NodeInfo("5", "Pepper", "h", 1, "", "native", 1))
     window.session.launcher.restart_virtual_robot("Pepper")
     nodes.update(graph(2, (*NODES, *more)), 1.0)
@@ -144,7 +144,7 @@ def test_new_nodes_are_bold_until_expanded_unless_started_by_studio(panel, windo
 
 
 def test_removed_node_is_struck_through_for_ten_seconds(panel, window) -> None:
-    nodes = window.session.nodes
+    nodes = window.session.shown.nodes
     nodes.update(graph(2, NODES[1:]), 1.0)
     nodes.update_ages(5.2)
     panel.refresh()
@@ -158,11 +158,11 @@ def test_removed_node_is_struck_through_for_ten_seconds(panel, window) -> None:
 
 
 def test_limitations_of_a_selected_original_nep_node_are_shown(panel, window) -> None:
-    panel.table.select_key(NodeRow(window.session.nodes.get("2")).key)
+    panel.table.select_key(NodeRow(window.session.shown.nodes.get("2")).key)
     assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, running since ")
     assert "up to 0.5.4.5" in panel.foot.text()
     assert "no sequence numbers or time stamps" in panel.foot.text()
-    panel.table.select_key(NodeRow(window.session.nodes.get("1")).key)
+    panel.table.select_key(NodeRow(window.session.shown.nodes.get("1")).key)
     assert "no numbers" not in panel.foot.text()
     assert "on lab-pc" in panel.foot.text()
 
@@ -211,7 +211,7 @@ def test_cpu_load_is_updated_when_reported_and_sorted_once_per_second(panel, win
     panel.table.horizontalHeader().sectionClicked.emit(place)
     assert [line[0] for line in shown(panel)] == ["rize", "camera_driver", "studio"]
     busy = NodeInfo("3", "studio", platform.node(), 600, "Python", "native", 3, 2.0)
-    window.session.nodes.update(graph(1, (*NODES[:2], busy)), 1.0)
+    window.session.shown.nodes.update(graph(1, (*NODES[:2], busy)), 1.0)
     ticks(window, panel, 2)
     assert shown(panel)[0][0] == "rize"
     ticks(window, panel, 30)
@@ -224,7 +224,7 @@ def test_cpu_load_is_updated_when_reported_and_sorted_once_per_second(panel, win
 )
 def test_empty_nodes_panel_names_the_cause_and_can_start_a_master(qtbot, qapp, kind, words, pressed) -> None:
     window = Window(Session())
-    window.session.master = MasterState(kind, window.session.master.address)
+    window.session.live.master = MasterState(kind, window.session.live.master.address)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, NodesPanel)
@@ -250,14 +250,14 @@ def test_bridge_is_labelled_and_refers_to_its_counters(panel, window) -> None:
     bridge = NodeInfo("7", "bridge-lab-to-ros", "lab-pc", 9, "Python", "native", 1, 0.02)
     view = graph(2, (*NODES, bridge))
     told = {**view.topics, BRIDGES_TOPIC: topic(BRIDGES_TOPIC, "7"), "/chat": topic("/chat", "7", "7")}
-    window.session.nodes.update(replace(view, topics=told), 1.0)
+    window.session.shown.nodes.update(replace(view, topics=told), 1.0)
     panel.refresh()
     assert [line[:2] for line in shown(panel) if line[0] == bridge.name] == [["bridge-lab-to-ros", "bridge"]]
-    assert generation_cell(NodeRow(window.session.nodes.get("7"))).icon == "arrow-left-right"
-    panel.table.select_key(NodeRow(window.session.nodes.get("7")).key)
+    assert generation_cell(NodeRow(window.session.shown.nodes.get("7"))).icon == "arrow-left-right"
+    panel.table.select_key(NodeRow(window.session.shown.nodes.get("7")).key)
     assert "A bridge that forwards topics between this network and others." in panel.foot.text()
     assert BRIDGES_TOPIC in panel.foot.text()
-    assert [each.is_bridge for each in window.session.nodes] == [False, False, False, True]
+    assert [each.is_bridge for each in window.session.shown.nodes] == [False, False, False, True]
     panel.filter.setText("bridge")
     panel.refresh()
     panel.rebuild()
@@ -266,8 +266,8 @@ def test_bridge_is_labelled_and_refers_to_its_counters(panel, window) -> None:
 
 def test_wildcard_subscription_is_listed_at_its_node_and_not_as_a_topic(panel, window) -> None:
     wide = PatternInfo("/robot/*/camera", "image", (SubscriberInfo(7, "3", 0, 0),))
-    window.session.nodes.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
-    window.session.topics.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
+    window.session.shown.nodes.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
+    window.session.shown.topics.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
     ticks(window, panel, 2)
     panel.table.opened.emit("3  ")
     row = next(row for row in panel.model._rows.rows if row.topic == wide.name)
@@ -276,4 +276,4 @@ def test_wildcard_subscription_is_listed_at_its_node_and_not_as_a_topic(panel, w
     panel.table.opened.emit(row.key)
     assert window.opened == []
     assert window.toasts == ["/robot/*/camera has wildcards and matches several topics"]
-    assert wide.name not in window.session.topics
+    assert wide.name not in window.session.shown.topics

@@ -67,7 +67,7 @@ def test_full_life_cycle_of_each_panel_raises_no_error(qtbot, qapp, name, sessio
             window.theme.set_mode(mode)  # type: ignore[arg-type]
             ticks(window, panel, 7)
             assert not panel.grab().isNull()
-    for topic in list(window.session.topics):
+    for topic in list(window.session.shown.topics):
         panel.show_topic(topic.name)
         ticks(window, panel, 2)
         window.session.remove(topic.name)
@@ -80,7 +80,7 @@ def test_full_life_cycle_of_each_panel_raises_no_error(qtbot, qapp, name, sessio
     panel.dispose()
     assert window.session.watched == []
     assert window.session.looked_at == []
-    assert all(stream.is_closed for stream in window.session.images.streams)
+    assert all(stream.is_closed for stream in window.session.shown.images.streams)
 
 
 @pytest.mark.parametrize("name", NAMES)

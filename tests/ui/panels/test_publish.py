@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import SavedMessage
+from app.core.world.world import World
 from app.ui.panels.publish import PANEL
 from app.ui.panels.publish.panel import PublishPanel
 from app.ui.panels.topics import panel as topics
@@ -90,7 +91,7 @@ def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
 
 def test_sending_arms_only_the_topic_of_the_message_and_the_switch_disarms(window, panel) -> None:
     session, acting = window.session, acting_of(window)
-    heard = session.source.listen("/cmd_vel", "json")
+    heard = session.live.source.listen("/cmd_vel", "json")
     panel.list.select_key("b")
     assert panel.form.send_button.text() == "Arm and send"
     QTest.keyClick(panel.form.edit.edit, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
@@ -123,7 +124,7 @@ def test_stop_change_of_source_and_closing_disarm(window, panel) -> None:
         assert not acting.arming.is_on
     acting.arm()
     acting.allow(Target("topic", "/cmd_vel"))
-    window.session.source_revision += 1
+    window.session.show(World())
     ticks(window, panel)
     assert not acting.arming.is_on
 
@@ -141,7 +142,7 @@ def test_arming_expires_after_its_time_limit(window, panel) -> None:
 def test_robot_command_topic_requires_another_confirmation(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     topic = session.fleet.connected[0].robot.topics.command
-    heard = session.source.listen(topic, "json")
+    heard = session.live.source.listen(topic, "json")
     acting.saved_messages.set_message(replace(STILL, topic=topic))
     panel.list.select_key("b")
     ticks(window, panel)
@@ -171,7 +172,7 @@ def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
     link = session.fleet.connected[0]
     link.robot = replace(link.robot, virtual=False)
     topic = link.robot.topics.command
-    heard = session.source.listen(topic, "json")
+    heard = session.live.source.listen(topic, "json")
     acting.arm()
     acting.allow(Target("topic", topic), is_confirmed=True)
     assert acting.send(replace(STILL, topic=topic)) == ""
@@ -257,8 +258,8 @@ def test_publish_is_in_the_menu_of_topics_with_fields(qtbot, window) -> None:
     assert "Publish to this topic" not in [each.text for each in table.row_actions("/robot/camera")]
 
 
-def test_sending_cannot_be_armed_while_a_recording_is_shown(window, panel, monkeypatch) -> None:
-    monkeypatch.setattr(type(window.session), "is_replaying", True)
+def test_sending_cannot_be_armed_while_a_world_other_than_the_live_network_is_shown(window, panel) -> None:
+    window.session.show(World())
     assert acting_of(window).send(STILL) == "A recording is open. Return to live to send."
     ticks(window, panel, 7)
     assert not panel.strip.switch.isEnabled()

@@ -50,7 +50,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     acting = session.acting
     press(button(panel, "Publish a message"))
     assert window.commands == ["publish.new"]
-    heard = session.source.listen("/words", "json")
+    heard = session.live.source.listen("/words", "json")
     assert acting.send(WORD) == ""
     assert heard.listen(timeout_s=20.0)[0]
     ticks(window, panel)

@@ -35,7 +35,7 @@ def offer(session: Session, **services: str) -> None:
         for name, node in services.items()
     }
     infos["/nep/parameters/1"] = ServiceInfo("/nep/parameters/1", "json", (ServerInfo(2, "1", (), 0, 0, 0),))
-    session.source.tell(replace(view, revision=view.revision + 1, services=infos))
+    session.live.source.tell(replace(view, revision=view.revision + 1, services=infos))
     session.take_over()
 
 
@@ -131,7 +131,7 @@ def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
         asked.append(request)
         return {"ok": True, "faces": [{"id": 7}], "quality": 0.93}
 
-    session.source.node.new_server("remember_face", serve, threads=1)
+    session.live.source.node.new_server("remember_face", serve, threads=1)
     assert panel.call_button.text() == "Arm and call"
     press(panel.call_button)
     answered(window, panel, qtbot)
@@ -162,7 +162,7 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
             raise ValueError("no face in sight")
         return go_on.wait(30)
 
-    session.source.node.new_server("remember_face", serve, threads=3)
+    session.live.source.node.new_server("remember_face", serve, threads=3)
     press(panel.call_button)
     answered(window, panel, qtbot)
     assert panel.reply_view.message_label.text() == "rejected: no face in sight"
@@ -221,7 +221,7 @@ def test_controls_have_accessible_names_and_fit_a_narrow_panel(panel, qtbot) -> 
 
 def test_reply_is_not_clipped_at_the_width_of_the_developer_layout(window, panel, qtbot) -> None:
     panel.resize(328, 700)
-    window.session.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
+    window.session.live.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
     press(panel.call_button)
     answered(window, panel, qtbot)
     assert panel.reply_view.chip.text.startswith("replied in ")

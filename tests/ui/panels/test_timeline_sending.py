@@ -67,7 +67,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     panel.refresh()
     assert panel.transport.sending_off_label.text() == "Sending is off"
     assert not panel.strip.isVisible()
-    heard = session.source.listen("/test/a", "json")
+    heard = session.live.source.listen("/test/a", "json")
 
     panel.transport.armed.setFocus()
     QTest.keyClick(panel.transport.armed, Qt.Key.Key_Space)

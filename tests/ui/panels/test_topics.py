@@ -132,7 +132,7 @@ def test_sorting_keeps_the_selection_and_changing_values_are_sorted_once_per_sec
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
     assert panel.table.selected_key() == "/odom"
     moved = QSignalSpy(panel.model.layoutChanged)
-    window.session.topics["/touch"].rate_hz = 500.0
+    window.session.shown.topics["/touch"].rate_hz = 500.0
     ticks(window, panel, 28)
     assert moved.count() == 0
     ticks(window, panel, 1)
@@ -176,7 +176,7 @@ def test_enter_opens_a_topic_and_arrow_keys_move(panel, window) -> None:
 )
 def test_empty_panel_suggests_next_steps(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
     window = Window(Session())
-    window.session.master = MasterState(kind, window.session.master.address)
+    window.session.live.master = MasterState(kind, window.session.live.master.address)
     panel = window.make(PANEL)
     qtbot.addWidget(panel)
     assert isinstance(panel, TopicsPanel)
@@ -200,7 +200,7 @@ def test_sort_order_is_restored_with_the_layout(qtbot, panel, window) -> None:
 
 
 def test_sparkline_of_recent_rates_is_shown_before_the_rate(panel, window) -> None:
-    topic = window.session.topics["/odom"]
+    topic = window.session.shown.topics["/odom"]
     topic.rates.clear()
     topic.rates.extend([49.0, 50.0, 51.0])
     cell = panel.model.data(
@@ -244,7 +244,7 @@ def test_publisher_cell_lists_the_nodes_of_a_topic() -> None:
 
 def test_tooltips_report_the_number_of_shown_messages(panel, window) -> None:
     rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
-    topic = window.session.topics["/odom"]
+    topic = window.session.shown.topics["/odom"]
     assert rate.tip(topic) == "Messages per second, as reported by the publishers"
     topic.received, topic.dropped, topic.missed = 1200, 970, 3800
     assert rate.tip(topic) == "230 of 5\u2009000 messages shown"
@@ -329,7 +329,7 @@ def test_tree_view_groups_topics_in_folders_with_summed_rates(panel, window) -> 
     assert row(panel, "/arm/*", figures) == ["arm/", "2 topics", "42.5", "500 B/s", "0.1 s", "3"]
     cell = panel.model.data(panel.model.index_of("/arm/left/speed"), CELL_ROLE)
     assert cell.indent > panel.model.data(panel.model.index_of("/arm/*"), CELL_ROLE).indent
-    session.topics["/arm/left/speed"].rate_hz = 50.0
+    session.shown.topics["/arm/left/speed"].rate_hz = 50.0
     ticks(window, panel, 6)
     assert row(panel, "/arm/*", ("rate",)) == ["52.5"]
     assert panel.count_label.text() == "2 of 15 topics, 7 nodes"
@@ -364,7 +364,7 @@ def test_filter_expands_folders_and_matches_types_and_patterns(panel, window) ->
     panel.filter.setText("/robot/* image")
     found = [name for name in shown(panel) if not name.endswith("/")]
     assert "depth" in found
-    assert {window.session.topics[f"/robot/{name}"].msg_type for name in found} == {"image"}
+    assert {window.session.shown.topics[f"/robot/{name}"].msg_type for name in found} == {"image"}
     panel.filter.clear()
     assert "depth" not in shown(panel)
 

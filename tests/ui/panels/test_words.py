@@ -138,10 +138,10 @@ def named_in(rules: Iterable[AlarmRule]) -> Iterator[str]:
 def data_of(session: Session) -> Iterator[str]:
     """Return texts from users, robots and the network, which are not translated."""
     yield from MESSAGE_TYPES
-    for topic in session.topics:
+    for topic in session.shown.topics:
         yield default_topic(topic.name)
         yield from (topic.name, topic.msg_type, topic.msg_type.rpartition("/")[2], *topic.publisher_nodes)
-    for node in session.nodes:
+    for node in session.shown.nodes:
         yield from (node.name, node.host, node.language)
     for link in session.fleet.links:
         yield from (link.name, *words_of(link.robot), *texts_in((link.values, link.drawing)))

@@ -284,7 +284,7 @@ def test_panels_topics_and_files_are_found(
     palette: CommandPalette, window: MainWindow, tmp_path: Path
 ) -> None:
     palette.dismiss()
-    topics = window.session.topics
+    topics = window.session.shown.topics
     topics._topics["/faces"] = Topic("/faces", "json", "json")
     topics.revision += 1
     file = tmp_path / "faces.nepb"
@@ -348,8 +348,8 @@ def test_empty_result_is_reported(palette: CommandPalette) -> None:
 def test_result_list_is_bounded_with_ten_thousand_topics(palette: CommandPalette, window: MainWindow) -> None:
     palette.dismiss()
     for number in range(10_000):
-        window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
-    window.session.topics.revision += 1
+        window.session.shown.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
+    window.session.shown.topics.revision += 1
     palette.open()
     assert len(palette.rows.line_model.lines) < 120
     QTest.keyClicks(palette.field, "t9")

@@ -36,6 +36,7 @@ class Recorder:
             session.settings, session.alerts, session.address, print,
             start=self._start, clock=session.clock,
         )  # fmt: skip
+        session.update_parts()
 
     def _start(self, _number: int, _address: str, _post: Callable[[object], object]) -> OrdersOnly:
         return self.line
@@ -124,7 +125,7 @@ def test_only_selected_topics_are_recorded(window, recorder):
     session = recorder.session
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    names = sorted(topic.name for topic in session.topics.existing_topics())
+    names = sorted(topic.name for topic in session.shown.topics.existing_topics())
     assert sheet.count.text().startswith(f"{len(names)} of {len(names)}")
     sheet._set_mode("chosen")
     assert session.recordings.choice.topics == tuple(names)
@@ -278,7 +279,7 @@ def test_texts_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, record
     recorder.say("ring")
     sheet.show_state()
     qtbot.wait(50)  # Qt defers layouts
-    topics = [topic.name for topic in recorder.session.topics.existing_topics()]
+    topics = [topic.name for topic in recorder.session.shown.topics.existing_topics()]
     assert [text for _where, text in said_by(sheet) if untranslated(text, "GB", *topics)] == []
     assert clipped(sheet) == []
     assert not list(unsaid(sheet))

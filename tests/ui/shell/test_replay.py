@@ -144,19 +144,19 @@ def test_image_of_a_paused_recording_is_not_stale_and_keeps_its_recorded_age(
 
 
 def test_live_topics_keep_receiving_messages_during_a_replay(qtbot, window, session, path):
-    watch = session.watch("/a")
+    watch = session.live.watch("/a")
     opened(qtbot, window, path)
     said = live(session, 2000)
     window.tick()
     assert session.live.topics["/a"].newest is said
-    assert session.topics["/a"].newest is not said
+    assert session.shown.topics["/a"].newest is not said
     watch.close()
 
 
 def test_replay_publishes_and_subscribes_to_no_topic(qtbot, window, session, path, monkeypatch):
     asked = []
-    monkeypatch.setattr(session.source, "submit", lambda what, job: asked.append(what))
-    monkeypatch.setattr(session.source, "watch", asked.append)
+    monkeypatch.setattr(session.live.source, "submit", lambda what, job: asked.append(what))
+    monkeypatch.setattr(session.live.source, "watch", asked.append)
     replay = opened(qtbot, window, path)
     asked.clear()
     window.open_topic("/a")
@@ -178,7 +178,7 @@ def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_recording(
     window.commands.files.open_all([other])
     assert session.replay.path == other
     until(qtbot, window, lambda: session.replay.opened_recording is not None)
-    assert [topic.name for topic in session.topics] == ["/a", "/camera"]
+    assert [topic.name for topic in session.shown.topics] == ["/a", "/camera"]
     until(qtbot, window, lambda: first.has_ended)
 
 
@@ -337,17 +337,17 @@ def test_plotted_topic_missing_in_the_recording_is_not_listed_as_a_recorded_topi
     until(qtbot, window, lambda: replay.player.position_ns == replay.start_ns + 1)
     for _ in range(5):
         window.tick()
-    assert "/ghost" not in session.topics
-    assert "/a" in session.topics
+    assert "/ghost" not in session.shown.topics
+    assert "/a" in session.shown.topics
 
 
 def test_reset_panels_ends_the_subscriptions_of_a_plot_and_keeps_its_curves(qtbot, window, session):
     window.show()
     window.show_layout("developer")
     window.plot("/ghost", "x")
-    assert session.series.topics == ("/ghost",)
+    assert session.shown.series.topics == ("/ghost",)
     window.commands.run("layout.reset")
-    assert session.series.topics == ()
+    assert session.shown.series.topics == ()
     assert "plot" not in window.bench.open_names()
     window.open_panel("plot")
-    assert session.series.topics == ("/ghost",)
+    assert session.shown.series.topics == ("/ghost",)

@@ -115,8 +115,8 @@ class Studio:
             journal_folder=home / "journal",
             start_processes=False,
         )
-        assert isinstance(self.session.source, Network)
-        self.source = self.session.source
+        assert isinstance(self.session.live.source, Network)
+        self.source = self.session.live.source
         self.source.tell(view())
         self.window = MainWindow(self.session, theme, {**PanelRegistry(), "behaviour": BLOCKS}, [])
         qtbot.addWidget(self.window)
@@ -126,8 +126,8 @@ class Studio:
         self.window.show_layout("developer")
         self.window.tick()
         for topic in INSPECTED:
-            self.session.watch(topic)
-        self.session.watch(LOG_TOPIC)
+            self.session.live.watch(topic)
+        self.session.live.watch(LOG_TOPIC)
         self.panel("image", ImagePanel).show_topic(CAMERA)
         self.panel("plot", PlotPanel).plot_field(NUMBERS, "x")
         self.panel("plot", PlotPanel).plot_field(NUMBERS, "y")
@@ -177,15 +177,13 @@ class Studio:
             held["picture"] = (shown.picture.width, shown.picture.height, shown.picture.bgra.tobytes())
         console = self.panel("console", ConsolePanel)
         self.window.tick()
-        held["lines"] = [
-            (r.stamp_s, r.level, r.origin, r.text) for r in self.session.displayed_console.records
-        ]
+        held["lines"] = [(r.stamp_s, r.level, r.origin, r.text) for r in self.session.shown.console.records]
         held["lines in sight"] = [
             console.model.index(n, 0).data(Qt.ItemDataRole.AccessibleTextRole)
             for n in range(console.model.rowCount())
         ]
         plot = self.panel("plot", PlotPanel)
-        origin_ns = self.session.series.origin_ns
+        origin_ns = self.session.shown.series.origin_ns
         for curve in plot.shown:
             samples = curve.curve.samples
             stamps = [round((origin_ns + each * 1e9) / 1000) for each in samples.times.tolist()]

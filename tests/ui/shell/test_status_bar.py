@@ -47,7 +47,7 @@ def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.last_reply_s, link.values = None, {}
-    for topic in session.topics:
+    for topic in session.shown.topics:
         topic.rate_hz = topic.age_s = None
     assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
 
@@ -86,7 +86,7 @@ def test_traffic_item_counts_nodes_topics_and_messages_of_the_live_network(sessi
     assert facts(session).traffic()[1] == "7 nodes, 12 topics, 269 messages/s"
     session.traffic.messages_per_s = None
     assert facts(session).traffic()[1] == "7 nodes, 12 topics"
-    session.graph = None
+    session.shown.graph = None
     assert facts(session).traffic()[1] == ""
 
 
@@ -114,7 +114,7 @@ def test_status_bar_reports_displayed_and_received_messages_if_some_were_not_dis
     ],
 )
 def test_master_item_shows_its_state(session: fakes.Session, kind: str, words: str) -> None:
-    session.master = MasterState(kind, session.master.address)
+    session.live.master = MasterState(kind, session.live.master.address)
     assert facts(session).master()[1] == words
 
 

@@ -8,21 +8,18 @@ from pathlib import Path
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import ShowRecordingFile
-from app.core.console import CAPACITY, Console
 from app.core.messages.image_streams import Images
 from app.core.network.mailbox import Batch
-from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
-from app.core.network.watches import Watch, Watches
-from app.core.networks.networks import Networks
+from app.core.network.watches import Watch
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.recording.replay.sending import ReplaySending
 from app.core.recording.replay.source import ReplayResults, ReplaySource, ReplayStatus
 from app.core.run.acting.acting import SessionActing
-from app.core.series.feed import SeriesFeed
-from app.core.storage.settings import Settings
+from app.core.world.console import CAPACITY
+from app.core.world.world import World
 from nep.i18n import _, number
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
@@ -39,11 +36,8 @@ LOG_TOPICS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
 
-class Replay:
-    """Recording that is shown in the panels. Not thread-safe; use it from the main thread.
-
-    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` correspond to
-    the attributes of a session for the live network. A recording has no nodes and no other networks.
+class Replay(World):
+    """Recording as a world, without nodes and other networks. Not thread-safe; use it from the main thread.
 
     Attributes:
         selected_topic: Topic whose messages `step` steps through; "" for none.
@@ -52,7 +46,6 @@ class Replay:
     def __init__(
         self,
         path: Path,
-        settings: Settings,
         alerts: Alerts,
         *,
         clock: Callable[[], float] = time.monotonic,
@@ -63,15 +56,9 @@ class Replay:
         # nothing can be sent.
         self.path = path
         self.opened_recording: OpenedRecording | None = None
-        self._watches = Watches(self._start_watch, self._stop_watch)
-        self.topics, self.nodes = Topics(("", 0)), Nodes()
-        self.networks = Networks(settings, (), lambda _event: None, alerts)
-        self.images = Images(self.watch, clock)
-        self.images.now_ns = self._position_ns
-        self.source = ReplaySource(path, self.images, clock=clock, opener=opener)
-        self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_history_capacity)
-        self.console = Console(lambda: self._position_ns() / 1e9)
-        self.graph: GraphView | None = None
+        images = Images(self.watch, clock)
+        self.source = ReplaySource(path, images, clock=clock, opener=opener)
+        super().__init__(topics=Topics(("", 0)), images=images, clock=clock, now_ns=self._position_ns)
         self.densities: Densities | None = None
         self.selected_topic = ""
         self.sending = ReplaySending(acting) if acting is not None else None
@@ -85,10 +72,6 @@ class Replay:
     def start(self) -> None:
         """Open the file in a background thread."""
         self.source.start()
-
-    def watch(self, topic: str) -> Watch:
-        """Watch a topic until the watch is closed. Messages arrive in ``topics``."""
-        return self._watches.open([topic])
 
     def request_stop(self) -> None:
         """Stop publishing and signal the threads to stop, without waiting for them; `close` waits."""
@@ -304,27 +287,27 @@ class Replay:
 
     # -- tick --------------------------------------------------------------------------------------
 
-    def tick(self, now: float) -> None:
-        """Apply the messages read since the last tick at ``now`` (monotonic seconds)."""
+    def tick(self) -> None:
+        """Apply the messages read since the last tick."""
         if (
             self.opened_recording is None
             and self.source.opened_recording is not None
             and self.player is not None
         ):
-            self._on_opened(self.source.opened_recording, now)
+            self._on_opened(self.source.opened_recording)
         self._alert_problems()
         results = self.source.pop_results()
         if results.seek_messages is not None:
-            self._apply_seek(results.seek_messages, now)
-        self._apply_history(results, now)
+            self._apply_seek(results.seek_messages)
+        self._apply_history(results)
         for topic, batch in results.drain_result.batches.items():
             if topic in LOG_TOPICS:
                 self.console.add_messages(batch.messages, batch.dropped)
-            self._add(topic, batch, now)
+            self.add(topic, batch)
         self.series.dispatch(results.drain_result.batches)
         if results.stats:
             self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in results.stats.items()})
-        self.topics.update_ages(now, self._position_ns())
+        self.topics.update_ages(self._clock(), self._position_ns())
         if self.player is None or not self.player.is_playing:
             self.images.restart_silence()
         if self.sending is not None:
@@ -335,14 +318,15 @@ class Replay:
             outbox = self.sending.outbox
             self.source.forward({topic.route.recorded for topic in outbox.active_topics}, outbox.offer)
 
-    def _on_opened(self, opened: OpenedRecording, now: float) -> None:
+    def _on_opened(self, opened: OpenedRecording) -> None:
         self.opened_recording = opened
+        self.revision += 1  # its topics and start time are available from now on
         recording = opened.recording
         self.series.origin_ns = recording.start_ns
         if self.sending is not None:
             self.sending.set_recording(opened)
         self.graph = create_graph(recording.topics, opened.stats)
-        self.topics.update(self.graph, now)
+        self.topics.update(self.graph, self._clock())
         self.selected_topic = next(iter(recording.topics), "")
         self.densities = Densities(recording)
         for topic in LOG_TOPICS:
@@ -386,36 +370,33 @@ class Replay:
         detail = _("To create a repaired copy, run: nep recording repair {file}").format(file=self.path)
         self._alerts.raise_alert(NOT_CLOSED, "info", title, detail)
 
-    def _apply_seek(self, messages: Sequence[Message], now: float) -> None:
+    def _apply_seek(self, messages: Sequence[Message]) -> None:
         self.topics.reset()
         self.series.reset()
         self.console.reset()
         for message in messages:
-            self._add(message.topic, Batch([message]), now)
+            self.add(message.topic, Batch([message]))
 
-    def _apply_history(self, results: ReplayResults, now: float) -> None:
+    def _apply_history(self, results: ReplayResults) -> None:
         log_messages = [message for topic in LOG_TOPICS for message in results.history.get(topic, ())]
         self.console.add_messages(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
         for topic, messages in results.history.items():
             batch = Batch(list(messages))
-            self._add(topic, Batch(batch.messages[-2:]), now)
+            self.add(topic, Batch(batch.messages[-2:]))
             self.series.reset([topic])
             self.series.dispatch({topic: batch})
 
-    def _add(self, topic: str, batch: Batch, now: float) -> None:
-        if self._watches.is_watched(topic):
-            self.topics.add(topic, batch, now)
-            self.topics[topic].is_watched = True
-
-    def _start_watch(self, topic: str) -> None:
+    def subscribe(self, topic: str) -> None:
+        """Play the messages of a topic."""
         self.source.watch(topic)
-        replayed_topic = self.topics.get(topic)
-        if replayed_topic is not None:
-            replayed_topic.is_watched = True
 
-    def _stop_watch(self, topic: str) -> None:
+    def unsubscribe(self, topic: str) -> None:
+        """Stop playing the messages of a topic."""
         self.source.unwatch(topic)
-        self.topics.unwatch(topic)
+
+    def set_capacity(self, topic: str, count: int | None) -> None:
+        """Set how many messages of a topic are kept, also from the time before the playhead."""
+        self.source.set_history_capacity(topic, count)
 
 
 def create_graph(topics: Mapping[str, RecordedTopic], stats: Mapping[str, TopicStats]) -> GraphView:

@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from app.core.alerts.alerts import Alerts
-from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.network.source import Source
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.run.acting.arming import ARMED_S, Arming, Target
@@ -37,8 +35,12 @@ from app.core.run.acting.templates import is_editable, is_plain_text
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.settings import Settings
 from app.core.storage.user_file import read_stored
+from app.core.world.console import Console
+from app.core.world.live import LiveWorld
+from app.core.world.part import SessionPart
+from app.core.world.world import World
 from nep.errors import NepError
-from nep.i18n import _, format_list, ngettext
+from nep.i18n import _, format_list, lazy, ngettext
 
 FILE_NAME = "messages.json"
 _SENDERS_BY_ORIGIN: Mapping[SendOrigin, str] = {"publish": "shelf"}
@@ -50,13 +52,16 @@ class ActingSession(Protocol):
     settings: Settings
     alerts: Alerts
     console: Console
-    source: Source
+    live: LiveWorld
     fleet: Fleet
-    source_revision: int
 
     @property
-    def is_replaying(self) -> bool:
-        """True if a recording is shown instead of the live network."""
+    def shown(self) -> World:
+        """World that the panels show."""
+
+    @property
+    def source_revision(self) -> int:
+        """Counter that increases when another world is shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +88,10 @@ class ArmQuestion:
         return template.format(topic=self.topic, robots=format_list(list(self.robots)))
 
 
-class SessionActing:
+class SessionActing(SessionPart):
     """Manual publishing and calling. Not thread-safe, except `disarm`; use it from the main thread."""
+
+    task = lazy("send messages by hand")
 
     def __init__(
         self,
@@ -95,7 +102,7 @@ class SessionActing:
     ) -> None:
         self._session, self._clock = session, clock
         self.arming = Arming(clock)
-        self.submit = session.source.submit
+        self.submit = session.live.source.submit
         """Runs a job with Studio's node on the live network."""
         self.gate = session.fleet.gate
         self.on_moved: OnMoved = ignore_moved
@@ -133,7 +140,7 @@ class SessionActing:
         Returns:
             Reason why this isn't possible, or "".
         """
-        if self._session.is_replaying and not for_replay:
+        if not self._session.shown.is_live and not for_replay:
             return _("A recording is open. Return to live to send.")
         was_on = self.arming.is_on
         self.arming.arm(self.armed_s)
@@ -315,7 +322,7 @@ class SessionActing:
         return ""
 
     def _replay_problem(self) -> str:
-        return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
+        return "" if self._session.shown.is_live else _("A recording is open. Return to live to send.")
 
     def prepare(self, target: Target, on_allow: Callable[[], object]) -> str | None:
         """Prepare sending to a target, asking the user if necessary.

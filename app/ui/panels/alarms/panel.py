@@ -308,7 +308,7 @@ class AlarmsPanel(PanelWidget):
         condition = rule.condition
         if part.role in {"value", "limit"} and condition.name and self._value_watch is None:
             # field names and values to offer come from the newest message
-            self._value_watch = self.session.watch(condition.name)
+            self._value_watch = self.session.live.watch(condition.name)
         self.field = SlotField(
             self.theme,
             row,

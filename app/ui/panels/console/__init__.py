@@ -1,6 +1,6 @@
 """Console panel: log records of Studio, programs and robots.
 
-The records are stored in `app.core.console`; `list` filters and paints them.
+The records are stored in `app.core.world.console`; `list` filters and paints them.
 """
 
 from app.ui.panels.console.panel import PANEL as PANEL

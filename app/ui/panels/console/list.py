@@ -28,7 +28,7 @@ from app.ui.widgets.keyboard import has_no_modifiers
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.console import ConsoleRecord
+    from app.core.world.console import ConsoleRecord
 
 Index = QModelIndex | QPersistentModelIndex
 RECORD_ROLE = int(Qt.ItemDataRole.UserRole)

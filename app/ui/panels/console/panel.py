@@ -28,7 +28,7 @@ from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.core.console import ConsoleRecord
+    from app.core.world.console import ConsoleRecord
 
 LEVEL_LABELS = {
     "debug": lazy("All, including details"),
@@ -110,7 +110,7 @@ class ConsolePanel(PanelWidget):
         self.model.reset_records((), self._current_filter())
 
     def refresh(self) -> None:
-        console = self.session.displayed_console
+        console = self.world.console
         filter_state = (self.level, self.node, self.find_field.text())
         if (console.revision, filter_state) == (self._last_revision, self._last_filter):
             return
@@ -204,7 +204,7 @@ class ConsolePanel(PanelWidget):
 
     def clear(self) -> None:
         """Delete all stored records."""
-        self.session.displayed_console.clear()
+        self.world.console.clear()
         self.refresh()
 
     def _update_filter_button(self) -> None:
@@ -217,9 +217,7 @@ class ConsolePanel(PanelWidget):
         menu = Menu(self.theme, self)
         for level, text in LEVEL_LABELS.items():
             self._add_choice(menu, _(text), level == self.level, partial(self.set_level, level))
-        nodes = sorted(
-            {record.origin for record in self.session.displayed_console.records} | {self.node} - {""}
-        )
+        nodes = sorted({record.origin for record in self.world.console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
             self._add_choice(menu, _("From all sources"), not self.node, partial(self.set_node, ""))

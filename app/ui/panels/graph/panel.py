@@ -200,7 +200,7 @@ class GraphPanel(PanelWidget):
             self._last_snapshot = snapshot
             self._rebuild()
         self._apply_layout()
-        values = (self.session.topics.values_revision, self.session.networks.values_revision)
+        values = (self.world.topics.values_revision, self.world.networks.values_revision)
         if values != self._values_revisions or (
             self._has_gone_nodes() and self._ticks % QUIET_UPDATE_TICKS == 0
         ):
@@ -211,18 +211,22 @@ class GraphPanel(PanelWidget):
 
     def _snapshot(self) -> tuple[object, ...]:
         session = self.session
-        view = session.graph
+        view = session.shown.graph
         graph = (view.epoch, view.revision) if view is not None else None
-        counts = (session.nodes.revision, session.topics.revision, session.networks.revision)
+        counts = (
+            session.shown.nodes.revision,
+            session.shown.topics.revision,
+            session.shown.networks.revision,
+        )
         pages = session.web_pages.revision
-        return (graph, counts, pages, session.fleet.revision, session.master.kind, self._options)
+        return (graph, counts, pages, session.fleet.revision, session.live.master.kind, self._options)
 
     def _graph_input(self) -> GraphInput:
         session = self.session
         return GraphInput(
-            [*session.nodes, *session.networks.nodes],
-            [*session.topics, *session.networks.topics],
-            session.graph.services if session.graph is not None else {},
+            session.shown.all_nodes,
+            session.shown.all_topics,
+            session.shown.graph.services if session.shown.graph is not None else {},
             [link.name for link in session.fleet.links],
             self._host,
             page_nodes(session.web_pages),
@@ -276,7 +280,7 @@ class GraphPanel(PanelWidget):
         self._update_card()
 
     def _stats_of(self, line: GraphLine) -> LineStats:
-        return line_stats(line, self.session.topic, self._call_rates_hz, self._box_of)
+        return line_stats(line, self.world.topic, self._call_rates_hz, self._box_of)
 
     def _has_gone_nodes(self) -> bool:
         graph = self._requested_graph
@@ -290,7 +294,7 @@ class GraphPanel(PanelWidget):
         return replace(sizes, node=(max(width, math.ceil(detail_width + NODE_TEXT_INSET)), height))
 
     def _update_empty_state(self) -> None:
-        if self.session.master.kind == "none":
+        if self.session.live.master.kind == "none":
             self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
@@ -373,7 +377,7 @@ class GraphPanel(PanelWidget):
             self._update_options(shows_services=not self._options.shows_services)
 
     def _open(self, key: str) -> None:
-        if self.session.topic(key) is not None:
+        if self.world.topic(key) is not None:
             show_messages(self.context, key)
 
     def _show_menu(self, selection: GraphSelection, position: QPoint) -> None:
@@ -403,7 +407,7 @@ class GraphPanel(PanelWidget):
         return menu
 
     def _topic_actions(self, key: str) -> list[RowAction]:
-        if self.session.topic(key) is None:
+        if self.world.topic(key) is None:
             network, name = split_key(key)
             return [copy_action(self.context, name)] if network else service_actions(self.context, name)
         return topic_actions(self.context, key)
@@ -431,11 +435,11 @@ class GraphPanel(PanelWidget):
     def _card_sources(self) -> CardSources:
         scene = self.canvas.scene
         nodes = scene.graph.nodes if scene is not None else ()
-        names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
+        names = {entry.key: entry.name for entry in self.world.all_nodes}
         names |= {node.entry_key: node_name(node, self._host) for node in nodes if node.entry_key}
         return CardSources(
-            self.session.topic,
-            self.session.graph,
+            self.world.topic,
+            self.world.graph,
             lambda entry: names.get(entry, split_key(entry)[1]),
             self._box_of,
             self._call_rates_hz,
@@ -456,7 +460,7 @@ class GraphPanel(PanelWidget):
         self._separator.setVisible(content is not None)
 
     def _services_of(self, entry: str) -> list[tuple[str, bool]]:
-        view = self.session.graph
+        view = self.world.graph
         services: list[tuple[str, bool]] = []
         for name, service in view.services.items() if view is not None else ():
             if is_drawn(name, self._options):
@@ -481,7 +485,7 @@ class GraphPanel(PanelWidget):
         )
 
     def _topic_description(self, key: str) -> str:
-        topic = self.session.topic(key)
+        topic = self.world.topic(key)
         scene = self.canvas.scene
         line = scene.graph.line_of(key) if scene is not None else None
         route_text = ""

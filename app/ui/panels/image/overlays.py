@@ -44,7 +44,7 @@ class Overlays:
 
     def choices(self) -> list[str]:
         """Return the keys of the available overlay topics, and of selected ones that no longer exist."""
-        all_topics = (*self._session.topics, *self._session.networks.topics)
+        all_topics = self._session.shown.all_topics
         available = [
             topic.key for topic in all_topics if topic.gone_s is None and may_contain_annotations(topic)
         ]
@@ -53,7 +53,7 @@ class Overlays:
     def set_visible(self, topic: str, is_visible: bool) -> None:
         """Show or hide the annotations of a topic. At most `MAX_OVERLAYS` topics can be shown."""
         if is_visible and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
-            self._watches[topic] = self._session.watch_displayed(topic)
+            self._watches[topic] = self._session.shown.watch(topic)
         elif not is_visible and topic in self._watches:
             self._watches.pop(topic).close()
             self._cached_annotations.pop(topic, None)
@@ -76,7 +76,7 @@ class Overlays:
         """
         shapes: list[AnnotationShape] = []
         for key in self._watches:
-            topic = self._session.topic(key)
+            topic = self._session.shown.topic(key)
             message = topic.newest if topic is not None and topic.gone_s is None else None
             cached = self._cached_annotations.get(key)
             if cached is None or cached[0] is not message or cached[1] != (width, height):

@@ -128,7 +128,7 @@ class ImagePanel(PanelWidget):
 
     def topics(self) -> list[str]:
         """Return the keys of the available image topics: first Studio's own network, then other networks."""
-        all_topics = (*self.session.topics, *self.session.networks.topics)
+        all_topics = self.world.all_topics
         return [topic.key for topic in all_topics if topic.codec == CODEC and topic.gone_s is None]
 
     def show_topic(self, name: str) -> None:
@@ -144,10 +144,10 @@ class ImagePanel(PanelWidget):
         self.freeze.setChecked(False)
         self.set_title(_("Image"), topic_label(name))
         if name:
-            self._stream = self.session.images.stream(name)
+            self._stream = self.world.images.stream(name)
             self._stream.set_style(self._styles.get(name, PLAIN))
             self.style_bar.show_style(self._styles.get(name, PLAIN))
-            self.session.mark_seen(name)
+            self.world.mark_seen(name)
         self._update_empty_state()
 
     def source_changed(self) -> None:
@@ -171,7 +171,7 @@ class ImagePanel(PanelWidget):
         self.actions_of.update_checks()
 
     def refresh(self) -> None:
-        revision = self.session.topics.revision, self.session.networks.revision
+        revision = self.world.topics.revision, self.world.networks.revision
         if revision != self._revision:
             self._revision = revision
             topics = self.topics()
@@ -195,13 +195,13 @@ class ImagePanel(PanelWidget):
             open_message = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([open_message, self.doctor_action(self._topic)])
         # the playhead is before the topic's first image
-        elif self.session.replay is not None and self._has_image:
+        elif not self.world.is_live and self._has_image:
             self.view.clear()
             self._update_empty_state()
 
     def _watch_robot(self) -> None:
-        is_live = self.session.replay is None  # live detections don't belong on recorded images
-        link = robot_of_camera(self.session, self._topic) if is_live else None
+        # live detections don't belong on recorded images
+        link = robot_of_camera(self.session, self._topic) if self.world.is_live else None
         name = link.name if link is not None else ""
         if name != self._watched_robot:
             self._close_robot_watch()

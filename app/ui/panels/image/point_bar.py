@@ -121,7 +121,7 @@ class PointBar(QWidget):
         arming, target = self._acting.arming, self.target
         return (
             self.is_on
-            and not self._context.session.is_replaying
+            and self._context.session.shown.is_live
             and self._armed_target == (arming.turn, target)
             and arming.allows(target)
         )
@@ -134,7 +134,7 @@ class PointBar(QWidget):
         acting = self._acting
         is_waiting = acting.arming.is_on and not self.is_armed and acting.question is None
         self.arm_button.setVisible(
-            is_waiting and not self.problem_label.text() and not self._context.session.is_replaying
+            is_waiting and not self.problem_label.text() and self._context.session.shown.is_live
         )
         self.strip.refresh()
 

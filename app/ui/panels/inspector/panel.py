@@ -127,9 +127,9 @@ class InspectorPanel(PanelWidget):
         self.set_title(_("Inspector"), topic_label(name))
         if name:
             self._since_ns = time.time_ns()
-            self._watch = self.session.watch_displayed(name)
-            self.history.start(self.session.series, name)
-            self.session.mark_seen(name)
+            self._watch = self.world.watch(name)
+            self.history.start(self.world.series, name)
+            self.world.mark_seen(name)
         self._show_empty()
 
     def source_changed(self) -> None:
@@ -140,7 +140,7 @@ class InspectorPanel(PanelWidget):
     def refresh(self) -> None:
         if not self._topic:
             return
-        topic, is_recorded = self.session.topic(self._topic), self.session.replay is not None
+        topic, is_recorded = self.world.topic(self._topic), not self.world.is_live
         self.history.clamp_selection()
         is_earlier = self.history.selected_number is not None
         self.live.set(*chip_state(topic, self.is_frozen, is_recorded=is_recorded, is_earlier=is_earlier))
@@ -191,7 +191,7 @@ class InspectorPanel(PanelWidget):
         self._show_page(NOTHING)
 
     def _show_waiting(self, topic: Topic | None) -> None:
-        problem = self.session.networks.read_problem(self._topic)
+        problem = self.world.networks.read_problem(self._topic)
         if problem:
             self.body.show_undecodable(topic_label(self._topic), problem, self.doctor_action(self._topic))
         else:
@@ -228,7 +228,7 @@ class InspectorPanel(PanelWidget):
         self._shown_message, self._reading = message, reading
         if is_new:
             self._previous_value = self._value if self._value is not None else NO_BASE
-            topic = self.session.topic(self._topic)
+            topic = self.world.topic(self._topic)
             previous = topic.previous if topic is not None else None
             if self.history.selected_number is not None:
                 previous = self.history.previous_message()
@@ -244,7 +244,7 @@ class InspectorPanel(PanelWidget):
         # Cached per message, because latency and age are those at its arrival.
         if message is not self._info_cache[0]:
             kind = find_kind(split_key(self._topic)[0])
-            is_recorded = self.session.replay is not None
+            is_recorded = not self.world.is_live
             self._info_cache = (message, message_info(message, self._since_ns, kind, is_recorded=is_recorded))
         return self._info_cache[1]
 
@@ -383,7 +383,7 @@ class InspectorPanel(PanelWidget):
             return
         if self._reading is not None and self._reading.message is displayed and not self._is_raw_mode:
             self._show_decoded(self._reading)
-        elif self.session.topic(self._topic) is not None:
+        elif self.world.topic(self._topic) is not None:
             self._show_message(displayed)
 
     def _row_selected(self, index: QModelIndex) -> None:
@@ -467,7 +467,7 @@ class InspectorPanel(PanelWidget):
     def resume(self) -> None:
         if self._watch is not None and self._watch.is_suspended:
             self._since_ns = time.time_ns()
-            self.history.start(self.session.series, self._topic)
+            self.history.start(self.world.series, self._topic)
         super().resume()
 
     def suspend(self) -> None:

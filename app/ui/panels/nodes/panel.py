@@ -57,7 +57,10 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._footer = ContentScrollArea(self.foot)
         session = self.session
         self._parameters = NodeParameters(
-            session.watch, session.topic, session.parameters, lambda: session.master.kind == "connected"
+            session.live.watch,
+            session.live.topic,
+            session.parameters,
+            lambda: session.live.master.kind == "connected",
         )
         self.parameters = ParametersView(self.theme, self._parameters)
         self.parameters.hide()
@@ -99,7 +102,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         is_sort_due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
         if is_sort_due or self._snapshot() != self._last_snapshot:
             self.rebuild()
-        values_revision = self.session.nodes.values_revision + self.session.networks.values_revision
+        values_revision = self.world.nodes.values_revision + self.world.networks.values_revision
         if values_revision != self._values_revision or (
             self._has_gone_nodes and self._ticks % SORT_TICKS == 0
         ):
@@ -109,13 +112,13 @@ class NodesPanel(NetworkTable[NodeRow]):
 
     def _snapshot(self) -> tuple[object, ...]:
         session = self.session
-        return session.nodes.revision, session.networks.revision, session.master.kind
+        return session.shown.nodes.revision, session.shown.networks.revision, session.live.master.kind
 
     def source_changed(self) -> None:
         self._last_snapshot, self._values_revision = (), -1
 
     def rebuild(self) -> None:
-        nodes = [*self.session.nodes, *self.session.networks.nodes]
+        nodes = self.world.all_nodes
         self._last_snapshot = self._snapshot()
         self._has_gone_nodes = any(node.gone_s is not None for node in nodes)
         keywords = self.filter_words()
@@ -128,7 +131,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._show_details()
 
     def _rate_text(self, name: str) -> str:
-        topic = self.session.topic(name)
+        topic = self.world.topic(name)
         return rate_text(topic.rate_hz) if topic is not None else ""
 
     def update_empty_state(self) -> None:
@@ -156,21 +159,21 @@ class NodesPanel(NetworkTable[NodeRow]):
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return
-        if row.is_pattern and self.session.topic(row.topic_key) is None:
+        if row.is_pattern and self.world.topic(row.topic_key) is None:
             message = _("{pattern} has wildcards and matches several topics")
             self.context.show_toast(message.format(pattern=row.topic))
         elif row.topic:
             show_messages(self.context, row.topic_key)
         else:
-            network = self.session.networks.get(row.node.network)
-            (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
+            network = self.world.networks.get(row.node.network)
+            (network.nodes if network is not None else self.world.nodes).mark_seen(row.node.id)
             self._set_expanded(key, row.node.key not in self._expanded_keys)
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return ()
-        if row.is_pattern and self.session.topic(row.topic_key) is None:
+        if row.is_pattern and self.world.topic(row.topic_key) is None:
             return (copy_action(self.context, row.topic),)  # a pattern stands for many topics
         if row.topic:
             return topic_actions(self.context, row.topic_key)

@@ -211,7 +211,7 @@ class PlotExport:
             self._context.show_toast(_("The previous export is still running"))
             return
         curves = [each.curve for each in self._curves() if not each.is_hidden]
-        origin_ns = self._context.session.series.origin_ns
+        origin_ns = self._context.session.shown.series.origin_ns
         self._writer = CsvWriter(path, columns_of(curves, *self._visible_range()), origin_ns)
 
     def poll(self) -> None:

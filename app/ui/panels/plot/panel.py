@@ -60,7 +60,7 @@ class PlotPanel(PanelWidget):
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Plot"))
-        self.curves = Curves(self.session.series, self._topic_names)
+        self.curves = Curves(self.world.series, self._topic_names)
         self.shown: list[PlotCurve] = []
         self.view = TimeView()
         self.stats = LegendStats()
@@ -172,14 +172,14 @@ class PlotPanel(PanelWidget):
         state = self.save_state()
         self.tools.add.dispose()
         self.curves.close()
-        self.curves = Curves(self.session.series, self._topic_names)
+        self.curves = Curves(self.world.series, self._topic_names)
         self.shown.clear()
         self.canvas.cursors.clear()
         self.cursors.setChecked(False)
         self.restore_state(state)
 
     def _topic_names(self) -> list[str]:
-        topics = [*self.session.topics, *self.session.networks.topics]
+        topics = self.world.all_topics
         return [topic.key for topic in topics]
 
     # -- curves -------------------------------------------------------------------------------------------
@@ -241,7 +241,7 @@ class PlotPanel(PanelWidget):
 
     def _is_gone(self, plot_curve: PlotCurve) -> bool:
         for name in topics_of(plot_curve.curve.source):
-            topic = self.session.topic(name)
+            topic = self.world.topic(name)
             if topic is None or topic.gone_s is not None:
                 return True
         return False
@@ -274,7 +274,7 @@ class PlotPanel(PanelWidget):
 
     def _visible_range(self) -> tuple[float, float]:
         newest = self.curves.newest_s
-        newest = self.session.series.now_s() if newest is None else newest
+        newest = self.world.series.now_s() if newest is None else newest
         starts = [float(each.curve.samples.times[0]) for each in self.shown if len(each.curve.samples)]
         return self.view.visible_range(min(starts, default=newest - self.view.span_s), newest)
 
@@ -298,7 +298,7 @@ class PlotPanel(PanelWidget):
             self.xy.show_pairs(self._pairs(), begin_s, end_s)
         else:
             self._mark_cursors(lines)
-            clock_s = (self.session.series.origin_ns + end_s * 1e9) / 1e9
+            clock_s = (self.world.series.origin_ns + end_s * 1e9) / 1e9
             canvas.show_lines(lines, clock_s)
         states = [each for each in self.shown if each.curve.is_state]
         self.lanes.show_curves(states if self.states.isChecked() and not self.is_xy else [])

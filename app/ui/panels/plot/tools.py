@@ -54,7 +54,7 @@ class FieldCatalog:
         """Subscribe to the topics whose fields can be plotted."""
         for topic in self._candidate_topics():
             if topic.key not in self._watches:
-                self._watches[topic.key] = self._session.watch_displayed(topic.key)
+                self._watches[topic.key] = self._session.shown.watch(topic.key)
 
     def close(self) -> None:
         """Unsubscribe from all topics."""
@@ -63,7 +63,7 @@ class FieldCatalog:
         self._watches.clear()
 
     def _candidate_topics(self) -> list[Topic]:
-        topics = [*self._session.topics.existing_topics(), *self._session.networks.topics]
+        topics = [*self._session.shown.topics.existing_topics(), *self._session.shown.networks.topics]
         candidates = [
             topic
             for topic in topics
@@ -74,14 +74,15 @@ class FieldCatalog:
     def topic_keys(self) -> list[str]:
         """Return the keys of all topics that exist."""
         return [
-            topic.key for topic in (*self._session.topics.existing_topics(), *self._session.networks.topics)
+            topic.key
+            for topic in (*self._session.shown.topics.existing_topics(), *self._session.shown.networks.topics)
         ]
 
     def fields(self) -> Iterable[tuple[str, PlottableField]]:
         """Yield each field that can be plotted, after the expression that plots it."""
         count = 0
         for key in self._watches:
-            topic = self._session.topic(key)
+            topic = self._session.shown.topic(key)
             newest = topic.newest if topic is not None else None
             if newest is None or newest.size_bytes > LARGE_BYTES:
                 continue

@@ -175,7 +175,7 @@ class PublishPanel(PanelWidget):
         form.show_problem(problem)
         is_armed = acting.arming.allows(Target("topic", message.topic))
         is_sending = acting.outbox.is_sending(message.id)
-        can_send = not problem and not self.session.is_replaying
+        can_send = not problem and self.world.is_live
         form.send_button.setEnabled(can_send)
         form.send_button.set_label(
             _("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock"
@@ -257,7 +257,7 @@ class PublishPanel(PanelWidget):
         if topic.msg_type != message.msg_type:
             self.form.set_type(topic.msg_type)
         self._template_topic = message.topic
-        self._template_watch = self.session.watch(message.topic)
+        self._template_watch = self.session.live.watch(message.topic)
         self.form.template_button.set_label(_("Waiting for a message"), "hourglass")
         self._poll_template()
 

@@ -204,7 +204,7 @@ class ServicesPanel(PanelWidget):
             acting.revision,
             acting.calls.revision,
             acting.arming.revision,
-            self.session.master.kind,
+            self.session.live.master.kind,
         )
         if state != self._last_state:
             self._last_state = state
@@ -240,7 +240,7 @@ class ServicesPanel(PanelWidget):
         self._show_selected()
 
     def _update_empty_state(self) -> None:
-        if self.session.master.kind == "none":
+        if self.session.live.master.kind == "none":
             self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
@@ -322,7 +322,7 @@ class ServicesPanel(PanelWidget):
         pending_call = acting.calls.in_flight
         is_own_call = pending_call is not None and pending_call.service == name
         can_call = self._parse_text().fault is None and not self._problem() and pending_call is None
-        self.call_button.setEnabled(can_call and not self.session.is_replaying)
+        self.call_button.setEnabled(can_call and self.world.is_live)
         is_armed = acting.arming.allows(Target("service", name))
         if is_own_call:
             text = _("Waiting {time}").format(time=seconds_text(acting.calls.elapsed_s))

@@ -234,7 +234,7 @@ class TimelinePanel(PanelWidget):
         focus_target.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def dispose(self) -> None:
-        if self.session.is_replaying:
+        if self.session.replay is not None:
             self.session.acting.disarm()
 
     # -- bookmarks ----------------------------------------------------------------------------------------

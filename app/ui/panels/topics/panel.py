@@ -125,15 +125,15 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self.table.refresh_visible()
 
     def _snapshot(self) -> tuple[object, ...]:
-        topics, networks = self.session.topics, self.session.networks
-        return topics.revision, len(topics), networks.revision, self.session.master.kind
+        topics, networks = self.world.topics, self.world.networks
+        return topics.revision, len(topics), networks.revision, self.session.live.master.kind
 
     def source_changed(self) -> None:
         self._last_snapshot = ()
 
     def rebuild(self) -> None:
         self._last_snapshot = self._snapshot()
-        topics = [*self.session.topics, *self.session.networks.topics]
+        topics = self.world.all_topics
         self._virtual_robots = self.session.launcher.virtual_robots
         keywords = self.filter_words()
         matches = topic_filter(keywords)
@@ -144,9 +144,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._update_counts(len(topics), len(rows) if keywords else None)
         self.show_table(bool(rows), bool(keywords))
         self.show_networks()
-        is_replaying = self.session.replay is not None
-        kinds = [network.kind for network in self.session.networks.selected_networks]
-        self.foot.setText(_(RECORDED_FOOTER_TEXT) if is_replaying else _footer_text(kinds))
+        kinds = [network.kind for network in self.world.networks.selected_networks]
+        self.foot.setText(_footer_text(kinds) if self.world.is_live else _(RECORDED_FOOTER_TEXT))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
 
@@ -164,9 +163,9 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self.table.refresh_visible()  # names of topics are formatted differently in a tree
 
     def _update_counts(self, total: int, match_count: int | None) -> None:
-        nodes = len(self.session.networks.nodes)
-        if self.session.graph is not None:
-            nodes += len(self.session.graph.nodes)
+        nodes = len(self.world.networks.nodes)
+        if self.world.graph is not None:
+            nodes += len(self.world.graph.nodes)
         if match_count is None:
             text = ngettext("{count} topic", "{count} topics", total)
         else:
@@ -179,8 +178,8 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self.filter.setVisible(total > 0)
 
     def update_empty_state(self) -> None:
-        if self.session.master.kind == "searching":
-            text = _("Address: {address}").format(address=self.session.master.address)
+        if self.session.live.master.kind == "searching":
+            text = _("Address: {address}").format(address=self.session.live.master.address)
             self.empty.set_texts(_("Searching for a master"), text, "radio-tower")
             self.empty.set_actions([])
         else:

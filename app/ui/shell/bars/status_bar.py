@@ -150,7 +150,7 @@ class StatusFormatter:
 
     def master(self) -> StatusEntry:
         """Return the state and the address of the master."""
-        master = self._session.master
+        master = self._session.live.master
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
         if master.kind == "searching":

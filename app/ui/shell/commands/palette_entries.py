@@ -101,7 +101,7 @@ class PaletteEntries:
         return [Entry(f"example:{each.path}", each.name, "blocks", each.text) for each in examples]
 
     def _topic_entries(self) -> list[Entry]:
-        topics, networks = self._session.topics, self._session.networks
+        topics, networks = self._session.shown.topics, self._session.shown.networks
         if (topics.revision, networks.revision) != self._topic_revisions:
             self._topic_revisions = topics.revision, networks.revision
             current_topics = [

@@ -57,7 +57,7 @@ class RecordCommands:
             self._shell.show_toast(reason, _("Choose topics to record"), self.open_sheet)
         elif reason:
             self._shell.show_toast(reason)
-        elif self._session.master.kind != "connected":
+        elif self._session.live.master.kind != "connected":
             self._shell.show_toast(_("Recording starts as soon as a master appears"))
         return not reason
 

@@ -220,7 +220,7 @@ class ViewCommands:
             topic_field: Topic and field path; "" is the path of the whole payload.
         """
         topic, path = topic_field
-        topic_state = self._session.topics.get(topic)
+        topic_state = self._session.shown.topics.get(topic)
         newest = topic_state.newest if topic_state is not None else None
         value: object = None
         with suppress(NepError):

@@ -424,7 +424,7 @@ class RecordSheet(Overlay):
         self._show_meters()
         self._show_topics()
         self._show_flight_recorder()
-        is_master_missing = self._session.master.kind != "connected"
+        is_master_missing = self._session.live.master.kind != "connected"
         self.foot.setText(
             _("Waiting for a master; recording starts when one appears")
             if is_master_missing
@@ -488,8 +488,8 @@ class RecordSheet(Overlay):
         set_role(self.limits_hint, "error" if message else "textSecondary")
 
     def _show_topics(self) -> None:
-        topics = sorted(self._session.topics.existing_topics(), key=lambda topic: topic.name)
-        state = (self._session.topics.revision, self.choice)
+        topics = sorted(self._session.shown.topics.existing_topics(), key=lambda topic: topic.name)
+        state = (self._session.shown.topics.revision, self.choice)
         if state != self._last_topics_state:
             self._last_topics_state = state
             selection = self._selection()

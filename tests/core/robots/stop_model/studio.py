@@ -146,7 +146,7 @@ class SimulatedStudio:
             start_processes=False,
             clock=clock.now,
         )
-        source = self.session.source
+        source = self.session.live.source
         assert isinstance(source, SimulatedSource)
         source.node, self._source = self.node, source
         fleet, runs = self.session.fleet, self.session.runs

@@ -45,7 +45,7 @@ def panel(qtbot, window) -> Iterator[PlotPanel]:
 
 
 def message(session: Session, topic: str, time_s: float, payload: object, seq: int | None = None) -> Message:
-    stamp_ns = session.series.origin_ns + round(time_s * 1e9)
+    stamp_ns = session.shown.series.origin_ns + round(time_s * 1e9)
     return Message(
         topic, json.dumps(payload).encode(), "json", "json", stamp_ns=stamp_ns, seq=seq, publisher=1
     )
@@ -53,7 +53,7 @@ def message(session: Session, topic: str, time_s: float, payload: object, seq: i
 
 def send(panel: PlotPanel, topic: str, rows, *, dropped: int = 0) -> None:
     messages = [message(panel.session, topic, time_s, payload) for time_s, payload in rows]
-    panel.session.series.dispatch({topic: Batch(messages, dropped)})
+    panel.session.shown.series.dispatch({topic: Batch(messages, dropped)})
 
 
 def show(panel: PlotPanel, *texts: str, right: bool = False) -> None:
@@ -103,14 +103,14 @@ def cell(panel: PlotPanel, name: str, column: str) -> str:
 
 def test_plot_without_curves_offers_to_add_a_curve(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
-    assert window.session.series.topics == ()
+    assert window.session.shown.series.topics == ()
     press(button(panel.empty, "Add a curve"))
     assert has_keys(panel.add)
 
 
 def test_field_added_by_another_panel_is_plotted_and_its_topic_watched(panel, window) -> None:
     panel.plot_field("/odom", "speed")
-    assert window.session.series.topics == ("/odom",)
+    assert window.session.shown.series.topics == ("/odom",)
     assert "/odom" in window.session.watched
     send(panel, "/odom", sine(0, 60))
     look(panel)
@@ -119,7 +119,7 @@ def test_field_added_by_another_panel_is_plotted_and_its_topic_watched(panel, wi
     columns = drawn(panel, panel.theme.series(0))
     assert len(columns) > 0.9 * panel.canvas.area.width()
     panel.remove("/odom.speed")
-    assert window.session.series.topics == ()
+    assert window.session.shown.series.topics == ()
     assert panel.pages.currentIndex() == 0
 
 
@@ -224,8 +224,8 @@ def test_state_changes_within_one_pixel_are_painted_once(panel) -> None:
 def test_footer_reports_undecodable_messages_and_discarded_points(panel) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(0, 60))
-    bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.series.origin_ns, publisher=1)
-    panel.session.series.dispatch({"/odom": Batch([bad])})
+    bad = Message("/odom", b"{", "json", "json", stamp_ns=panel.session.shown.series.origin_ns, publisher=1)
+    panel.session.shown.series.dispatch({"/odom": Batch([bad])})
     send(panel, "/odom", [(30, {"speed": 1})])
     look(panel)
     assert "1 message can't be decoded" in panel.caption.text()
@@ -440,7 +440,7 @@ def test_fields_are_suggested_with_values_and_accepted_by_enter(adding, window) 
     QTest.keyClick(panel.add, Qt.Key.Key_Return, Qt.KeyboardModifier.ShiftModifier)
     assert [(each.name, each.is_on_right_axis) for each in panel.shown] == [("/odom.pose.y", True)]
     assert panel.add.text() == ""
-    assert window.session.series.topics == ("/odom",)
+    assert window.session.shown.series.topics == ("/odom",)
     assert window.session.watched == ["/odom"], "nothing else is looked at any more"
 
 
@@ -484,7 +484,9 @@ def test_nonexistent_topic_stays_in_the_input_with_a_suggestion(adding) -> None:
 
 def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) -> None:
     codecs = {
-        window.session.topics[name].codec for name in window.session.watched if name in window.session.topics
+        window.session.shown.topics[name].codec
+        for name in window.session.watched
+        if name in window.session.shown.topics
     }
     assert "image" not in codecs
     adding.add.dispose()
@@ -569,10 +571,10 @@ def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, windo
         ("/odom.speed - /cmd.linear", True, False),
     ]
     assert other.span.value == "300"
-    assert sorted(other.session.series.topics) == ["/cmd", "/odom"]
+    assert sorted(other.session.shown.series.topics) == ["/cmd", "/odom"]
     assert other.save_state() == panel.save_state()
     other.dispose()
-    assert other.session.series.topics == ()
+    assert other.session.shown.series.topics == ()
 
 
 @pytest.mark.parametrize(

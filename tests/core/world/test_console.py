@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import orjson
 
-from app.core.console import MAX_TEXT_LENGTH, Console
+from app.core.world.console import MAX_TEXT_LENGTH, Console
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.own_process import OwnProgram, fresh_environ, studio_command
+from app.core.reports.own_process import OwnProgram, fresh_environ, studio_command
 from app.core.session import Session
 from app.core.storage.settings import Settings
 
@@ -55,16 +55,16 @@ def test_alert_about_a_changed_program_is_shown_and_resolved_with_its_cause(
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
     try:
         kept = program.rename(program.with_name("kept"))
-        session._check(0.0)
+        session.check()
         (alert,) = (each for each in session.alerts.active if each.id == "installation")
         assert (alert.severity, alert.count) == ("error", 0)
         assert "removed" in alert.title
         program.write_bytes(b"new")
-        session._check(1.0)
+        session.check()
         (alert,) = (each for each in session.alerts.active if each.id == "installation")
         assert "updated" in alert.title
         kept.replace(program)
-        session._check(2.0)
+        session.check()
         assert not [each for each in session.alerts.active if each.id == "installation"]
     finally:
         session.close()
@@ -76,7 +76,7 @@ def test_check_of_the_program_file_keeps_the_alert_about_a_stopped_behaviour(
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
     try:
         session.alerts.raise_alert("program", "error", "The behaviour stopped unexpectedly.")
-        session._check(0.0)
+        session.check()
         assert [each.title for each in session.alerts.active if each.id == "program"] == [
             "The behaviour stopped unexpectedly."
         ]

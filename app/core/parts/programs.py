@@ -1,0 +1,127 @@
+"""Parts of a session for programs: open behaviours, the run, and programs that Studio starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.core.alerts.alerts import Alerts
+from app.core.alerts.intents import OPEN_DOCTOR_LABEL, ConnectRobot, OpenDoctor
+from app.core.documents.open_documents import Documents
+from app.core.documents.saved_tabs import SavedTabs
+from app.core.faults import log_errors
+from app.core.network.web_pages import WebPages
+from app.core.robots.fleet import Fleet
+from app.core.robots.last_robots import LastRobots
+from app.core.robots.launcher import Launcher, LaunchFailed
+from app.core.run.control import Runs
+from app.core.run.view import RunState
+from app.core.world.console import Console
+from app.core.world.live import LiveWorld
+from app.core.world.part import SessionPart
+from nep.i18n import _, lazy
+
+
+class OpenBehaviourTabs(SessionPart):
+    """Open behaviours, which know the connected robots and the topics of the live network."""
+
+    task = lazy("save the open tabs")
+
+    def __init__(self, live: LiveWorld, fleet: Fleet, documents: Documents, tabs: SavedTabs) -> None:
+        self._live, self._fleet, self._documents, self._tabs = live, fleet, documents, tabs
+        self._fleet_revision = self._topics_revision = -1
+
+    def tick(self) -> None:
+        """Tell the behaviours about changed robots and topics."""
+        if self._fleet.revision != self._fleet_revision:
+            self._fleet_revision = self._fleet.revision
+            self._documents.set_connected([link.robot for link in self._fleet.connected])
+        topics = self._live.topics
+        if topics.revision != self._topics_revision:
+            self._topics_revision = topics.revision
+            self._documents.set_topics(sorted(topic.name for topic in topics.existing_topics()))
+
+    def check(self) -> None:
+        """Save changed tabs."""
+        self._tabs.save_if_changed()
+
+    def close(self) -> None:
+        """Save the tabs, and close the behaviours."""
+        with log_errors("save the tabs"):
+            self._tabs.save(has_ended_normally=True)
+        self._documents.close_all()
+
+
+class CurrentRun(SessionPart):
+    """Run of a behaviour."""
+
+    task = lazy("update the run")
+
+    def __init__(self, runs: Runs, fleet: Fleet, on_state: Callable[[RunState], object]) -> None:
+        # `on_state` is called with the state of the run at each tick.
+        self._runs, self._fleet, self._on_state = runs, fleet, on_state
+
+    def tick(self) -> None:
+        """Update the run, and stop robots again that have finished their actions after a Stop."""
+        self._runs.update_robots()
+        self._runs.tick()
+        self._on_state(self._runs.state)
+        for name in self._fleet.pop_settled_robots():
+            self._runs.stop_again(name)
+
+    def close(self) -> None:
+        """Stop the program and its robots."""
+        self._runs.close()
+
+
+class StartedPrograms(SessionPart):
+    """Programs that Studio starts: the master, virtual robots, and the web server."""
+
+    task = lazy("check started programs")
+
+    def __init__(
+        self,
+        live: LiveWorld,
+        launcher: Launcher,
+        last_robots: LastRobots,
+        web_pages: WebPages,
+        *,
+        starts_master: bool,
+    ) -> None:
+        self._live, self._launcher, self._last_robots = live, launcher, last_robots
+        self._web_pages, self._starts_master = web_pages, starts_master
+
+    def start(self) -> None:
+        """Start a master if none replies."""
+        if self._starts_master:
+            self._launcher.ensure_master()
+
+    def tick(self) -> None:
+        """Start the requested virtual robots."""
+        self._launcher.start_requested_robots()
+
+    def check(self) -> None:
+        """Detect programs that have exited, and start a master again if none replies."""
+        self._launcher.check()
+        self._last_robots.save(self._launcher)
+        if self._live.master.kind == "none" and self._starts_master:
+            self._launcher.ensure_master_with_backoff()
+        self._web_pages.check()
+
+    def close(self) -> None:
+        """Stop the programs, except a master that other programs use."""
+        with log_errors("save the robots"):
+            self._last_robots.save(self._launcher)
+        self._launcher.close()
+
+
+def alert_launch_failure(event: LaunchFailed, alerts: Alerts, console: Console) -> None:
+    """Raise an alert about a program that couldn't be started or has exited, and log it."""
+    console.add("error", event.name, f"{event.message} {event.detail}".strip())
+    alerts.raise_alert(
+        f"companion:{event.name}",
+        "error",
+        event.message,
+        event.detail.splitlines()[-1] if event.detail else "",
+        button=_("Restart the robot") if event.is_robot else _(OPEN_DOCTOR_LABEL),
+        intent=ConnectRobot(event.name) if event.is_robot else OpenDoctor(),
+    )
