@@ -239,7 +239,7 @@ class FaultAlerts:
             self._on_succeeded(operation)
 
     def run(self, operation: str, step: Callable[[], object]) -> None:
-        """Run one step with `guarded`, in a third of the time.
+        """Run one step as with `guarded`, but without a context manager, which is slower.
 
         Args:
             operation: Translatable phrase that completes "can't ..."; mark it with `lazy`.

@@ -37,7 +37,13 @@ from app.core.network.web_pages import WebPages, WebServerStarted
 from app.core.networks.networks import NetworkEvent
 from app.core.networks.parameters import ParameterSetter
 from app.core.parts.health import HealthChecks, MessageCounts
-from app.core.parts.programs import CurrentRun, OpenBehaviourTabs, StartedPrograms, alert_launch_failure
+from app.core.parts.programs import (
+    CurrentRun,
+    OpenBehaviourTabs,
+    RepeatedStops,
+    StartedPrograms,
+    alert_launch_failure,
+)
 from app.core.parts.robots import ConnectedRobots, RoomSync, StopConnections
 from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import SessionRecordings
@@ -165,7 +171,8 @@ class Session:
             OpenBehaviourTabs(live, fleet, documents, self.tabs),
             self.alarms,
             self.acting,
-            CurrentRun(self.runs, fleet, self.recordings.events.update_run),
+            CurrentRun(self.runs, self.recordings.events.update_run),
+            RepeatedStops(self.runs, fleet),
             HealthChecks(
                 live,
                 self._health,

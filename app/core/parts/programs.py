@@ -56,21 +56,36 @@ class CurrentRun(SessionPart):
 
     task = lazy("update the run")
 
-    def __init__(self, runs: Runs, fleet: Fleet, on_state: Callable[[RunState], object]) -> None:
+    def __init__(self, runs: Runs, on_state: Callable[[RunState], object]) -> None:
         # `on_state` is called with the state of the run at each tick.
-        self._runs, self._fleet, self._on_state = runs, fleet, on_state
+        self._runs, self._on_state = runs, on_state
 
     def tick(self) -> None:
-        """Update the run, and stop robots again that have finished their actions after a Stop."""
+        """Update the run and its robots."""
         self._runs.update_robots()
         self._runs.tick()
         self._on_state(self._runs.state)
-        for name in self._fleet.pop_settled_robots():
-            self._runs.stop_again(name)
 
     def close(self) -> None:
         """Stop the program and its robots."""
         self._runs.close()
+
+
+class RepeatedStops(SessionPart):
+    """Second Stop of robots that have finished an action after the first.
+
+    This is a part of its own, so that no failure of the run prevents it.
+    """
+
+    task = lazy("stop robots again")
+
+    def __init__(self, runs: Runs, fleet: Fleet) -> None:
+        self._runs, self._fleet = runs, fleet
+
+    def tick(self) -> None:
+        """Stop these robots again."""
+        for name in self._fleet.pop_settled_robots():
+            self._runs.stop_again(name)
 
 
 class StartedPrograms(SessionPart):

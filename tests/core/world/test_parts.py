@@ -106,3 +106,17 @@ def test_program_is_closed_before_its_robots_and_the_recorder_before_the_network
         ("LiveWorld", "StartedPrograms"),
     ):
         assert names.index(first) < names.index(later)
+
+
+def test_failing_run_does_not_prevent_the_second_stop_of_a_robot(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> None:
+        raise ValueError("no robot")
+
+    stopped: list[str] = []
+    monkeypatch.setattr(session.runs, "update_robots", fail)
+    monkeypatch.setattr(session.runs, "stop_again", stopped.append)
+    monkeypatch.setattr(session.fleet, "pop_settled_robots", lambda: ("turtle",))
+    session.tick()
+    assert stopped == ["turtle"]
