@@ -19,16 +19,16 @@ from typing import TextIO
 import nep
 from app.blocks import Program, compile_behaviour
 from app.blocks.model.workspace import Workspace, parse_workspace
-from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_action_titles
-from app.core.robots.stop.channels import StopTarget
-from app.core.robots.stop.report import StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
+from app.robots.client.discovery import FoundRobots, find_robots
+from app.robots.client.stop import StopTarget
+from app.robots.client.stop_report import StopReport
 from app.robots.description.description import Robot, parse
 from app.robots.identity import controls_of
 from nep.errors import NepError

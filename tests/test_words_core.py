@@ -27,10 +27,10 @@ from app.core.robots.health_facts import health_items
 from app.core.robots.motion.permission import MayNotMoveError, PermissionQuestion
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop.report import RobotStop, StopReport, unreached_result
 from app.core.run.view import RunState, clock_text, stop_text, view_of
 from app.errors import DocumentError
 from app.robots import simulated
+from app.robots.client.stop_report import RobotStop, StopReport, unreached_result
 from app.robots.description.description import parse, thing_description
 from app.robots.description.inputs import Parameter, check_input, value_problem
 from app.robots.description.validate import validate

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.pure.calculation import (
@@ -109,6 +108,7 @@ from app.blocks.runtime.values import (
     rounded_down,
     rounded_up,
 )  # fmt: skip
+from app.robots.client.discovery import find_robots
 from nep import node as new_node
 from nep.i18n import _
 from nep.system.streams import prepare_streams

@@ -2,13 +2,12 @@
 
 A robot is defined by its name, its topics and the node that announced it first. The master's graph lists the
 node of each publisher, and every native message contains the id of its publisher. This protects against
-programs that don't lie to the master (docs/trust.md). Except for `Senders`, the module has no state.
+programs that don't lie to the master (docs/trust.md).
 """
 
 from __future__ import annotations
 
 import hashlib
-import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,7 +15,6 @@ from typing import Protocol
 from app.robots.description.description import topic_of
 from app.robots.description.model import Robot, RobotTopics
 from nep.i18n import _, lazy
-from nep.messages.message import Message
 from nep.programs.robots.moving import DESCRIPTION_TYPE as DESCRIPTION_TYPE
 from nep.programs.robots.moving import RIZE_COMMAND_TOPIC, RobotControls
 from nep.protocol.graph_view import GraphView
@@ -24,12 +22,11 @@ from nep.text import bounded_str, strip_controls
 
 GATEWAY = "gateway"
 SHARED_TOPICS = frozenset({RIZE_COMMAND_TOPIC, "action_state"})
-"""Topics that all robots of RIZE use (`app.robots.rize`)."""
-MAX_SENDERS = 20_000
+"""Topics that all robots of RIZE use (`app.robots.client.rize`)."""
 MAX_STOP_ERROR_LENGTH = 200
 MAY_MOVE_MESSAGE = lazy("{robot} may still move: {why}")
 MAX_ERROR_LENGTH = 1000
-_NATIVE_GENERATIONS = frozenset({"native", GATEWAY})
+NATIVE_GENERATIONS = frozenset({"native", GATEWAY})
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +81,7 @@ def subscriber_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
 
 def _is_native(view: GraphView, node_id: str) -> bool:
     node = view.nodes.get(node_id)
-    return node is None or node.generation in _NATIVE_GENERATIONS
+    return node is None or node.generation in NATIVE_GENERATIONS
 
 
 def first_announcer(view: GraphView, topic: str) -> Identity | None:
@@ -193,39 +190,6 @@ def topic_conflict(robot: Robot, robots: Iterable[Robot]) -> str | None:
                     robot=robot.name, topic=topic, other=other.name
                 )
     return None
-
-
-class Senders:
-    """Table of the nodes by publisher id, as reported by the master. Thread-safe.
-
-    The table is limited to the newest 20 000 entries. A node that uses the publisher id of another node is
-    ignored while the other node is in the graph.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._nodes: dict[int, str] = {}
-
-    def update(self, view: GraphView, topics: Iterable[str]) -> None:
-        """Add the publishers of topics.
-
-        Args:
-            view: Graph of the network.
-            topics: Names of the topics.
-        """
-        with self._lock:
-            for topic in topics:
-                info = view.topics.get(topic)
-                for publisher in info.publishers if info is not None else ():
-                    if self._nodes.get(publisher.id) not in view.nodes:
-                        self._nodes[publisher.id] = publisher.node_id
-            while len(self._nodes) > MAX_SENDERS:
-                del self._nodes[next(iter(self._nodes))]
-
-    def node_of(self, message: Message) -> str | None:
-        """Return the id of the node that sent a message; None if its publisher is unknown."""
-        with self._lock:
-            return None if message.publisher is None else self._nodes.get(message.publisher)
 
 
 class RobotProcesses(Protocol):

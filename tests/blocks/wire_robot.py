@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 
 import nep
-from app.robots import rize
+from app.robots.client import rize
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
 

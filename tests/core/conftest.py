@@ -26,7 +26,7 @@ def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
     Robots get three seconds to confirm a stop, because a busy computer may need more than the default.
     """
-    monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 3.0)
+    monkeypatch.setattr("app.robots.client.limits.STOP_TIMEOUT_S", 3.0)
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     made = Session(
         Settings(tmp_path),

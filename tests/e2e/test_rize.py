@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.robots import rize
+from app.robots.client import rize
 from tests.e2e.behaviours import block, number, say, started, write
 from tests.e2e.programs import Program
 from tests.e2e.studio import Studio

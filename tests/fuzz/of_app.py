@@ -24,7 +24,7 @@ if IS_THERE:  # optional: not dependencies of the library
     from app.core.robots.voices import RobotSound
     from app.core.storage.settings import Settings
     from app.errors import DescriptionError, DocumentError
-    from app.robots import rize
+    from app.robots.client import rize
     from app.robots.description.description import parse
     from app.robots.virtual.neighbours import Neighbours
 

@@ -41,7 +41,8 @@ def Invocation(
     elapsed_s: float = 0.0, left_s: float | None = None, **more: object,
 ) -> link_module.Invocation:  # fmt: skip
     """Return an invocation that started ``elapsed_s`` ago and times out in ``left_s`` (None: never)."""
-    made = link_module.Invocation(id, action, state, feedback or {}, clock=lambda: elapsed_s, **more)  # type: ignore[arg-type]
+    more |= {"feedback": feedback or {}, "clock": lambda: elapsed_s}
+    made = link_module.Invocation(id, "Pepper", action, state, **more)  # type: ignore[arg-type]
     if left_s is not None:
         made.execution_start_s, made.timeout_s = 0.0, elapsed_s + left_s
     return made

@@ -7,38 +7,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-FINAL_STATES = ("succeeded", "failed", "canceled")
-REPLY_STATES = ("accepted", "running", *FINAL_STATES)
+from app.robots.client.task import RobotTask
 
 
-@dataclass
-class RobotCall:
+@dataclass(eq=False)
+class RobotCall(RobotTask):
     """Command to a robot and its replies. Written in the network's thread, read by a script.
 
     Attributes:
-        id: Unique id of the command.
-        robot: Name of the robot.
-        action: Name of the action.
-        output: Result of the action.
-        error: Message if the action failed, else "".
+        is_canceled_by_pause: True if a pause cancelled the command.
+        last_reply_s: Time of the robot's last reply to this program (monotonic seconds).
     """
 
-    id: str
-    robot: str
-    action: str
-    state: str = "sent"  # then accepted, running, succeeded, failed, canceled
-    output: Mapping[str, object] = field(default_factory=dict)
-    feedback: Mapping[str, object] = field(default_factory=dict)  # newest feedback that is not empty
-    error: str = ""
-    has_started: bool = False  # the robot has started the action
     is_canceled_by_pause: bool = False
-    waits_for: tuple[str, ...] = ()  # actions that the robot finishes first
-    last_reply_s: float = field(default_factory=time.monotonic)  # monotonic time of the robot's last reply
+    last_reply_s: float = field(default_factory=time.monotonic)
 
     @property
     def done(self) -> bool:
         """True after the robot's final reply."""
-        return self.state in FINAL_STATES
+        return not self.is_running
 
 
 class ProgramLink(Protocol):

@@ -5,36 +5,28 @@ from __future__ import annotations
 import logging
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
-from app.blocks.runtime.link import FINAL_STATES, REPLY_STATES, RobotCall
+from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
-from app.robots import rize
+from app.robots.client.dialects import dialect_of, new_id
+from app.robots.client.heartbeat import Heartbeat
+from app.robots.client.inbox import ReplyInbox, Senders
+from app.robots.client.reply import RobotReply
+from app.robots.client.stop import PendingStops, StopRequest, StopTarget, unproven_robots
 from app.robots.description.description import Robot
-from app.robots.heartbeat import Heartbeat
-from app.robots.identity import (
-    Senders,
-    first_announcer,
-    publisher_nodes,
-    safe_error_text,
-    stop_error_text,
-    subscriber_nodes,
-)
-from app.robots.message_buffer import PendingMessages
+from app.robots.identity import Identity, first_announcer
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 from nep.system.log_rarely import SuppressedErrors
-from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
 """Minimum interval in seconds between graph queries that look up unknown publishers."""
-MAX_PENDING_PER_PUBLISHER = 32
 
 Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -93,11 +85,6 @@ def value_of(payload: object) -> object:
     return payload
 
 
-def new_id(kind: str) -> str:
-    """Return a unique id with the prefix ``kind``."""
-    return f"{kind}-{uuid.uuid4().hex[:12]}"
-
-
 class Network:
     """Connection of a program to its robots and topics.
 
@@ -134,19 +121,17 @@ class Network:
         self._senders = Senders()
         self._view = GraphView(0, 0)
         self._replies_lock = threading.Lock()  # serializes the handling of replies
-        self._unresolved_replies = PendingMessages(per_publisher=MAX_PENDING_PER_PUBLISHER)
+        self._inbox = ReplyInbox(self._senders)
         self._lookup_requested = threading.Event()
         self._lookup_thread: threading.Thread | None = None
-        self._stop_errors: dict[str, str] = {}
         self._program = program
         self._robots = {robot.name: robot for robot in robots}
         self._robot_of = {sensor.topic: robot.name for robot in robots for sensor in robot.sensors}
         self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
         self._lock = threading.RLock()
         self._calls: dict[str, RobotCall] = {}
-        # id of a stop -> robot, and nodes that must still reply
-        self._stops: dict[str, tuple[str, set[str]]] = {}
-        self._own_stops: set[str] = set()
+        self._stops = PendingStops()
+        self._unproven_stops: Mapping[str, StopRequest] = {}
         self._newest_messages: dict[str, Message] = {}
         self._callbacks: dict[str, list[Callback]] = {}
         self._subscribed_topics: set[str] = set()
@@ -175,17 +160,17 @@ class Network:
         with suppress(NepError):  # the master is down: owners are resolved later
             self._resolve_senders()
         for robot in self._robots.values():
-            if robot.dialect != "rize":
+            if dialect_of(robot).is_identified:
                 self._heartbeat.start(robot.name, self._publishers[robot.topics.command].publish)
 
     def _open_robot(self, robot: Robot) -> None:
-        self._get_publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
-        msg_type = "json" if robot.dialect == "rize" else "robot/answer"
+        dialect = dialect_of(robot)
+        self._get_publisher(robot.topics.command, dialect.command_type)
         with self._lock:
             topic = robot.topics.reply
             if topic not in self._subscribed_topics:
                 self._subscribed_topics.add(topic)
-                self._node.new_sub(topic, msg_type, sink=self._receive_replies)
+                self._node.new_sub(topic, dialect.reply_type, sink=self._receive_replies)
 
     def close(self) -> None:
         """Stop the heartbeat and the look-up of publishers.
@@ -216,21 +201,20 @@ class Network:
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
         """Send a command to a robot; the returned call is updated as replies arrive."""
         description = self._robots[robot]
-        call = RobotCall(new_id("cmd"), robot, action)
+        call = RobotCall(new_id("cmd"), robot, action, started_s=time.monotonic())
         with self._lock:
             self._calls[call.id] = call
         self._motions.record_command(call, description, input)
-        if description.dialect == "rize":
-            self._send(description, rize.to_command(description, action, input, call.id))
-        else:
-            self._send(description, self._make_command(call.id, "invoke", action, input))
+        command = dialect_of(description).invoke(description, call.id, self._program, action, input)
+        self._send(description, command)
         return call
 
     def cancel(self, call: RobotCall) -> None:
         """Cancel a command. Has no effect for robots of RIZE, which don't support it."""
         description = self._robots[call.robot]
-        if description.dialect != "rize":
-            self._send(description, self._make_command(call.id, "cancel", call.action))
+        command = dialect_of(description).cancel(call.id, self._program, call.action)
+        if command is not None:
+            self._send(description, command)
 
     def sensor(self, robot: str, name: str) -> object:
         """Return the newest value of a sensor; None if no value has been received yet or decoding fails.
@@ -300,15 +284,17 @@ class Network:
             call.is_canceled_by_pause = call.is_canceled_by_pause or call.robot == robot.name
         self._send_stop(robot)
 
-    def _send_stop(self, robot: Robot) -> None:
-        id = new_id("stop")
+    def _send_stop(self, robot: Robot) -> StopRequest:
+        owner = self._owners.get(robot.name)
+        target = StopTarget(robot, None if owner is None else Identity(owner))
         with self._stops_changed:
-            self._own_stops.add(id)
-            self._stops[id] = (robot.name, self._stop_nodes(robot))
-        self._send(robot, self._make_command(id, "stop", robot.safe_stop.action))
+            request = self._stops.start(target, self._view, time.monotonic())
+            request.is_over = not self._is_ending  # nobody waits for the replies to a pause
+        self._send(robot, dialect_of(robot).stop(robot, request.id, self._program))
+        return request
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
-        """Stop all robots and wait for their confirmations. Robots of RIZE are skipped.
+        """Stop all robots and wait for their confirmations. Robots that can't confirm (RIZE) are skipped.
 
         Args:
             timeout_s: Maximum wait in seconds.
@@ -320,30 +306,24 @@ class Network:
         if timeout_s:
             with suppress(NepError):
                 self._resolve_senders()
-        for robot in self._robots.values():
-            if robot.dialect == "rize":
-                continue
-            self._send_stop(robot)
+        requests = [
+            self._send_stop(robot) for robot in self._robots.values() if dialect_of(robot).is_identified
+        ]
         with self._stops_changed:
-            pending_stops = self._stops
             self._stops_changed.wait_for(
-                lambda: all(name in self._stop_errors for name, _ in pending_stops.values()), timeout_s
+                lambda: all(request.has_all_replies or request.is_refused for request in requests), timeout_s
             )
-            return tuple(dict.fromkeys(name for name, _ in pending_stops.values()))
+            self._unproven_stops = unproven_robots(requests)
+            return tuple(self._unproven_stops)
 
     def stop_error(self, name: str) -> str:
         """Return the reason why a robot did not confirm its stop: the error in its reply, or no reply.
 
         The text has no full stop.
         """
-        return self._stop_errors.get(name) or _("{robot} didn't reply").format(robot=name)
-
-    def _stop_nodes(self, robot: Robot) -> set[str]:
-        # The robot's own node, and others that reply to its commands, must reply to a stop.
-        command_subscribers = set(subscriber_nodes(self._view, robot.topics.command))
-        other_nodes = command_subscribers & set(publisher_nodes(self._view, robot.topics.reply))
-        owner = self._owners.get(robot.name)
-        return {owner or "", *other_nodes}
+        request = self._unproven_stops.get(name)
+        problems = [result.problem for result in request.results()] if request is not None else []
+        return next(filter(None, problems), "") or _("{robot} didn't reply").format(robot=name)
 
     # ---- internals
 
@@ -377,11 +357,10 @@ class Network:
             self._senders.update(view, topics)
             for robot in self._robots.values():
                 first = first_announcer(view, robot.topics.description)
-                if robot.dialect != "rize" and first is not None:
+                if dialect_of(robot).is_identified and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
-            for message in self._unresolved_replies.pop_all():
-                if self._senders.node_of(message) is not None:
-                    self._handle_reply_locked(message)
+            for node, message in self._inbox.pop_listed():
+                self._handle_reply_locked(node, message)
         self._on_change()
 
     def _request_lookup(self) -> None:
@@ -402,16 +381,11 @@ class Network:
             self._closed.wait(LOOKUP_INTERVAL_S)
 
     def _is_from_robot(self, message: Message) -> bool:
-        # If the robot's own program publishes the topic, only its messages count; a camera may be another
-        # program.
-        robot = self._robot_of.get(message.topic)
-        owner = self._owners.get(robot) if robot is not None else None
-        if owner is None or owner not in publisher_nodes(self._view, message.topic):
-            return True
-        node = self._senders.node_of(message)
-        if node is None:
+        owner = self._owners.get(self._robot_of.get(message.topic, ""))
+        is_own = self._senders.is_own(self._view, message, owner)
+        if is_own is None:
             self._request_lookup()
-        return node == owner
+        return is_own is True
 
     def _receive_messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
@@ -432,102 +406,50 @@ class Network:
         with self._replies_lock:
             for message in messages:
                 with self._errors:
-                    self._handle_reply_locked(message)
+                    self._receive_reply_locked(message)
         self._on_change()
 
-    def _handle_reply_locked(self, message: Message) -> None:
-        # Call with `_replies_lock` held. The sender must be known before a reply is used.
-        node = self._senders.node_of(message)
-        is_native = any(
-            robot.dialect != "rize" and robot.topics.reply == message.topic for robot in self._robots.values()
-        )
-        if is_native and (node is None or self._unresolved_replies.has_messages_of(message.publisher)):
-            self._unresolved_replies.add(message)
+    def _receive_reply_locked(self, message: Message) -> None:
+        # The sender must be known before a reply counts, if robots on this topic can be identified.
+        robots = [robot for robot in self._robots.values() if robot.topics.reply == message.topic]
+        if not any(dialect_of(robot).is_identified for robot in robots):
+            self._handle_reply_locked(self._senders.node_of(message), message)
+            return
+        node = self._inbox.sender_of(message)
+        if node is None:
             self._request_lookup()
-            return
-        if is_native and not self._is_stop_node(message.topic, node or ""):
-            return  # skip decoding
-        payload = payload_of(message)
-        if isinstance(payload, Mapping):
-            self._apply_reply(message.topic, payload, node or "")
+        else:
+            self._handle_reply_locked(node, message)
 
-    def _is_stop_node(self, topic: str, node: str) -> bool:
-        # True for a robot's node, and for a node that must reply to a stop.
+    def _handle_reply_locked(self, node: str | None, message: Message) -> None:
+        # Call with `_replies_lock` held. Only messages of nodes whose replies count are decoded.
+        now = time.monotonic()
         with self._stops_changed:
-            is_awaited = any(node in silent_nodes for _name, silent_nodes in self._stops.values())
-        return is_awaited or any(self._is_own_reply(robot, topic, node) for robot in self._robots.values())
+            if node is not None and self._stops.is_awaited(message):
+                self._stops.receive(node, message, now)
+            self._stops_changed.notify_all()
+        for robot in self._robots.values():
+            dialect = dialect_of(robot)
+            if robot.topics.reply == message.topic and dialect.is_own(
+                robot, self._owners.get(robot.name), node, self._view
+            ):
+                reply = dialect.read(payload_of(message))
+                if reply is not None:
+                    self._apply_reply(robot, reply, now)
 
-    def _apply_reply(self, topic: str, payload: Mapping[str, object], node: str) -> None:
-        # Replies to a stop count from all nodes that must reply, others from the robot's own node only.
-        reply = payload if "state" in payload and "op" in payload else rize.from_reply(payload)
-        if reply is None:
+    def _apply_reply(self, robot: Robot, reply: RobotReply, now: float) -> None:
+        for pending_call in list(self._calls.values()):
+            if pending_call.robot == robot.name:
+                pending_call.last_reply_s = now
+        if reply.op == "stop":
+            is_external = reply.state in ("succeeded", "failed") and not self._stops.is_own(reply.id)
+            if is_external and not self._is_ending:
+                self._on_external_stop(robot.name)
             return
-        if reply.get("op") == "stop":
-            self._record_stop_reply(topic, reply, node)
-        if not any(self._is_own_reply(robot, topic, node) for robot in self._robots.values()):
-            return
-        self._record_heartbeat(topic)
-        if reply.get("op") == "stop":
-            return
-        call = self._calls.get(bounded_str(reply.get("id")))
-        # The reply to a cancel has the command's id, but only the command's own reply ends it.
-        if call is None or call.done or reply.get("op") not in (None, "invoke"):
-            return
-        state = bounded_str(reply.get("state"))
-        if self._robots[call.robot].topics.reply != topic or state not in REPLY_STATES:
-            return  # another robot's reply, or an invalid state
-        output = reply.get("output")
-        call.output = output if isinstance(output, Mapping) else {}
-        call.error = safe_error_text(reply.get("error"))
-        feedback = reply.get("feedback")
-        call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
-        call.has_started = call.has_started or state == "running"
-        waits_for = reply.get("waits_for")
-        call.waits_for = tuple(map(bounded_str, waits_for)) if isinstance(waits_for, list) else call.waits_for
-        call.state = state
-        if call.state in FINAL_STATES:
+        call = self._calls.get(reply.id)
+        if call is not None and call.robot == robot.name and call.apply(reply, now):
             self._calls.pop(call.id, None)
             self._motions.record_final_reply(call)
-
-    def _is_own_reply(self, robot: Robot, topic: str, node: str) -> bool:
-        if robot.topics.reply != topic:
-            return False
-        return robot.dialect == "rize" or self._owners.get(robot.name) == node
-
-    def _record_heartbeat(self, topic: str) -> None:
-        now = time.monotonic()
-        for call in list(self._calls.values()):
-            if self._robots[call.robot].topics.reply == topic:
-                call.last_reply_s = now
-
-    def _record_stop_reply(self, topic: str, reply: Mapping[str, object], node: str) -> None:
-        if reply.get("state") not in ("succeeded", "failed"):
-            return
-        id = bounded_str(reply.get("id"))
-        robots = [robot.name for robot in self._robots.values() if robot.topics.reply == topic]
-        sender_robots = [
-            robot.name for robot in self._robots.values() if self._is_own_reply(robot, topic, node)
-        ]
-        with self._stops_changed:
-            is_own_stop = id in self._own_stops  # also for duplicate replies
-            name, silent_nodes = self._stops.get(id, ("", set()))
-            if name in robots and node in silent_nodes:
-                if reply["state"] == "failed":
-                    self._stop_errors[name] = stop_error_text(name, reply.get("error"))
-                else:
-                    silent_nodes.discard(node)
-                    self._stop_errors.pop(name, None)
-                if not silent_nodes:
-                    del self._stops[id]
-            self._stops_changed.notify_all()
-        if not is_own_stop and not self._is_ending:
-            for name in sender_robots:
-                self._on_external_stop(name)
-
-    def _make_command(
-        self, id: str, op: str, action: str = "", input: Mapping[str, object] | None = None
-    ) -> dict[str, object]:
-        return {"id": id, "op": op, "from": self._program, "action": action, "input": dict(input or {})}
 
     def _send(self, robot: Robot, command: Mapping[str, object]) -> None:
         self._publishers[robot.topics.command].publish(command)

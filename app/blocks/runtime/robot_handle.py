@@ -19,20 +19,17 @@ from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.link import ProgramLink, RobotCall
 from app.blocks.runtime.scheduler import EndScript, Scheduler
+from app.robots.client import limits
+from app.robots.client.dialects import dialect_of
+from app.robots.client.task import is_silent
 from app.robots.description.description import Action, Parameter, Robot
 from app.robots.description.inputs import parse_value
 from app.robots.description.json_access import finite_float
 from nep.i18n import _, format_list
 
-FIRST_REPLY_TIMEOUT_S = 3.0
 FIRST_VALUE_TIMEOUT_S = 2.0
-DEFAULT_TIMEOUT_S = 60.0
-TIMEOUT_MARGIN_S = 2.0
 COMMAND_CHECK_INTERVAL_S = 0.25
 """Interval in seconds at which a pending command is checked for time limits and a silent robot."""
-MAX_MISSED_HEARTBEATS, MIN_SILENCE_S = 4, 2.0
-PAUSE_TIMEOUT_S = 3.0
-"""Timeout in seconds for an action cancelled by a pause; robots built with the kit reply within 1 s."""
 MAX_STORED_COMMANDS = 64
 """Maximum number of recent commands in `Replacements`; a robot reports a replaced command at once."""
 REPLACE = "replace"
@@ -357,16 +354,16 @@ class RobotHandle:
             self._runtime.write(skipped_message.format(**names))
 
     def _wait_for_reply(self, robot: Robot, action: Action, call: RobotCall, activity: str) -> None:
-        scheduler = self._runtime.scheduler
-        if robot.dialect == "native" and not scheduler.wait_for(
-            lambda: call.state != "sent", FIRST_REPLY_TIMEOUT_S
+        scheduler, dialect = self._runtime.scheduler, dialect_of(robot)
+        if dialect.is_identified and not scheduler.wait_for(
+            lambda: call.state != "sent", limits.FIRST_REPLY_TIMEOUT_S
         ):
             raise BehaviourError(
                 _("{name} isn't responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
-        can_pause = action.cancellable and robot.dialect == "native"
-        time_limit_s = action.timeout_s or DEFAULT_TIMEOUT_S
-        deadline = time.monotonic() + time_limit_s + TIMEOUT_MARGIN_S
+        can_pause = action.cancellable and dialect.can_cancel
+        time_limit_s = action.timeout_s or limits.DEFAULT_ACTION_TIMEOUT_S
+        deadline = time.monotonic() + time_limit_s + limits.PROGRAM_MARGIN_S
         is_waiting = bool(call.waits_for) and call.state == "accepted"
         if is_waiting:
             self._runtime.status_text.set_text(_waiting_text(robot, call))
@@ -378,7 +375,7 @@ class RobotHandle:
             ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - time.monotonic()))
         ):
             if is_waiting:  # the time limit starts with the action
-                deadline = time.monotonic() + time_limit_s + TIMEOUT_MARGIN_S
+                deadline = time.monotonic() + time_limit_s + limits.PROGRAM_MARGIN_S
                 is_waiting = not call.has_started
                 self._runtime.status_text.set_text(_waiting_text(robot, call) if is_waiting else activity)
             error_text = self._silence_error(robot, call)
@@ -393,17 +390,14 @@ class RobotHandle:
             self._cancel_for_pause(call)
 
     def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
-        if robot.heartbeat_interval_s is None:
-            return None
-        silence_s = time.monotonic() - call.last_reply_s
-        if silence_s <= max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s):
+        if not is_silent(robot, call.last_reply_s, time.monotonic()):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 
     def _cancel_for_pause(self, call: RobotCall) -> None:
         call.is_canceled_by_pause = True
         self._runtime.link().cancel(call)
-        if not self._runtime.scheduler.wait_for(lambda: call.done, PAUSE_TIMEOUT_S):
+        if not self._runtime.scheduler.wait_for(lambda: call.done, limits.PAUSE_TIMEOUT_S):
             raise BehaviourError(
                 _("{name} didn't pause, so the behaviour was stopped.").format(name=self._name)
             )

@@ -10,10 +10,10 @@ from app.core.robots.health import Health
 from app.core.robots.launcher import Launcher
 from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.core.robots.room import SessionRoom
-from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.world.live import LiveWorld
 from app.core.world.part import SessionPart
+from app.robots.client.stop import StopTarget
 from nep.i18n import lazy
 from nep.nodes.node import Node
 

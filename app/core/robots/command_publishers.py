@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.core.robots.robot_link import RobotLink
+from app.robots.client.dialects import dialect_of
 from nep.i18n import _
 from nep.nodes.node import Node
-from nep.programs.robots.moving import COMMAND_TYPE
 
 Submit = Callable[[str, Callable[[Node], None]], None]
 """Function that queues a job with the node in the source's thread. See `Source.submit`."""
@@ -30,15 +30,13 @@ class CommandPublishers:
         link.is_opening = True
 
         def open_job(node: Node) -> None:
-            is_native = link.robot.dialect == "native"
             try:
                 if link.robot.topics != topics:
                     return  # the description changed; the next graph opens the new topics
                 world_publisher = node.new_pub(topics.world, "json") if topics.world is not None else None
                 link.world_publisher = world_publisher
-                link.publisher = node.new_pub(
-                    topics.command, COMMAND_TYPE if is_native else "json", batch=False
-                )
+                command_type = dialect_of(link.robot).command_type
+                link.publisher = node.new_pub(topics.command, command_type, batch=False)
             finally:
                 link.is_opening = False
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
-from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.command_publishers import CommandPublishers, Submit, close_publishers
 from app.core.robots.invocations import ManualInvocations
 from app.core.robots.known_robots import KnownRobots
@@ -19,29 +18,27 @@ from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import (
     SENDER,
     Invocation,
-    Payload,
     RobotLink,
     excess_disconnected,
     topics_of,
 )
 from app.core.robots.robot_messages import RobotMessages
-from app.core.robots.stop.channels import MAX_TOPICS, StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
-from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S, StopReport
+from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S
 from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, UnknownRobotError
-from app.robots import rize
+from app.robots.client import rize
+from app.robots.client.announcements import Announcements, Claim, RizeNames, foreign_topic_claim
+from app.robots.client.dialects import dialect_of
+from app.robots.client.heartbeat import Heartbeat
+from app.robots.client.inbox import Senders
+from app.robots.client.limits import MAX_STOP_TOPICS
+from app.robots.client.reply import Payload
+from app.robots.client.stop import StopTarget
+from app.robots.client.stop_report import StopReport
 from app.robots.description.description import Robot, topic_of
-from app.robots.heartbeat import Heartbeat
-from app.robots.identity import (
-    AllVirtualProcesses,
-    Identity,
-    RobotProcesses,
-    Senders,
-    publisher_nodes,
-    topic_conflict,
-)
+from app.robots.identity import AllVirtualProcesses, Identity, RobotProcesses, publisher_nodes
 from nep.errors import NepError
 from nep.i18n import _
 from nep.programs.robots.moving import MovingTopics
@@ -86,7 +83,7 @@ class Fleet:
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own_filter.other_programs)
         """Robots that may move, and so must be named by a Stop."""
         self._invocations = ManualInvocations(self._send, self._heartbeat.stop, clock)
-        self._messages = RobotMessages(self._own_filter, self._invocations, self.moved, clock)
+        self._messages = RobotMessages(self._senders, self._own_filter, self._invocations, self.moved, clock)
         self._selected_name = ""
         self._has_graph = False
         self.revision = 0
@@ -183,7 +180,7 @@ class Fleet:
             self.moved.record_command(
                 [name], "form", id="" if description.repeat_s is not None else invocation.id
             )
-        if invocation.is_running and link.publisher is not None and link.robot.dialect == "native":
+        if invocation.is_running and link.publisher is not None and dialect_of(link.robot).is_identified:
             self._heartbeat.start(name, link.publisher.publish)
         return invocation
 
@@ -335,7 +332,7 @@ class Fleet:
             link.name: self._own_filter.new_programs(link, previous_view) for link in commanded_links if link
         }
         self.moved.record_new_programs(new_programs)
-        self._messages.apply_held_replies(self._links)
+        self._messages.apply_held_replies(self.links)
         for link in self._links.values():
             if link.is_connected and link.publisher is None:
                 self._publishers.open(link)
@@ -421,14 +418,13 @@ class Fleet:
     def _update_rize(self, view: GraphView) -> None:
         if self._rize_events is None and rize.EVENTS in view.topics:
             self._rize_events = self._watches.open([rize.EVENTS])
-        native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
+        native = {link.name for link in self._links.values() if dialect_of(link.robot).is_identified}
         rize_names = self._rize_names.names_in(view, native)
         for name in rize_names:
-            existing = self._links.get(name)
-            if existing is None or existing.robot.dialect == "rize":
+            if name not in native:
                 self.connect(rize.robot(name), f"{rize.COMMANDS} {name}")
         for link in self._links.values():
-            if link.robot.dialect == "rize" and link.is_connected and link.name not in rize_names:
+            if link.name not in native and link.is_connected and link.name not in rize_names:
                 self._disconnect(link)
 
     def _update_announced_robots(self) -> None:
@@ -444,7 +440,7 @@ class Fleet:
         for topic in self._foreign_claims.keys() - announced.keys():
             del self._foreign_claims[topic]
         for topic, (robot, identity) in announced.items():
-            claim = self._foreign_claim(robot)
+            claim = foreign_topic_claim(robot, (link.robot for link in self._links.values()))
             if claim is None:
                 self._foreign_claims.pop(topic, None)
                 self.connect(robot, topic, identity)
@@ -458,16 +454,6 @@ class Fleet:
         # The program is still listed, but its newest description can't be parsed.
         nodes = publisher_nodes(self._own_filter.view, topic)
         return link.identity is not None and link.identity.node_id in nodes
-
-    def _foreign_claim(self, robot: Robot) -> Claim | None:
-        # Rejects a robot whose description names topics of another robot.
-        problem = topic_conflict(robot, (link.robot for link in self._links.values()))
-        if problem is None:
-            return None
-        return Claim(
-            f"{problem}.",
-            _("{robot} is ignored. Find out what this program is, and close it.").format(robot=robot.name),
-        )
 
     def connect(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
         """Connect a robot. Does nothing if neither the robot nor its program has changed.
@@ -491,10 +477,10 @@ class Fleet:
         link.was_real = was_real
         previous, link.robot = link.robot, robot
         link.is_connected, link.gone_s = True, None
-        if previous.topics != robot.topics or previous.dialect != robot.dialect:
-            if previous.dialect == robot.dialect:
+        if previous.topics != robot.topics or dialect_of(previous) is not dialect_of(robot):
+            if dialect_of(previous) is dialect_of(robot):
                 earlier_topics = dict.fromkeys((*link.earlier_topics, previous.topics))
-                link.earlier_topics = tuple(earlier_topics)[:MAX_TOPICS]
+                link.earlier_topics = tuple(earlier_topics)[:MAX_STOP_TOPICS]
             self._close_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.reply])
@@ -558,7 +544,7 @@ class Fleet:
             del self._links[link.name]
             for topic in [topic for topic, name in self._names_by_topic.items() if name == link.name]:
                 del self._names_by_topic[topic]
-            self._messages.discard(link.name)
+            self._messages.discard(link)
             self._publishers.close(link)
             self.revision += 1
 

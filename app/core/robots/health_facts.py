@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from app.core.network.topics import Topic, Topics
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
+from app.robots.client.dialects import dialect_of
 from app.robots.description.description import Sensor
 from app.robots.description.json_access import finite_float
 from nep.i18n import _, lazy, ngettext, number, plazy
@@ -260,5 +261,5 @@ def _heartbeat_items(link: RobotLink) -> Iterable[HealthItem]:
         yield HealthItem(
             HEARTBEAT, "ok", _("every {seconds} s during actions").format(seconds=number(interval_s))
         )
-    elif link.robot.dialect == "native":
+    elif dialect_of(link.robot).is_identified:
         yield HealthItem(HEARTBEAT, "off", _("none during actions"))

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import time
-import uuid
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
-from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink
-from app.robots import rize
-from app.robots.description.description import Action, Robot
-from app.robots.identity import safe_error_text
+from app.core.robots.robot_link import SENDER, Invocation, RobotLink
+from app.robots.client.dialects import dialect_of, new_id
+from app.robots.client.limits import FIRST_REPLY_TIMEOUT_S, FORM_MARGIN_S
+from app.robots.client.reply import Payload, RobotReply
+from app.robots.client.task import is_silent
+from app.robots.description.description import Action
 from nep.i18n import _, number
-from nep.text import bounded_str
-
-FIRST_REPLY_TIMEOUT_S = 3.0
-"""Time limit in seconds for the first reply to a command."""
-GRACE_S = 0.5
-"""Time in seconds that a robot has to report the end of an action after its time limit.
-
-After that, Studio ends the invocation.
-"""
-MAX_MISSED_HEARTBEATS = 4
-MIN_SILENCE_S = 2.0
 
 
 class ManualInvocations:
@@ -43,7 +33,8 @@ class ManualInvocations:
         The invocation fails immediately if the robot can't be reached.
         """
         invocation = Invocation(
-            uuid.uuid4().hex,
+            new_id("form"),
+            link.name,
             action.name,
             started_s=self._clock(),
             clock=self._clock,
@@ -54,7 +45,8 @@ class ManualInvocations:
         link.invocations[action.name] = invocation
         link.past_invocations.append(invocation)
         link.last_contact_s = self._clock()
-        if not self._send(link, create_command(link.robot, invocation, input)):
+        command = dialect_of(link.robot).invoke(link.robot, invocation.id, SENDER, action.name, input)
+        if not self._send(link, command):
             self._end(
                 link,
                 invocation,
@@ -69,35 +61,13 @@ class ManualInvocations:
         if invocation is not None and invocation.is_running:
             self._send_cancel(link, invocation)
 
-    def apply_reply(self, link: RobotLink, reply: Payload) -> None:
+    def apply_reply(self, link: RobotLink, reply: RobotReply) -> None:
         """Apply a reply of the robot. A reply to another program only shows that the robot is responding."""
-        link.last_contact_s = link.last_reply_s = self._clock()
+        now = link.last_contact_s = link.last_reply_s = self._clock()
         link.is_unresponsive = False
         for invocation in link.running_invocations:
-            if invocation.id != reply.get("id") or reply.get("op") not in (None, "invoke"):
-                continue
-            self._apply(link, invocation, reply)
-
-    def _apply(self, link: RobotLink, invocation: Invocation, reply: Payload) -> None:
-        state = reply.get("state")
-        if not isinstance(state, str) or (state not in FINAL_STATES and state not in ("accepted", "running")):
-            return
-        # Most replies have feedback only, and a robot may flood Studio with them.
-        if "feedback" in reply:
-            invocation.feedback = _object(reply["feedback"]) or invocation.feedback
-        if "output" in reply:
-            invocation.output = _object(reply["output"]) or invocation.output
-        if "waits_for" in reply:
-            invocation.awaited_actions = _names(reply["waits_for"]) or invocation.awaited_actions
-        if "replaces" in reply:
-            invocation.replaced_actions = _names(reply["replaces"]) or invocation.replaced_actions
-        error = reply.get("error")
-        if state in FINAL_STATES:
-            self._end(link, invocation, state, safe_error_text(error) if error else None)
-            return
-        invocation.state = state
-        if state == "running" and invocation.execution_start_s is None:
-            invocation.execution_start_s = self._clock()
+            if invocation.apply(reply, now) and not link.running_invocations:
+                self._on_idle(link.name)
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
         """Cancel invocations that exceed their time limit or whose robot doesn't respond.
@@ -110,8 +80,7 @@ class ManualInvocations:
                 self._check_invocation(link, invocation, now)
 
     def _check_invocation(self, link: RobotLink, invocation: Invocation, now: float) -> None:
-        robot = link.robot
-        if robot.dialect == "native" and invocation.state == "sent":
+        if dialect_of(link.robot).is_identified and invocation.state == "sent":
             if now - invocation.started_s > FIRST_REPLY_TIMEOUT_S:
                 self._mark_unresponsive(
                     link,
@@ -119,19 +88,14 @@ class ManualInvocations:
                     _("{robot} isn't responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
-        max_silence_s = (
-            max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.heartbeat_interval_s)
-            if robot.heartbeat_interval_s
-            else None
-        )
-        if max_silence_s is not None and now - link.last_contact_s > max_silence_s:
+        if is_silent(link.robot, link.last_contact_s, now):
             error = _(
                 "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
             ).format(robot=link.name)
             self._mark_unresponsive(link, invocation, error)
             return
         remaining_s = invocation.remaining_s
-        if remaining_s is not None and remaining_s < -GRACE_S:
+        if remaining_s is not None and remaining_s < -FORM_MARGIN_S:
             link.is_unresponsive = True  # until it replies
             self._send_cancel(link, invocation)
             self._end(
@@ -148,51 +112,23 @@ class ManualInvocations:
         self._send_cancel(link, invocation)  # a robot that resumes must not continue
         self._end(link, invocation, "failed", error)
 
-    def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
+    def end_all(self, link: RobotLink, state: str, error: str = "") -> None:
         """End all invocations of a robot.
 
         Args:
             link: State of the robot.
             state: Final state of the invocations.
-            error: Error message of the invocations, or None.
+            error: Error message of the invocations, or "".
         """
         for invocation in link.running_invocations:
             self._end(link, invocation, state, error)
 
-    def _end(self, link: RobotLink, invocation: Invocation, state: str, error: str | None) -> None:
-        invocation.state, invocation.error, invocation.ended_s = state, error, self._clock()
+    def _end(self, link: RobotLink, invocation: Invocation, state: str, error: str) -> None:
+        invocation.end(state, error, self._clock())
         if not link.running_invocations:
             self._on_idle(link.name)
 
     def _send_cancel(self, link: RobotLink, invocation: Invocation) -> None:
-        if link.robot.dialect == "native":
-            self._send(
-                link, {"id": invocation.id, "op": "cancel", "from": SENDER, "action": invocation.action}
-            )
-
-
-def create_command(robot: Robot, invocation: Invocation, input: Payload) -> Payload:
-    """Return the message that invokes an action of a robot.
-
-    Args:
-        robot: Robot that receives the command.
-        invocation: Invocation of the action.
-        input: Input of the action.
-    """
-    if robot.dialect == "rize":
-        return rize.to_command(robot, invocation.action, input, invocation.id)
-    return {
-        "id": invocation.id,
-        "op": "invoke",
-        "from": SENDER,
-        "action": invocation.action,
-        "input": dict(input),
-    }
-
-
-def _names(value: object) -> tuple[str, ...]:
-    return tuple(map(bounded_str, value)) if isinstance(value, (list, tuple)) else ()
-
-
-def _object(value: object) -> Payload | None:
-    return value if isinstance(value, Mapping) else None
+        command = dialect_of(link.robot).cancel(invocation.id, SENDER, invocation.action)
+        if command is not None:
+            self._send(link, command)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.core.network.mailbox import Batch
-from app.core.robots.robot_link import Payload, RobotLink, topics_of
+from app.core.robots.robot_link import RobotLink, topics_of
+from app.robots.client.dialects import dialect_of
+from app.robots.client.inbox import Senders
+from app.robots.client.reply import Payload
 from app.robots.description.description import Robot
-from app.robots.identity import GATEWAY, Identity, Senders, identity_of, publisher_nodes, subscriber_nodes
+from app.robots.identity import Identity, identity_of, publisher_nodes, subscriber_nodes
 from nep.errors import NepError
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
@@ -40,7 +43,7 @@ class OwnMessageFilter:
                 self._serving_nodes(link, previous),
             )
             for subscriber in (
-                topic.subscribers if topic is not None and link.robot.dialect == "native" else ()
+                topic.subscribers if topic is not None and dialect_of(link.robot).is_identified else ()
             ):
                 if subscriber.node_id in serving_nodes and subscriber.node_id not in view.nodes:
                     self._suspended_programs.setdefault(link.name, {})[subscriber.id] = identity_of(
@@ -74,7 +77,7 @@ class OwnMessageFilter:
         when they resume.
         """
         link = self._links.get(name)
-        if link is None or link.robot.dialect != "native":
+        if link is None or not dialect_of(link.robot).is_identified:
             return []
         own_node = link.identity.node_id if link.identity is not None else ""
         programs = [
@@ -90,7 +93,7 @@ class OwnMessageFilter:
 
         A program serves a robot if it receives the robot's commands and publishes replies.
         """
-        if link.robot.dialect != "native":
+        if not dialect_of(link.robot).is_identified:
             return []
         earlier_nodes = self._serving_nodes(link, previous)
         return [
@@ -104,21 +107,20 @@ class OwnMessageFilter:
         replying_nodes = publisher_nodes(view, link.robot.topics.reply)
         return [node for node in subscriber_nodes(view, link.robot.topics.command) if node in replying_nodes]
 
-    def is_from_robot(self, link: RobotLink, message: Message) -> bool | None:
-        """Return True if the robot's own program sent a message; None while the sender is unknown.
+    def is_from_robot(self, link: RobotLink, node: str | None) -> bool | None:
+        """Return True if a node is the robot's own program; None while it is unknown.
 
-        As long as the program of a native robot is unknown, the result is True. Programs of RIZE can't
-        be distinguished: the result is True for every subscriber of the robot's commands, for the
-        gateway and for unknown senders.
+        As long as the program of a robot that announces itself is unknown, the result is True.
+
+        Args:
+            link: State of the robot.
+            node: Id of the node that sent a message, or None.
         """
-        if link.identity is None and link.robot.dialect == "native":
+        dialect = dialect_of(link.robot)
+        if link.identity is None and dialect.is_identified:
             return True
-        node = self._senders.node_of(message)
-        if link.robot.dialect != "native":
-            node_info = self.view.nodes.get(node or "")
-            is_gateway = node_info is None or node_info.generation == GATEWAY
-            return is_gateway or node in subscriber_nodes(self.view, link.robot.topics.command)
-        return None if node is None or link.identity is None else node == link.identity.node_id
+        own_node = link.identity.node_id if link.identity is not None else None
+        return dialect.is_own(link.robot, own_node, node, self.view)
 
     def newest_payload(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
         """Return the payload of the newest message; None if there is none or it isn't a valid mapping.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
 from app.core.robots.reported_count import ReportedCount
+from app.robots.client.reply import Payload
+from app.robots.client.task import RobotTask
 from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import Identity, is_may_move_error
 from nep.i18n import _, lazy
@@ -22,7 +24,6 @@ MAX_DISCONNECTED = 200
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
-FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 STATE_LABELS = {
     NOT_STOPPED: lazy("not stopped"),
     STOPPING: lazy("stopping"),
@@ -34,35 +35,19 @@ STATE_LABELS = {
 }
 """Display text for each value of `RobotLink.state`."""
 
-Payload = Mapping[str, object]
 
-
-@dataclass(slots=True, eq=False)
-class Invocation:
+@dataclass(eq=False)
+class Invocation(RobotTask):
     """Manual invocation of an action.
 
     Attributes:
-        state: State in the robot's last reply; "sent" before the first reply.
-        awaited_actions: Actions that must end before this one starts, while the state is "accepted".
-        replaced_actions: Actions that were cancelled by this one.
         timeout_s: Time limit in seconds, measured from the start of execution; None for no limit.
         sent_at_s: Time of sending in seconds since 1970.
     """
 
-    id: str
-    action: str
-    state: str = "sent"
-    feedback: Payload = field(default_factory=dict)
-    output: Payload = field(default_factory=dict)
-    error: str | None = None
-    started_s: float = 0.0
-    ended_s: float | None = None
     clock: Callable[[], float] = time.monotonic
     input: Payload = field(default_factory=dict)
     timeout_s: float | None = None
-    execution_start_s: float | None = None
-    awaited_actions: tuple[str, ...] = ()
-    replaced_actions: tuple[str, ...] = ()
     sent_at_s: float = 0.0
 
     @property
@@ -71,11 +56,6 @@ class Invocation:
         if self.timeout_s is None or self.execution_start_s is None:
             return None
         return self.execution_start_s + self.timeout_s - self.clock()
-
-    @property
-    def is_running(self) -> bool:
-        """True until the invocation has a final state: the robot reports the end, or the invocation fails."""
-        return self.state not in FINAL_STATES
 
     @property
     def elapsed_s(self) -> float:

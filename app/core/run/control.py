@@ -17,8 +17,7 @@ from app.core.alerts.alerts import Alerts
 from app.core.documents.document import Document
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import actions_by_robot
-from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted, StopReport
-from app.core.robots.stop.stopper import STOP_TIMEOUT_S as STOP_TIMEOUT_S
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.asking import OpenQuestion
 from app.core.run.block_errors import BlockErrors
@@ -39,6 +38,8 @@ from app.core.run.view import (
 )
 from app.core.world.console import Console
 from app.errors import AppError
+from app.robots.client.limits import STOP_TIMEOUT_S as STOP_TIMEOUT_S
+from app.robots.client.stop_report import StopReport
 from nep.i18n import _
 
 DOUBLE_CLICK_INTERVAL_S = 0.5

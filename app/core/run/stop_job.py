@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.core.faults import log_errors
-from app.core.robots.stop.report import LateReply, RobotReplied, RobotStop, RobotStopped, StopCompleted
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper, stop_and_report
 from app.core.run.runner import Runner
+from app.robots.client.stop_report import RobotStop
 
 PostEvent = Callable[[object], None]
 

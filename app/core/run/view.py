@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S, RobotStop, StopReport, StopStatus
+from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S
+from app.robots.client.stop_report import RobotStop, StopReport, StopStatus
 from nep.i18n import _, format_list, lazy, ngettext, number
 
 MAX_NAMED = 4

@@ -15,7 +15,7 @@ from app.blocks.model.program import Program
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.publishing import PublishGuard, guarded_topics, robots_moved_by
-from app.robots import rize
+from app.robots.client import rize
 from nep.masters.master import Master
 from tests.blocks.samples import block, robot, started, text, workspace
 from tests.blocks.wire_robot import WireRobot

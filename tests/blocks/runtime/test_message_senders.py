@@ -9,9 +9,9 @@ from typing import ClassVar
 import pytest
 
 import nep
-from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.network import Network
+from app.robots.client.discovery import find_robots
 from app.robots.description.description import Robot
 from app.robots.identity import subscriber_nodes
 from nep.masters.master import Master
@@ -28,7 +28,7 @@ class Program:
     told: ClassVar = {
         "another topic": r".*/Evil/description announces Pepper.*",
         "two programs": "2 programs announce themselves as Pepper\\..*“Pepper”.*“evil”.*",
-        "foreign topic": ("Evil claims /Pepper/LEAF, which belongs to Pepper; Evil is ignored\\."),
+        "foreign topic": "Evil claims /Pepper/LEAF, which belongs to Pepper\\. Evil is ignored.*",
     }
 
     def __init__(self, node: nep.Node) -> None:

@@ -87,7 +87,7 @@ def test_canceled_action_is_not_an_error():
 
 
 def test_robot_that_does_not_reply_is_named(monkeypatch):
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_REPLY_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("app.robots.client.limits.FIRST_REPLY_TIMEOUT_S", 0.05)
     link = FakeLink()
     link.answers = {"say": ("sent", {}, "")}
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
@@ -97,7 +97,7 @@ def test_robot_that_does_not_reply_is_named(monkeypatch):
 
 
 def test_action_that_never_ends_is_canceled(monkeypatch):
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.95)
+    monkeypatch.setattr("app.robots.client.limits.PROGRAM_MARGIN_S", -29.95)
     link = FakeLink()
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)

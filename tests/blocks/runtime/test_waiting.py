@@ -27,7 +27,7 @@ class Queued(FakeLink):
 
 
 def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.5)  # time limit of 0.5 s
+    monkeypatch.setattr("app.robots.client.limits.PROGRAM_MARGIN_S", -29.5)  # time limit of 0.5 s
     link = Queued()
     run = begin(link)
     until(lambda: bool(link.calls))
@@ -44,7 +44,7 @@ def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkey
 
 
 def test_robot_whose_heartbeat_stops_is_an_error_at_the_block(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.MIN_SILENCE_S", 0.3)
+    monkeypatch.setattr("app.robots.client.limits.MIN_SILENCE_S", 0.3)
     link = FakeLink()
     link.held = {"say"}
     run = begin(link, beat_s=0.05)

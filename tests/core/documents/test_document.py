@@ -17,7 +17,7 @@ from app.core.documents.document import CompiledProgram, Document, read
 from app.core.documents.journal import Journal, unsaved_work
 from app.core.storage.atomic_file import MAX_BYTES
 from app.errors import DocumentError
-from app.robots import rize
+from app.robots.client import rize
 from tests.blocks.fakes import until
 
 EMPTY: dict[str, object] = {}

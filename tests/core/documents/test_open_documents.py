@@ -13,7 +13,7 @@ from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.journal import Journal, unsaved_work
 from app.core.documents.open_documents import MAX_CLOSED_TABS, Documents
 from app.errors import DocumentError
-from app.robots import rize
+from app.robots.client import rize
 
 STARTED: dict[str, object] = {
     "blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "a", "x": 1, "y": 2}]}

@@ -9,10 +9,10 @@ import pytest
 
 from app.core.recording import events as events_module
 from app.core.recording.events import RecordedEvents
-from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.robots.client.stop_report import RobotStop, StopReport
 from nep.programs.alarms import AlarmCondition, AlarmEvent, AlarmRule
 
 RUNNING = RunState("running", "Greeting", is_started=False, started_s=1.0)

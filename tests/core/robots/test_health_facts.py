@@ -10,7 +10,8 @@ from app.core.network.topics import Topic
 from app.core.robots.health_facts import LOW_BATTERY_PERCENT, HealthItem, health_items
 from app.core.robots.reported_count import GROWTH_WINDOW_S, ReportedCount
 from app.core.robots.robot_link import RobotLink
-from app.robots import rize, simulated
+from app.robots import simulated
+from app.robots.client import rize
 from app.robots.description.description import DataField, Sensor, parse, thing_description
 
 PEPPER = parse(thing_description(simulated.ROBOT.thing_model, "Pepper"))

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from app.core.robots.invocations import FIRST_REPLY_TIMEOUT_S, GRACE_S, ManualInvocations
-from app.core.robots.robot_link import MAX_PAST_INVOCATIONS, Invocation, Payload, RobotLink
+from app.core.robots.invocations import ManualInvocations
+from app.core.robots.robot_link import MAX_PAST_INVOCATIONS, Invocation, RobotLink
+from app.robots.client.limits import FIRST_REPLY_TIMEOUT_S, FORM_MARGIN_S
+from app.robots.client.reply import Payload, parse_reply
 from app.robots.description.description import Action, Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 
@@ -40,12 +42,17 @@ class Bench:
 
     def answer(self, made: Invocation, state: str, **more: object) -> None:
         told = {"id": made.id, "op": "invoke", "action": made.action, "state": state}
-        self.tries.apply_reply(self.link, {**told, **more})
+        self.receive({**told, **more})
+
+    def receive(self, payload: Payload) -> None:
+        reply = parse_reply(payload)
+        assert reply is not None
+        self.tries.apply_reply(self.link, reply)
 
     def pass_time(self, seconds: float, *, alive: bool = False) -> None:
         self.now += seconds
         if alive:
-            self.tries.apply_reply(self.link, {"op": "alive", "id": "", "state": "running"})
+            self.receive({"op": "alive", "id": "", "state": "running"})
         self.tries.check_timeouts([self.link])
 
 
@@ -59,7 +66,7 @@ def test_invocation_passes_through_its_states_and_is_recorded(bench) -> None:
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
     bench.answer(made, "accepted", replaces=["turn"])
-    assert (made.state, made.replaced_actions, made.remaining_s) == ("accepted", ("turn",), None)
+    assert (made.state, made.replaces, made.remaining_s) == ("accepted", ("turn",), None)
     bench.answer(made, "running")
     bench.now += 4
     bench.answer(made, "running", feedback={"moved": 0.2})
@@ -86,7 +93,7 @@ def test_invocation_fails_after_three_seconds_without_reply(bench) -> None:
     assert (made.state, made.error) == ("failed", "Turtle isn't responding. Check that it is switched on.")
     assert bench.sent[-1]["op"] == "cancel"  # in case the robot responds again
     assert (bench.link.state, bench.link.chip_text) == ("silent", "virtual, not responding")
-    bench.tries.apply_reply(bench.link, {"op": "alive", "id": ""})
+    bench.receive({"op": "alive", "id": ""})
     assert bench.link.state == "ready"
 
 
@@ -110,9 +117,9 @@ def test_invocation_of_robot_without_heartbeat_waits_until_the_time_limit(bench)
     bench.answer(made, "running")
     bench.pass_time(59.0)
     assert made.is_running
-    bench.pass_time(1.0 + GRACE_S / 2)
+    bench.pass_time(1.0 + FORM_MARGIN_S / 2)
     assert made.is_running  # grace period in which the robot may report the timeout itself
-    bench.pass_time(GRACE_S)
+    bench.pass_time(FORM_MARGIN_S)
     assert (made.state, made.error) == ("failed", "move took longer than 60 s")
     assert bench.sent[-1]["op"] == "cancel"
     bench.answer(made, "succeeded")
@@ -124,7 +131,7 @@ def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
     bench.answer(made, "accepted", waits_for=["turn", "turn"])
     for _ in range(200):
         bench.pass_time(0.5, alive=True)
-    assert (made.state, made.awaited_actions) == ("accepted", ("turn", "turn"))
+    assert (made.state, made.waits_for) == ("accepted", ("turn", "turn"))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +149,7 @@ def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
 def test_foreign_and_invalid_replies_do_not_end_an_invocation(bench, answer) -> None:
     made = bench.begin()
     bench.answer(made, "running")
-    bench.tries.apply_reply(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
+    bench.receive({**answer, "id": made.id} if answer.get("mine") else answer)
     assert made.state == "running"
 
 
@@ -150,7 +157,7 @@ def test_second_final_reply_is_ignored(bench) -> None:
     made = bench.begin()
     bench.answer(made, "succeeded")
     bench.answer(made, "failed", error="no")
-    assert (made.state, made.error) == ("succeeded", None)
+    assert (made.state, made.error) == ("succeeded", "")
 
 
 def test_invocation_of_unreachable_robot_fails_at_once(bench) -> None:

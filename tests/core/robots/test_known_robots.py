@@ -11,7 +11,7 @@ from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
 from app.core.robots.known_robots import MAX_ROBOTS, SETTING_KEY, KnownRobot, KnownRobots
 from app.core.storage.settings import Settings
-from app.robots import rize
+from app.robots.client import rize
 
 
 def robot(name: str, *, virtual: bool = False):

@@ -17,8 +17,8 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.runtime.find_robots import find_robots
 from app.core.run.runner import Runner
+from app.robots.client.discovery import find_robots
 from nep.messages.message import Message
 from tests.blocks.samples import block, number, started, workspace
 from tests.core.run.test_runner import Heard

@@ -162,8 +162,8 @@ def test_run_prints_the_rejection_message_of_the_robot(master: Master, arm: Driv
 @pytest.fixture
 def patient(session: Session, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Session with stop timeouts longer than any test."""
-    monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 120.0)
-    monkeypatch.setattr("app.core.robots.stop.stopper.MAX_STOP_TIMEOUT_S", 120.0)
+    monkeypatch.setattr("app.robots.client.limits.STOP_TIMEOUT_S", 120.0)
+    monkeypatch.setattr("app.robots.client.limits.MAX_STOP_TIMEOUT_S", 120.0)
     return session
 
 

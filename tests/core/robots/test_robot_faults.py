@@ -193,7 +193,7 @@ def test_duplicate_and_foreign_replies_are_ignored(session: Session, liar: Liar,
     again = session.fleet.invoke("Turtle", "light", {})
     liar.say(again, "succeeded")
     tick_until(session, lambda: again.state == "succeeded")  # in order, so the earlier replies were read
-    assert (tried.state, tried.error, tried.output) == ("succeeded", None, {"moved": 0.5})
+    assert (tried.state, tried.error, tried.output) == ("succeeded", "", {"moved": 0.5})
 
 
 def test_malformed_replies_are_ignored(session: Session, liar: Liar, tried: Invocation) -> None:

@@ -13,11 +13,10 @@ import pytest
 from app.core.alerts.alerts import Alerts
 from app.core.network.topics import Topics
 from app.core.network.watches import Watches
-from app.core.robots.announcements import RizeNames
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RESTART_TIMEOUT_S, Health
 from app.core.robots.robot_link import MAX_DISCONNECTED, RobotLink
-from app.core.robots.stop.report import RobotStop, StopReport
+from app.robots.client.stop_report import RobotStop, StopReport
 from app.robots.description.description import RobotTopics, topic_of
 from app.robots.identity import Identity
 from nep.nodes.node import Node
@@ -201,10 +200,3 @@ def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None
         runs._run = replace(runs.state, state="ready")
     finally:
         lab.close()
-
-
-def test_number_of_rize_robot_names_is_limited() -> None:
-    names = RizeNames()
-    for number in range(1000):
-        names.add(f"Robot{number}")
-    assert len(names._announced_names) <= MAX_DISCONNECTED

@@ -10,9 +10,9 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.robots.stop.channels import StopTarget
-from app.core.robots.stop.report import RobotStop, StopReport, unreached_result
 from app.core.robots.stop.stopper import RobotStopper
+from app.robots.client.stop import StopTarget
+from app.robots.client.stop_report import RobotStop, StopReport, unreached_result
 from app.robots.description.description import RobotTopics
 from app.robots.identity import first_announcer, identity_of
 from nep.errors import AddressInUseError
@@ -256,12 +256,11 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
 
     stopper.stop_all(timeout_s=0.1, on_late=late)
     (command,) = pepper.heard("stop")
-    (asked,) = stopper._requests.values()
     answer = {"id": command["id"], "op": "stop", "action": "stop", "state": "failed", "error": "stuck"}
     publisher = pepper._answer._spec.id
     topic, payload = pepper.described.topics.reply, json.dumps(answer).encode()
     with stopper._changed:
-        asked.unknown_replies.add(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
+        stopper._inbox.hold(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
     stopper.update_graph(stopper._node.graph())
     until(lambda: free == [True])
 

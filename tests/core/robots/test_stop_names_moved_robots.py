@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.robots.announcements import MAX_ROBOTS
 from app.core.session import CHECK_INTERVAL_S
+from app.robots.client.limits import MAX_ROBOTS
 from nep.messages.message import Message
 from tests.core.robots.stop_model.lab import SimulatedLab
 from tests.core.robots.stop_model.network import LEASE_S

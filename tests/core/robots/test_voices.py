@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.stop.report import StopReport
 from app.core.robots.voices import (
     MAX_NOTES_S,
     MAX_QUEUED,
@@ -14,6 +13,7 @@ from app.core.robots.voices import (
     RobotVoices,
     Speaker,
 )
+from app.robots.client.stop_report import StopReport
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from tests.ui.fakes import Session

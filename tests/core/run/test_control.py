@@ -7,12 +7,13 @@ from typing import cast
 
 import pytest
 
-from app.core.robots.stop.report import RobotStopped, StopCompleted, StopReport
+from app.core.robots.stop.report import RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
 from app.core.run.stop_job import stop_program, stop_robot
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.robots.client.stop_report import StopReport
 from tests.blocks.fakes import until
 
 

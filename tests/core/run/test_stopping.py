@@ -7,9 +7,9 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
-from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
+from app.robots.client.stop_report import RobotStop, StopReport
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, say, started, workspace
 from tests.blocks.wire_robot import RizeRobot, WireRobot

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState, duration_text, stop_text, view_of
+from app.robots.client.stop_report import RobotStop, StopReport
 
 PEPPER = RobotStop("Pepper", True, 38.2)
 TURTLE = RobotStop("Turtle", True, 41.4)

@@ -10,10 +10,10 @@ import threading
 import pytest
 
 import nep
+from app.robots.client.heartbeat import Heartbeat
 from app.robots.description.inputs import Parameter, input_problems
 from app.robots.driver.driver import Driver, EventLoop
 from app.robots.driver.receiver import MAX_COMMAND_BYTES
-from app.robots.heartbeat import Heartbeat
 from tests import hostile
 from tests.robots.conftest import TURTLE, Ears, eventually
 

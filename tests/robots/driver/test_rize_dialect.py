@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.blocks.runtime.network import Network
 from app.errors import RobotInputError
-from app.robots import rize
+from app.robots.client import rize
 from tests.robots.conftest import Ears, eventually
 from tests.robots.driver.test_process import network, start
 from tests.robots.virtual.test_simulated import pepper

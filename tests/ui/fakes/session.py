@@ -21,9 +21,9 @@ from app.core.network import doctor as doctor_module
 from app.core.network.master import MasterState
 from app.core.network.topics import Topic
 from app.core.robots.robot_link import RobotLink, topics_of
-from app.core.robots.stop.report import StopReport
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
+from app.robots.client.stop_report import StopReport
 from app.robots.description.model import Robot
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber

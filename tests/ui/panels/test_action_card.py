@@ -42,8 +42,8 @@ def tried(state: str = "running", **more: object) -> Invocation:
     ("made", "words"),
     [
         (tried("sent"), "sent"),
-        (tried("accepted", awaited_actions=("say", "show_emotion")), "waits for say and show emotion"),
-        (tried("accepted", replaced_actions=("turn",)), "replaces turn"),
+        (tried("accepted", waits_for=("say", "show_emotion")), "waits for say and show emotion"),
+        (tried("accepted", replaces=("turn",)), "replaces turn"),
         (tried(feedback={"moved": 0.2}), "moved 0.20 m"),
         (tried(elapsed_s=2.14), "for 2.1 s"),
     ],

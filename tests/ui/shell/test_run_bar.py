@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.robots.stop.report import StopStatus
 from app.core.run.view import RunView
+from app.robots.client.stop_report import StopStatus
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.command import Command
 from app.ui.shell.bars.run_bar import SPEED_COMMANDS, RunBar, ToolBar

@@ -16,10 +16,10 @@ from app.core.alerts.intents import ShowAlarms
 from app.core.messages import snapshots
 from app.core.network.remote_access import RemoteAccess
 from app.core.robots.motion.permission import MotionPermission
-from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.robots.client.stop_report import RobotStop, StopReport
 from app.ui.application import startup_problem, translate_qt
 from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from app.ui.shell.bars.app_bar import robots_chip

@@ -6,14 +6,11 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from app.robots.description.description import Robot, RobotTopics
-from app.robots.identity import Identity
+from app.robots.client.stop import StopTarget
+from app.robots.description.description import RobotTopics
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
-
-MAX_TOPICS = 32
-"""Maximum number of command topics of one robot. Current topics take precedence over earlier ones."""
 
 
 class StopPublisher(Protocol):
@@ -78,30 +75,6 @@ class StopNode(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class StopTarget:
-    """Robot to be stopped.
-
-    Attributes:
-        identity: Program of the robot; None for the first program that announced the robot.
-        earlier_programs: Earlier programs with the robot's name that may still be running and move the robot.
-        earlier_topics: Topics of earlier descriptions.
-        is_expected: False if the reply is not awaited. The Stop is then sent in case the robot still
-            receives commands.
-    """
-
-    robot: Robot
-    identity: Identity | None = None
-    earlier_programs: tuple[Identity, ...] = ()
-    earlier_topics: tuple[RobotTopics, ...] = ()
-    is_expected: bool = True
-
-    @property
-    def topic_sets(self) -> tuple[RobotTopics, ...]:
-        """Topics for the Stop: topics of the current description, then topics of earlier descriptions."""
-        return tuple(dict.fromkeys((self.robot.topics, *self.earlier_topics)))[:MAX_TOPICS]
-
-
 @dataclass
 class StopChannel:
     """Publisher on one command topic of a robot, and subscriber to the replies.
@@ -160,11 +133,6 @@ class StopLine:
     def name(self) -> str:
         """Name of the robot."""
         return self.target.robot.name
-
-    @property
-    def reply_topics(self) -> set[str]:
-        """Topics of the robot's replies."""
-        return {topic_set.reply for topic_set in self.target.topic_sets}
 
     @property
     def is_complete(self) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from app.core.robots.stop.report import StopReport
+from app.robots.client.stop_report import StopReport
 from app.robots.identity import Identity
 from nep.i18n import _, lazy
 

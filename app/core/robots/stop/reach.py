@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop.channels import StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
+from app.robots.client.dialects import REPLY_TYPE
+from app.robots.client.stop import StopTarget
 from app.robots.description.description import Robot, RobotTopics, SafeStop, topic_of
 from app.robots.identity import identity_of, publisher_nodes, subscriber_nodes
+from nep.programs.robots.moving import COMMAND_TYPE
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
 """Maximum number of unlisted robots that a Stop is sent to; further robots are reported as not reached."""
 MAX_ABSENT = 64
 """Maximum number of disconnected robots that a Stop is sent to because they replied earlier."""
-_COMMAND_TYPE, _REPLY_TYPE = "robot/command", "robot/answer"
 _DEFAULT_SAFE_STOP = SafeStop(
     "stop", None, 0.0, stops_on_program_end=True, stops_on_disconnect=True, can_confirm=True
 )
@@ -80,8 +81,8 @@ def unlisted_targets(
     if not descriptions:
         return ()
     subscribed_topics, published_topics = (
-        _topics_by_node(view, _COMMAND_TYPE),
-        _topics_by_node(view, _REPLY_TYPE),
+        _topics_by_node(view, COMMAND_TYPE),
+        _topics_by_node(view, REPLY_TYPE),
     )
     targets = []
     for topic in descriptions:
@@ -118,7 +119,7 @@ def _topics_by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:
             nodes = (
-                subscriber_nodes(view, topic) if msg_type == _COMMAND_TYPE else publisher_nodes(view, topic)
+                subscriber_nodes(view, topic) if msg_type == COMMAND_TYPE else publisher_nodes(view, topic)
             )
             for node in nodes:
                 topics_by_node.setdefault(node, []).append(topic)

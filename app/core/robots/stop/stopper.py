@@ -12,61 +12,45 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
+from dataclasses import dataclass
 
 from app.core.faults import error_text
-from app.core.robots.stop.channels import StopChannel, StopLine, StopNode, StopTarget
-from app.core.robots.stop.report import RobotStop, StopReport
-from app.core.robots.stop.request import StopRequest
-from app.robots import rize
+from app.core.robots.stop.channels import StopChannel, StopLine, StopNode
+from app.robots.client.dialects import dialect_of, new_id
+from app.robots.client.inbox import ReplyInbox, Senders
+from app.robots.client.limits import stop_timeout_s
+from app.robots.client.stop import PendingStops, StopRequest, StopTarget
+from app.robots.client.stop_report import RobotStop, StopReport
 from app.robots.description.description import Robot, RobotTopics
-from app.robots.identity import (
-    Senders,
-    first_announcer,
-    identity_of,
-    publisher_nodes,
-    stop_error_text,
-    subscriber_nodes,
-)
-from app.robots.message_buffer import PendingMessages
+from app.robots.identity import identity_of, subscriber_nodes
 from nep.errors import NepError
-from nep.i18n import _, lazy, ngettext
+from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 _log = logging.getLogger("studio")
-RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
-LATE_REPLY_TIMEOUT_S = 120.0
-"""Time in seconds after a Stop during which late replies are accepted."""
-MAX_LATE_REQUESTS = 64
-MAX_SERVING_PROGRAMS = 32
-"""Maximum number of programs of one robot whose replies are awaited."""
-MAX_NAMED_LISTENERS = 4
-"""Maximum number of programs that only subscribe to a robot's commands and are included in a report."""
 POLL_INTERVAL_S = 0.02
 """Interval in seconds at which the state of a connection is checked."""
 GRAPH_POLL_INTERVAL_S = 0.1
 """Minimum interval in seconds between graph queries while the publisher of a reply is unknown."""
 GRAPH_TIMEOUT_S = 0.3
-_UNKNOWN_PROGRAM = "nobody"
-"""Placeholder for the program of a robot that the graph does not list yet."""
 
-STOP_TIMEOUT_S = 1.0
-"""Default time limit of a Stop in seconds. A robot's description may require a longer time."""
-TIMEOUT_MARGIN_S = 0.5
-MAX_STOP_TIMEOUT_S = 10.0
+LateReplies = list[tuple[Callable[[RobotStop], object], RobotStop]]
 
 
-def stop_timeout_s(robots: Iterable[Robot], max_timeout_s: float = MAX_STOP_TIMEOUT_S) -> float:
-    """Return the time limit in seconds for a Stop, which exceeds the time limits of the robots' drivers.
+@dataclass(frozen=True)
+class _Delivery:
+    """Connections of a pending Stop.
 
-    Args:
-        robots: Robots to stop.
-        max_timeout_s: Maximum of the result.
+    Attributes:
+        on_late: Called with each reply after the timeout, or None.
+        program_key: Key of a program whose further commands the robot rejects, or None.
     """
-    needed_s = max((robot.safe_stop.within_s + TIMEOUT_MARGIN_S for robot in robots), default=0.0)
-    return min(max_timeout_s, max(STOP_TIMEOUT_S, needed_s))
+
+    line: StopLine
+    on_late: Callable[[RobotStop], object] | None
+    program_key: str | None
 
 
 class RobotStopper:
@@ -76,7 +60,7 @@ class RobotStopper:
         self,
         node: StopNode,
         clock: Callable[[], float] = time.monotonic,
-        max_timeout_s: float = MAX_STOP_TIMEOUT_S,
+        max_timeout_s: float | None = None,
     ) -> None:
         # `max_timeout_s` limits the wait for replies. Robots are added by `set_robots`.
         self._max_timeout_s = max_timeout_s
@@ -87,13 +71,16 @@ class RobotStopper:
         self._opening_lock = threading.Lock()  # held while opening connections
         self._opener_threads: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
-        self._requests: dict[str, StopRequest] = {}
+        self._stops = PendingStops(node.id)
+        self._deliveries: dict[str, _Delivery] = {}
+        """Connections of each pending Stop, by its id."""
         self._view: GraphView | None = None
         self._subscribed_nodes: dict[
             str, frozenset[str]
         ] = {}  # subscribed nodes by command topic, of this view
         self._graph_queried_s = 0.0
         self._senders = Senders()
+        self._inbox = ReplyInbox(self._senders)
 
     def update_graph(self, view: GraphView) -> None:
         """Apply a new graph, which determines the programs that serve each robot and must confirm a Stop."""
@@ -103,11 +90,11 @@ class RobotStopper:
             self._senders.update(
                 view, {topic_set.reply for target in targets for topic_set in target.topic_sets}
             )
-            late_replies = [
-                reply
-                for request in self._requests.values()
-                for reply in self._apply_held_replies_locked(request)
-            ]
+            now = self._clock()
+            results = self._stops.update(view, now)
+            for node, message in self._inbox.pop_listed():
+                results += self._stops.receive(node, message, now)
+            late_replies = self._late_replies_locked(results)
             self._changed.notify_all()
         for notify, reply in late_replies:
             notify(reply)
@@ -169,23 +156,14 @@ class RobotStopper:
         A Stop is pending for at most `LATE_REPLY_TIMEOUT_S` seconds.
         """
         with self._changed:
-            now = self._clock()
-            pending_requests = [
-                request
-                for request in self._requests.values()
-                if request.is_over and now - request.sent_s <= LATE_REPLY_TIMEOUT_S
-            ]
-        for request in pending_requests:
+            late_requests = self._stops.late_requests(self._clock())
+        for request in late_requests:
             self._deliver(request)
 
     def discard_late(self, names: Iterable[str]) -> None:
         """Discard pending Stops of robots that have stopped according to the user."""
-        stopped_names = set(names)
         with self._changed:
-            for id in [
-                id for id, each in self._requests.items() if each.is_over and each.line.name in stopped_names
-            ]:
-                del self._requests[id]
+            self._stops.discard(names)
 
     @property
     def problems(self) -> Mapping[str, str]:
@@ -204,7 +182,7 @@ class RobotStopper:
             program_key: Key of a program (`app.robots.identity`) whose further commands the robots reject.
         """
         for line in self._select_lines(names):
-            self._send(line, _new_id(), program_key)
+            self._send(line, new_id("stop"), program_key)
 
     def stop_all(
         self,
@@ -238,7 +216,7 @@ class RobotStopper:
         requests = [self._start_request(line, program_key, on_late) for line in lines]
         if is_for_all:
             for line in self._unexpected_lines():
-                self._send(line, _new_id(), program_key)
+                self._send(line, new_id("stop"), program_key)
         self._retry_missing_channels(requests)
         if timeout_s is None:
             timeout_s = stop_timeout_s((line.target.robot for line in lines), self._max_timeout_s)
@@ -257,15 +235,11 @@ class RobotStopper:
         # Waits until all requests are settled, or the deadline; returns the reported (request, node) pairs.
         reported: set[tuple[str, str]] = set()
         while True:
-            self._query_graph_if_needed(requests)
+            self._query_graph_if_needed()
             undelivered = [request for request in requests if not self._deliver(request)]
             with self._changed:
                 remaining_s = deadline_s - self._clock()
-                pause_s = (
-                    min(remaining_s, GRAPH_POLL_INTERVAL_S)
-                    if any(request.unknown_replies for request in requests)
-                    else remaining_s
-                )
+                pause_s = min(remaining_s, GRAPH_POLL_INTERVAL_S) if self._inbox else remaining_s
                 pause_s = min(pause_s, POLL_INTERVAL_S) if undelivered else pause_s
                 self._changed.wait_for(lambda: self._has_new_replies(requests, reported), max(0.0, pause_s))
                 new_results = [
@@ -286,7 +260,8 @@ class RobotStopper:
         for thread in self._opener_threads:
             thread.join(timeout=5)
         with self._changed:
-            self._requests.clear()
+            self._stops.discard()
+            self._deliveries.clear()
 
     # ---- connections
 
@@ -313,11 +288,12 @@ class RobotStopper:
             line.error = error
 
     def _connect(self, robot: Robot, topics: RobotTopics) -> StopChannel:
-        if robot.dialect == RIZE:
-            return StopChannel(topics.command, self._node.new_pub(topics.command, "json", batch=False), None)
-        publisher = self._node.new_pub(topics.command, "robot/command", batch=False)
+        dialect = dialect_of(robot)
+        publisher = self._node.new_pub(topics.command, dialect.command_type, batch=False)
+        if not dialect.is_identified:
+            return StopChannel(topics.command, publisher, None)
         try:
-            subscriber = self._node.new_sub(topics.reply, "robot/answer", sink=self._on_replies)
+            subscriber = self._node.new_sub(topics.reply, dialect.reply_type, sink=self._on_replies)
             return StopChannel(topics.command, publisher, subscriber)
         except NepError:
             publisher.close()
@@ -325,27 +301,33 @@ class RobotStopper:
 
     def _retry_missing_channels(self, requests: Sequence[StopRequest]) -> None:
         # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
-        incomplete_requests = [request for request in requests if not request.line.is_complete]
-        if not incomplete_requests:
+        with self._changed:
+            incomplete = [
+                (request, delivery)
+                for request in requests
+                if (delivery := self._deliveries.get(request.id)) and not delivery.line.is_complete
+            ]
+        if not incomplete:
             return
 
         def open_channels() -> None:
-            for request in incomplete_requests:
-                previous_topics = set(request.line.channels)
+            for request, delivery in incomplete:
+                line = delivery.line
+                previous_topics = set(line.channels)
                 with self._opening_lock:
-                    self._open_missing_channels(request.line)
-                new_topics = request.line.channels.keys() - previous_topics
+                    self._open_missing_channels(line)
+                new_topics = line.channels.keys() - previous_topics
                 error = (
-                    self._send(request.line, request.id, request.program_key, new_topics)
+                    self._send(line, request.id, delivery.program_key, new_topics)
                     if new_topics
-                    else request.line.send_problem
+                    else line.send_problem
                 )
                 with self._changed:
                     request.error = error if not previous_topics else request.error
                     self._changed.notify_all()
 
-        for request in incomplete_requests:
-            request.error = "" if not request.line.channels else request.error
+        for request, delivery in incomplete:
+            request.error = "" if not delivery.line.channels else request.error
         self._opener_threads = [thread for thread in self._opener_threads if thread.is_alive()]
         self._opener_threads.append(
             threading.Thread(target=open_channels, name="studio-stop-line", daemon=True)
@@ -361,12 +343,11 @@ class RobotStopper:
     def _start_request(
         self, line: StopLine, program_key: str | None, on_late: Callable[[RobotStop], object] | None
     ) -> StopRequest:
-        request = StopRequest(line, _new_id(), self._clock(), on_late, program_key)
         with self._changed:
-            self._evict_expired()
-            self._requests[request.id] = request
-            if self._view is not None and line.target.robot.dialect != RIZE:
-                request.replies |= self._serving_programs(request)
+            request = self._stops.start(line.target, self._view, self._clock())
+            pending_ids = {each.id for each in self._stops.requests}
+            self._deliveries = {id: each for id, each in self._deliveries.items() if id in pending_ids}
+            self._deliveries[request.id] = _Delivery(line, on_late, program_key)
             for topics, channel in line.channels.items():
                 if self._is_connected_locked(line, channel):
                     request.record_sent(topics, request.sent_s)
@@ -388,18 +369,19 @@ class RobotStopper:
     def _deliver(self, request: StopRequest) -> bool:
         # Sends the command on newly connected topics; returns whether nothing is left to deliver.
         with self._changed:
-            if request.has_all_replies or request.line.target.robot.dialect == RIZE:
+            delivery = self._deliveries.get(request.id)
+            if delivery is None or request.has_all_replies or not request.target.dialect.is_identified:
                 return True
-            channels = dict(request.line.channels)
             new_topics = [
                 topics
-                for topics, channel in channels.items()
-                if topics not in request.delivered_topics and self._is_connected_locked(request.line, channel)
+                for topics, channel in dict(delivery.line.channels).items()
+                if topics not in request.delivered_topics
+                and self._is_connected_locked(delivery.line, channel)
             ]
             for topics in new_topics:
                 request.record_sent(topics, self._clock())
         if new_topics:
-            self._send(request.line, request.id, request.program_key, new_topics)
+            self._send(delivery.line, request.id, delivery.program_key, new_topics)
         return bool(request.delivered_topics or request.error)
 
     def _send(
@@ -411,13 +393,7 @@ class RobotStopper:
     ) -> str:
         # Returns the reason if the Stop could be sent on no topic, else an empty string.
         robot = line.target.robot
-        stop_action = robot.safe_stop.action
-        if robot.dialect == RIZE:
-            command = rize.to_command(robot, stop_action, {}, id)
-        else:
-            command = {"id": id, "op": "stop", "from": self._sender, "action": stop_action, "input": {}}
-            if program_key is not None:
-                command["ends"] = program_key
+        command = line.target.dialect.stop(robot, id, self._sender, program_key)
         with self._changed:
             channels = [
                 channel
@@ -438,126 +414,54 @@ class RobotStopper:
     def _has_new_replies(self, requests: Sequence[StopRequest], reported: set[tuple[str, str]]) -> bool:
         if any(each.new_replies(reported) for each in requests) or all(each.is_settled for each in requests):
             return True
-        return (
-            any(each.unknown_replies for each in requests)
-            and self._clock() - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
-        )
+        return bool(self._inbox) and self._clock() - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
 
-    def _query_graph_if_needed(self, requests: Sequence[StopRequest]) -> None:
-        # Queries the graph while the programs of a robot or the publisher of a reply are unknown.
+    def _query_graph_if_needed(self) -> None:
+        # Queries the graph while there is none, or while the publisher of a reply is unknown.
         with self._changed:
-            is_waiting = self._view is None or any(request.unknown_replies for request in requests)
             now = self._clock()
-            is_due = is_waiting and (
-                self._view is None or now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
+            is_due = self._view is None or (
+                bool(self._inbox) and now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
             )
             if is_due:
                 self._graph_queried_s = now
         if is_due:
             self._refresh_view()
-        with self._changed:
-            for request in requests:
-                if not request.replies:
-                    request.replies |= self._serving_programs(request)
-                    self._apply_held_replies_locked(request)  # not late: the Stop was sent just now
 
     def _add_new_programs(self, requests: Sequence[StopRequest]) -> None:
         # Programs newer than the last graph received the Stop too.
         self._refresh_view()
         with self._changed:
-            for request in requests:
-                known_replies = {
-                    node: reply for node, reply in request.replies.items() if node != _UNKNOWN_PROGRAM
-                }
-                request.replies = self._serving_programs(request) | known_replies
+            self._stops.update(self._view or GraphView(0, 0), self._clock(), requests)
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
             self.update_graph(self._node.graph(GRAPH_TIMEOUT_S))
 
-    def _serving_programs(self, request: StopRequest) -> dict[str, RobotStop | None]:
-        # The programs that must reply, by node: the robot's own, then others that serve it. Programs that
-        # receive its commands but can't reply are named.
-        target, view = request.line.target, self._view or GraphView(0, 0)
-        if target.robot.dialect == RIZE:
-            # RIZE never replies; a robot that could not be reached is not among them.
-            return {} if request.error else {"": RobotStop(request.line.name, False, None, can_confirm=False)}
-        identity = target.identity or first_announcer(view, target.robot.topics.description)
-        own_node = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
-        replies: dict[str, RobotStop | None] = {own_node: None}
-        replying_nodes = {
-            node for topic_set in target.topic_sets for node in publisher_nodes(view, topic_set.reply)
-        }
-        receivers = dict.fromkeys(
-            node for topic_set in target.topic_sets for node in subscriber_nodes(view, topic_set.command)
-        )
-        other_nodes = [node for node in receivers if node not in (own_node, self._node.id)]
-        for node in [node for node in other_nodes if node in replying_nodes][:MAX_SERVING_PROGRAMS]:
-            request.program_names[node] = identity_of(view, node).node or node
-            replies[node] = None
-        listening_nodes = [node for node in other_nodes if node not in replying_nodes]
-        programs = [identity_of(view, node).node or node for node in listening_nodes[:MAX_NAMED_LISTENERS]]
-        if len(listening_nodes) > MAX_NAMED_LISTENERS:
-            programs = [
-                ngettext("{count} program", "{count} programs", len(listening_nodes)).format(
-                    count=len(listening_nodes)
-                )
-            ]
-        for node, program in zip(listening_nodes, programs, strict=False):
-            replies[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
-        for earlier in target.earlier_programs:
-            if earlier.node_id not in replies:
-                request.program_names[earlier.node_id] = earlier.node or earlier.node_id
-                replies[earlier.node_id] = None
-        return replies
-
     def _on_replies(self, messages: Sequence[Message]) -> None:
         # Checks the sender first: only messages of programs that must answer are decoded.
-        late_replies: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
+        results: list[tuple[StopRequest, RobotStop]] = []
         with self._changed:
             for message in messages:
-                node = self._senders.node_of(message)
-                for request in self._requests.values():
-                    if message.topic in request.line.reply_topics:
-                        late_replies += self._apply_reply_locked(request, node, message)
+                if not self._stops.is_awaited(message):
+                    continue
+                node = self._inbox.sender_of(message)
+                if node is not None:
+                    results += self._stops.receive(node, message, self._clock())
+            late_replies = self._late_replies_locked(results)
             self._changed.notify_all()
         for notify, result in late_replies:
             notify(result)
 
-    def _apply_held_replies_locked(
-        self, request: StopRequest
-    ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
-        # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
-        # publisher has not registered, or the master is missing, and then nothing can be proven.
-        pending = request.unknown_replies.pop_all()
-        attributed = [
-            (node, message) for message in pending if (node := self._senders.node_of(message)) is not None
-        ]
+    def _late_replies_locked(self, results: Sequence[tuple[StopRequest, RobotStop]]) -> LateReplies:
+        # Returns late results with their callbacks, which the caller invokes after releasing the lock.
+        late = [(self._deliveries.get(request.id), result) for request, result in results if request.is_over]
         return [
-            late_reply
-            for node, message in attributed
-            for late_reply in self._apply_reply_locked(request, node, message)
+            (delivery.on_late, result)
+            for delivery, result in late
+            if delivery is not None and delivery.on_late is not None
         ]
-
-    def _apply_reply_locked(
-        self, request: StopRequest, node: str | None, message: Message
-    ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        # Applies a reply of a program that must reply; returns the callback if it is late.
-        if node is None or not request.replies:
-            request.unknown_replies.add(message)
-            return []
-        if node not in request.replies:
-            if node in request.foreign_replies or len(request.foreign_replies) < MAX_SERVING_PROGRAMS:
-                request.foreign_replies.setdefault(node, PendingMessages(publishers=1)).add(message)
-            return []
-        name = request.line.name
-        has_changed = request.accept(node, message, self._clock(), partial(stop_error_text, name))
-        reply = request.replies[node]
-        if not has_changed or reply is None or not request.is_over or request.on_late is None:
-            return []
-        return [(request.on_late, reply)]
 
     def _create_report(
         self,
@@ -569,40 +473,28 @@ class RobotStopper:
         with self._changed:
             for request in requests:
                 request.is_over = True
-            results = [result for request in requests for result in request.results()]
+            results = {request.id: self._results_locked(request) for request in requests}
             unreported = [
                 result
                 for request in requests
-                for node, result in zip(request.replies or {"": None}, request.results(), strict=True)
+                for node, result in zip(request.replies or {"": None}, results[request.id], strict=True)
                 if (request.id, node) not in reported
             ]
             view = self._view or GraphView(0, 0)
             impostors = [
-                (request.line.name, identity_of(view, node).node or node)
+                (request.name, identity_of(view, node).node or node)
                 for request in requests
                 for node in request.impostors()
             ]
         for result in unreported:
             if on_answer is not None:
                 on_answer(result)
-        return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(impostors)))
+        robots = tuple(result for each in results.values() for result in each)
+        return StopReport(robots, elapsed_ms, tuple(dict.fromkeys(impostors)))
 
-    def _evict_expired(self) -> None:
-        # Discards Stops whose late replies are no longer accepted.
-        now = self._clock()
-        ended_ids = [id for id, each in self._requests.items() if each.is_over]
-        for index, id in enumerate(ended_ids):
-            each = self._requests[id]
-            if (
-                each.is_confirmed
-                or index < len(ended_ids) - MAX_LATE_REQUESTS
-                or now - each.sent_s > LATE_REPLY_TIMEOUT_S
-            ):
-                del self._requests[id]
-
-
-def _new_id() -> str:
-    return f"stop-{uuid.uuid4().hex[:12]}"
+    def _results_locked(self, request: StopRequest) -> list[RobotStop]:
+        delivery = self._deliveries.get(request.id)
+        return request.results("" if delivery is None else delivery.line.connection_problem)
 
 
 def stop_and_report(

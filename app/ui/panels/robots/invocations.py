@@ -115,13 +115,13 @@ def state_text(action: Action, invocation: Invocation, title_of: Callable[[str],
     if invocation.state == "sent":
         return _("sent")
     if invocation.state == "accepted":
-        if invocation.awaited_actions:
+        if invocation.waits_for:
             return _("waits for {actions}").format(
-                actions=format_list([title_of(name) for name in invocation.awaited_actions])
+                actions=format_list([title_of(name) for name in invocation.waits_for])
             )
-        if invocation.replaced_actions:
+        if invocation.replaces:
             return _("replaces {actions}").format(
-                actions=format_list([title_of(name) for name in invocation.replaced_actions])
+                actions=format_list([title_of(name) for name in invocation.replaces])
             )
         return _("sent")
     elapsed = _("for {duration}").format(duration=seconds_text(invocation.elapsed_s))

@@ -11,8 +11,8 @@ from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.robots.stop.report import StopStatus
 from app.core.run.view import RESTART, RunView
+from app.robots.client.stop_report import StopStatus
 from app.ui.shell.actions.actions import Actions
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon

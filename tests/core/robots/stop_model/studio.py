@@ -37,7 +37,7 @@ ALIVE_S = GRAPH_POLL_S  # equal to the graph interval, so that fewer moments are
 
 
 class SimulatedHeartbeat:
-    """Fake of `app.robots.heartbeat.Heartbeat` in virtual time, without a thread."""
+    """Fake of `app.robots.client.heartbeat.Heartbeat` in virtual time, without a thread."""
 
     def __init__(self, clock: SimulatedClock, sender: str) -> None:
         self._clock, self._sender = clock, sender

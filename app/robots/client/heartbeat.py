@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import threading
-import uuid
 from collections.abc import Callable, Mapping
 
+from app.robots.client.dialects import heartbeat
+from app.robots.client.limits import HEARTBEAT_INTERVAL_S
 from nep.errors import NepError
 from nep.system.log_rarely import SuppressedErrors
 
-HEARTBEAT_INTERVAL_S = 0.2
 _log = logging.getLogger(__name__)
 
 Publish = Callable[[Mapping[str, object]], object]
@@ -72,8 +72,7 @@ class Heartbeat:
             self._changed.wait(HEARTBEAT_INTERVAL_S if robots else None)
 
     def _publish(self, publish: Publish) -> None:
-        alive = {"id": uuid.uuid4().hex, "op": "alive", "from": self._sender, "action": "", "input": {}}
         try:
-            publish(alive)
+            publish(heartbeat(self._sender))
         except NepError:
             return  # the robot or this node is gone; the robot's watchdog stops it

@@ -9,28 +9,29 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
-from app.core.network.mailbox import Batch
-from app.core.network.watches import Watch, Watches
 from app.errors import DescriptionError
-from app.robots import rize
+from app.robots.client import rize
+from app.robots.client.inbox import Senders
+from app.robots.client.limits import MAX_ROBOTS
 from app.robots.description.description import Robot, parse_announcement
 from app.robots.identity import (
     DESCRIPTION_TYPE,
+    NATIVE_GENERATIONS,
     Identity,
-    Senders,
     description_topic_problem,
     identity_of,
     publisher_nodes,
+    topic_conflict,
 )
 from nep.errors import NepError
 from nep.i18n import _, format_list, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
-MAX_ROBOTS = 200
 MAX_CLAIMANTS = 8
 MAX_OWNERS = 4
 """Maximum number of previous owners of a name whose descriptions are stored, in case they return."""
@@ -39,8 +40,32 @@ MAX_CPU_SHARE = 0.2
 MAX_PARSE_BUDGET_S = 1.0
 """Maximum time in seconds for parsing after an idle period, for example for all robots of a room."""
 
-NATIVE_GENERATIONS = frozenset({"native", "gateway"})
 NODE_NAME_SUFFIXES = ("_driver", "_robot", "_node")
+
+
+class TopicWatch(Protocol):
+    """Subscription to a topic."""
+
+    def close(self) -> None:
+        """End the subscription."""
+        ...
+
+
+class TopicWatches(Protocol):
+    """Owner of the subscriptions to descriptions; implemented by `app.core.network.watches.Watches`."""
+
+    def open(self, topics: Sequence[str], /) -> TopicWatch:
+        """Subscribe to topics."""
+        ...
+
+
+class ReceivedMessages(Protocol):
+    """Messages of one topic; implemented by `app.core.network.mailbox.Batch`."""
+
+    @property
+    def messages(self) -> Sequence[Message]:
+        """Messages in order of arrival."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +80,27 @@ class Claim:
     title: str
     detail: str
 
+    @property
+    def sentence(self) -> str:
+        """Problem and consequence."""
+        return f"{self.title} {self.detail}"
+
+
+def foreign_topic_claim(robot: Robot, robots: Iterable[Robot]) -> Claim | None:
+    """Return a claim if the description of a robot names topics of another robot, else None.
+
+    Args:
+        robot: Announced robot.
+        robots: All known robots; `robot` itself is ignored.
+    """
+    problem = topic_conflict(robot, robots)
+    if problem is None:
+        return None
+    return Claim(
+        f"{problem}.",
+        _("{robot} is ignored. Find out what this program is, and close it.").format(robot=robot.name),
+    )
+
 
 @dataclass(slots=True)
 class _Announcement:
@@ -67,9 +113,10 @@ class _Announcement:
         owners: Nodes that have owned the topic, newest first.
         messages: Newest description of each publisher.
         rank: Number of topics that the same node announced before this one.
+        decode_error: Reason why the newest message can't be decoded, or "".
     """
 
-    watch: Watch | None = None
+    watch: TopicWatch | None = None
     owner: Identity | None = None
     owners: tuple[str, ...] = ()
     messages: dict[int, Message] = field(default_factory=dict)
@@ -79,6 +126,7 @@ class _Announcement:
     is_unreadable: bool = False
     rank: int = 0
     other_owners: tuple[Identity, ...] = ()
+    decode_error: str = ""
 
 
 class Announcements:
@@ -86,7 +134,7 @@ class Announcements:
 
     def __init__(
         self,
-        watches: Watches,
+        watches: TopicWatches,
         senders: Senders,
         clock: Callable[[], float] = time.monotonic,
         is_proven: Callable[[str], bool] = lambda _topic: False,
@@ -124,6 +172,24 @@ class Announcements:
             for topic, announcement in self._topics.items()
             if announcement.is_unreadable and announcement.robot is None
         )
+
+    @property
+    def unread_topics(self) -> tuple[str, ...]:
+        """Topics of announced robots whose descriptions have not been received yet."""
+        return tuple(
+            topic
+            for topic, announcement in self._topics.items()
+            if announcement.watch is not None and announcement.parsed_message is None
+        )
+
+    @property
+    def decode_errors(self) -> Mapping[str, str]:
+        """Reasons why messages can't be decoded, by topic."""
+        return {
+            topic: announcement.decode_error
+            for topic, announcement in self._topics.items()
+            if announcement.decode_error
+        }
 
     @property
     def claims(self) -> Mapping[str, Claim]:
@@ -189,7 +255,7 @@ class Announcements:
                     None,
                     None,
                 )
-                announcement.claim = None
+                announcement.claim, announcement.decode_error = None, ""
                 announcement.owners = tuple(dict.fromkeys((nodes[0], *announcement.owners)))[:MAX_OWNERS]
             other_nodes = (node for node in nodes if node != announcement.owner.node_id)
             announcement.other_owners = tuple(identity_of(view, node) for node in other_nodes)
@@ -203,7 +269,7 @@ class Announcements:
         self.omitted_topics = tuple(omitted_topics)
         self._parse_pending()
 
-    def add(self, batches: Mapping[str, Batch]) -> bool:
+    def add(self, batches: Mapping[str, ReceivedMessages]) -> bool:
         """Add received descriptions; return True if a description, possibly an earlier one, was parsed."""
         for topic in batches.keys() & self._topics.keys():
             announcement = self._topics[topic]
@@ -307,9 +373,11 @@ class Announcements:
     def _parse(self, topic: str, newest: Message) -> None:
         announcement = self._topics[topic]
         announcement.parsed_message, announcement.claim, announcement.is_unreadable = newest, None, False
+        announcement.decode_error = ""
         try:
             robot = parse_announcement(newest)
-        except NepError:
+        except NepError as error:
+            announcement.decode_error = f"{error}"
             return  # reported by the session's alert `message:<topic>`; the previous description stays valid
         except DescriptionError as error:
             title = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
