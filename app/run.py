@@ -27,6 +27,7 @@ from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
 from app.robots.client.discovery import FoundRobots, find_robots
+from app.robots.client.limits import DISCOVERY_TIMEOUT_S, LATE_DISCOVERY_INTERVAL_S, ROBOT_WAIT_S
 from app.robots.client.stop import StopTarget
 from app.robots.client.stop_report import StopReport
 from app.robots.description.description import Robot, parse
@@ -38,11 +39,7 @@ from nep.system.streams import print_error
 from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
-ROBOT_WAIT_S = 10.0
 POLL_INTERVAL_S = 0.1
-ALL_ROBOTS_WAIT_S = 3.0
-"""Time in seconds to wait for the descriptions of all robots, if a behaviour contains publish blocks."""
-LATE_ROBOT_CHECK_INTERVAL_S = 1.0
 _START_BLOCK_TYPE = re.compile(r"events_|robot_.*_when_")
 
 
@@ -119,7 +116,7 @@ def _find_used_robots(
     )
     if compile_behaviour(workspace, discovered.robots, absent=known_robots).publishes:
         discovered = find_robots(
-            node, ALL_ROBOTS_WAIT_S, expected=(), previous=known_robots
+            node, DISCOVERY_TIMEOUT_S, expected=(), previous=known_robots
         )  # publish blocks may move any of them
     return discovered
 
@@ -304,7 +301,7 @@ class _LateRobotMonitor:
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
-        self._next_poll_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
+        self._next_poll_s = time.monotonic() + LATE_DISCOVERY_INTERVAL_S
         self._known_topics: tuple[str, ...] = ()
 
     def poll(self) -> None:
@@ -314,12 +311,12 @@ class _LateRobotMonitor:
             view = self._node.graph()
             topics = tuple(sorted(description_topics(view)))
             if topics != self._known_topics:
-                discovered = find_robots(self._node, LATE_ROBOT_CHECK_INTERVAL_S)
+                discovered = find_robots(self._node, LATE_DISCOVERY_INTERVAL_S)
                 unread = set(topics) - {robot.topics.description for robot in discovered.robots}
                 moving = moving_topics(view, map(controls_of, discovered.robots), unread)
                 self._runner.set_robots({}, moving.topics)
                 self._known_topics = topics if not unread else ()
-        self._next_poll_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
+        self._next_poll_s = time.monotonic() + LATE_DISCOVERY_INTERVAL_S
 
 
 class _RunEvents:

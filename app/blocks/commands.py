@@ -109,6 +109,7 @@ from app.blocks.runtime.values import (
     rounded_up,
 )  # fmt: skip
 from app.robots.client.discovery import find_robots
+from app.robots.client.limits import DISCOVERY_TIMEOUT_S
 from nep import node as new_node
 from nep.i18n import _
 from nep.system.streams import prepare_streams
@@ -157,9 +158,6 @@ wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write
 
-ROBOT_DISCOVERY_S = 3.0
-STOP_REPLY_TIMEOUT_S = 1.0
-
 
 def run(name: str) -> None:
     """Run all scripts until they end or Ctrl+C is pressed, then stop the robots.
@@ -172,7 +170,7 @@ def run(name: str) -> None:
     """
     prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:
-        discovery = find_robots(node, ROBOT_DISCOVERY_S)
+        discovery = find_robots(node, DISCOVERY_TIMEOUT_S)
         for claim in discovery.rejected_claims:
             _print(claim)
         owners = {robot: owner.node_id for robot, owner in discovery.owners.items()}
@@ -186,7 +184,7 @@ def run(name: str) -> None:
         finally:
             with without_interrupts():
                 _runtime.scheduler.stop()
-                moving = network.stop_robots(STOP_REPLY_TIMEOUT_S)
+                moving = network.stop_robots()
                 stop_errors = [network.stop_error(robot) for robot in moving]
                 network.close()
     for stop_error in stop_errors:

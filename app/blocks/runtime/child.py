@@ -37,6 +37,7 @@ from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
 from app.blocks.runtime.variables import VariableWatch
 from app.errors import AppError
+from app.robots.client.limits import STOP_TIMEOUT_S
 from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 from nep.i18n import _
@@ -45,7 +46,6 @@ from nep.system.crash_trace import enable_crash_trace
 SAMPLE_INTERVAL_S = 1 / 30
 VARIABLES_PERIOD_SAMPLES = 3
 """Number of samples (one per `SAMPLE_INTERVAL_S`) per check of the variables, which takes place at 10 Hz."""
-STOP_REPLY_TIMEOUT_S = 1.0
 FLUSH_TIMEOUT_S = 0.03
 MAX_LINE_LENGTH = 2000
 MAX_LINES = 10_000
@@ -163,7 +163,7 @@ class Run:
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
         self._started_at = time.monotonic()
-        self._stop_reply_timeout_s = STOP_REPLY_TIMEOUT_S
+        self._stop_timeout_s: float | None = None
         self.set_pace(command)
         self._starts_paused = command.get("paused") is True
         if self._starts_paused:
@@ -222,7 +222,7 @@ class Run:
 
         The runner waits for these replies.
         """
-        self._stop_reply_timeout_s = 0.0
+        self._stop_timeout_s = 0.0
         self._runtime.scheduler.stop()
         self._runtime.finished.set()
 
@@ -240,7 +240,7 @@ class Run:
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._started_at, 3)
             self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent_robots)
-            node.close(FLUSH_TIMEOUT_S if self._stop_reply_timeout_s == 0.0 else 2 * STOP_REPLY_TIMEOUT_S)
+            node.close(FLUSH_TIMEOUT_S if self._stop_timeout_s == 0.0 else 2 * STOP_TIMEOUT_S)
         return error is None
 
     def _run_with_node(self, node: nep.Node) -> tuple[str, ...]:
@@ -263,9 +263,9 @@ class Run:
             self._report_until_finished()
         finally:
             self._runtime.scheduler.stop()
-            silent_robots = network.stop_robots(self._stop_reply_timeout_s)
+            silent_robots = network.stop_robots(self._stop_timeout_s)
             network.close()
-        return silent_robots if self._stop_reply_timeout_s else ()
+        return silent_robots if self._stop_timeout_s is None else ()
 
     def _start_scripts(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}

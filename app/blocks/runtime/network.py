@@ -15,6 +15,7 @@ from app.blocks.runtime.publishing import PublishGuard
 from app.robots.client.dialects import dialect_of, new_id
 from app.robots.client.heartbeat import Heartbeat
 from app.robots.client.inbox import ReplyInbox, Senders
+from app.robots.client.limits import PROGRAM_LOOKUP_INTERVAL_S, stop_timeout_s
 from app.robots.client.reply import RobotReply
 from app.robots.client.stop import PendingStops, StopRequest, StopTarget, unproven_robots
 from app.robots.description.description import Robot
@@ -24,9 +25,6 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 from nep.system.log_rarely import SuppressedErrors
-
-LOOKUP_INTERVAL_S = 0.2
-"""Minimum interval in seconds between graph queries that look up unknown publishers."""
 
 Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -293,16 +291,18 @@ class Network:
         self._send(robot, dialect_of(robot).stop(robot, request.id, self._program))
         return request
 
-    def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
+    def stop_robots(self, timeout_s: float | None = None) -> tuple[str, ...]:
         """Stop all robots and wait for their confirmations. Robots that can't confirm (RIZE) are skipped.
 
         Args:
-            timeout_s: Maximum wait in seconds.
+            timeout_s: Maximum wait in seconds; None for the time that the robots' descriptions require.
 
         Returns:
             Names of the robots that did not confirm the stop; see `stop_error` for the reasons.
         """
         self._is_ending = True
+        if timeout_s is None:
+            timeout_s = stop_timeout_s(self._robots.values())
         if timeout_s:
             with suppress(NepError):
                 self._resolve_senders()
@@ -359,6 +359,9 @@ class Network:
                 first = first_announcer(view, robot.topics.description)
                 if dialect_of(robot).is_identified and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
+            with self._stops_changed:
+                self._stops.update(view, time.monotonic())
+                self._stops_changed.notify_all()
             for node, message in self._inbox.pop_listed():
                 self._handle_reply_locked(node, message)
         self._on_change()
@@ -378,7 +381,7 @@ class Network:
             self._lookup_requested.clear()
             with self._errors, suppress(NepError):
                 self._resolve_senders()
-            self._closed.wait(LOOKUP_INTERVAL_S)
+            self._closed.wait(PROGRAM_LOOKUP_INTERVAL_S)
 
     def _is_from_robot(self, message: Message) -> bool:
         owner = self._owners.get(self._robot_of.get(message.topic, ""))

@@ -27,9 +27,6 @@ from app.robots.description.inputs import parse_value
 from app.robots.description.json_access import finite_float
 from nep.i18n import _, format_list
 
-FIRST_VALUE_TIMEOUT_S = 2.0
-COMMAND_CHECK_INTERVAL_S = 0.25
-"""Interval in seconds at which a pending command is checked for time limits and a silent robot."""
 MAX_STORED_COMMANDS = 64
 """Maximum number of recent commands in `Replacements`; a robot reports a replaced command at once."""
 REPLACE = "replace"
@@ -270,7 +267,9 @@ class RobotHandle:
             raise BehaviourError(_("{name} has no sensor “{sensor}”.").format(name=self._name, sensor=sensor))
         if link.sensor(self._name, sensor) is None:
             # Sensors publish several times a second: the first value may be in flight.
-            scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_TIMEOUT_S)
+            scheduler.wait_for(
+                lambda: link.sensor(self._name, sensor) is not None, limits.FIRST_VALUE_TIMEOUT_S
+            )
         value = link.sensor(self._name, sensor)
         return value if field is None else values.part(value, field)
 
@@ -372,7 +371,7 @@ class RobotHandle:
             return call.done or (can_pause and scheduler.is_script_paused())
 
         while not scheduler.wait_for(
-            ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - time.monotonic()))
+            ready, min(limits.COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - time.monotonic()))
         ):
             if is_waiting:  # the time limit starts with the action
                 deadline = time.monotonic() + time_limit_s + limits.PROGRAM_MARGIN_S

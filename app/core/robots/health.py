@@ -20,10 +20,10 @@ from app.core.network.topics import Topics
 from app.core.reports.own_process import ExecutableState
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
+from app.robots.client.limits import SENSOR_SILENCE_TIMEOUT_S
 from nep.i18n import _, format_list, lazy, ngettext
 from nep.protocol.graph_view import Alert, GraphView
 
-SILENCE_TIMEOUT_S = 3.0
 RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
 """Time limit in seconds for a restarted driver to connect again."""
@@ -389,7 +389,7 @@ class Health:
             and topic is not None
             and topic.gone_since_s is None
             and topic.silent_s is not None
-            and topic.silent_s > SILENCE_TIMEOUT_S
+            and topic.silent_s > SENSOR_SILENCE_TIMEOUT_S
         )
         if not is_silent or topic is None or topic.silent_s is None:
             link.silence_reason = None

@@ -12,11 +12,11 @@ from app.core.network.topics import Topic, Topics
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots.client.dialects import dialect_of
+from app.robots.client.limits import SENSOR_SILENCE_TIMEOUT_S
 from app.robots.description.description import Sensor
 from app.robots.description.json_access import finite_float
 from nep.i18n import _, lazy, ngettext, number, plazy
 
-SILENCE_TIMEOUT_S = 3.0
 MAX_MISSED_MESSAGES = 5
 """Number of consecutive missing messages after which a sensor counts as silent."""
 LOW_BATTERY_PERCENT = 20
@@ -234,7 +234,7 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
     # Only sensors with a rate can be silent; others may have no change to report.
     if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
-    return topic.silent_s > max(SILENCE_TIMEOUT_S, MAX_MISSED_MESSAGES / sensor.rate_hz)
+    return topic.silent_s > max(SENSOR_SILENCE_TIMEOUT_S, MAX_MISSED_MESSAGES / sensor.rate_hz)
 
 
 def _count_items(title: str, count: ReportedCount, now: float) -> Iterable[HealthItem]:

@@ -445,9 +445,9 @@ class Runs:
         # A late reply counts unless the state has changed since.
         run = self._run
         if event.number is None:
-            self.on_stop(RobotStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
+            self.on_stop(RobotStopped(event.report, event.mark))
         elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
-            self._apply_report(run.report.with_late_reply(event.robot))
+            self._apply_report(run.report.with_late_reply(event.report))
 
     # -- private -----------------------------------------------------------------------------------------
 

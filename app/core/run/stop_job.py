@@ -8,7 +8,7 @@ from app.core.faults import log_errors
 from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper, stop_and_report
 from app.core.run.runner import Runner
-from app.robots.client.stop_report import RobotStop
+from app.robots.client.stop_report import RobotStop, StopReport
 
 PostEvent = Callable[[object], None]
 
@@ -38,8 +38,8 @@ def stop_program(
     def on_reply(robot: RobotStop) -> None:
         post_event(RobotReplied(number, robot))
 
-    def on_late_reply(robot: RobotStop) -> None:
-        post_event(LateReply(number, robot))
+    def on_late_reply(report: StopReport) -> None:
+        post_event(LateReply(number, report))
 
     if runner is not None:
         if stopper is not None:
@@ -70,7 +70,7 @@ def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, m
         mark: Value of `MovedRobots.mark` when the Stop started.
     """
 
-    def on_late_reply(robot: RobotStop) -> None:
-        post_event(LateReply(None, robot, mark))
+    def on_late_reply(report: StopReport) -> None:
+        post_event(LateReply(None, report, mark))
 
     post_event(RobotStopped(stop_and_report(stopper, (name,), on_late=on_late_reply), mark))

@@ -11,12 +11,11 @@ from typing import Protocol
 from app.robots.client.announcements import Announcements, foreign_topic_claim
 from app.robots.client.dialects import dialect_of
 from app.robots.client.inbox import Senders
+from app.robots.client.limits import DISCOVERY_POLL_INTERVAL_S
 from app.robots.description.description import Robot
 from app.robots.identity import DESCRIPTION_TYPE, Identity
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
-
-POLL_INTERVAL_S = 0.1
 
 
 class Subscription(Protocol):
@@ -82,7 +81,7 @@ class _Subscriptions:
         received = {}
         for topic, subscription in self.by_topic.items():
             messages = []
-            message = subscription.receive(POLL_INTERVAL_S if topic in awaited else 0.0)
+            message = subscription.receive(DISCOVERY_POLL_INTERVAL_S if topic in awaited else 0.0)
             while message is not None:
                 messages.append(message)
                 message = subscription.receive(0.0)
@@ -153,7 +152,7 @@ def find_robots(
                 robots = connected | {name: robot for name, (robot, _owner) in announced.items()}
                 owners = {name: owner for name, (_robot, owner) in announced.items()}
                 return _result(robots, owners, announcements)
-            wait(POLL_INTERVAL_S)
+            wait(DISCOVERY_POLL_INTERVAL_S)
     finally:
         for subscription in subscriptions.by_topic.values():
             subscription.close()

@@ -17,6 +17,12 @@ FORM_MARGIN_S, PROGRAM_MARGIN_S = 0.5, 2.0
 """Time in seconds beyond an action's time limit, in which the robot should report the end itself."""
 PAUSE_TIMEOUT_S = 3.0
 """Timeout in seconds for an action cancelled by a pause; robots built with the kit reply within 1 s."""
+COMMAND_CHECK_INTERVAL_S = 0.25
+"""Interval in seconds at which a program checks a pending command for time limits and a silent robot."""
+FIRST_VALUE_TIMEOUT_S = 2.0
+"""Maximum time in seconds for which a program waits for the first value of a sensor."""
+SENSOR_SILENCE_TIMEOUT_S = 3.0
+"""Minimum time in seconds without a value after which a sensor counts as silent."""
 HEARTBEAT_INTERVAL_S = 0.2
 """Interval in seconds of the heartbeats to robots, which stop when they no longer receive any."""
 
@@ -45,6 +51,22 @@ MAX_PENDING_PUBLISHERS, MAX_PENDING_PER_PUBLISHER = 64, 32
 of one publisher, on one topic."""
 MAX_ROBOTS = 200
 """Maximum number of announced robots."""
+
+# ---- graph and discovery
+
+GRAPH_TIMEOUT_S = 0.3
+"""Time limit in seconds of a graph query during a Stop."""
+STOP_LOOKUP_INTERVAL_S, PROGRAM_LOOKUP_INTERVAL_S = 0.1, 0.2
+"""Minimum interval in seconds between graph queries that look up the publisher of a reply."""
+CONNECTION_CHECK_INTERVAL_S = 0.02
+"""Interval in seconds at which a Stop checks whether a robot has been connected."""
+ROBOT_WAIT_S = 10.0
+"""Default of the maximum time in seconds for which the command line waits for the robots of a behaviour."""
+DISCOVERY_TIMEOUT_S = 3.0
+"""Maximum time in seconds for the descriptions of all announced robots."""
+LATE_DISCOVERY_INTERVAL_S = 1.0
+"""Interval in seconds at which the command line looks for robots that were announced during a run."""
+DISCOVERY_POLL_INTERVAL_S = 0.1
 
 
 def max_silence_s(robot: Robot) -> float | None:

@@ -39,8 +39,8 @@ from nep.protocol.graph_view import GraphView
 MIN_DISPLAYED_WAIT_MS = 20.0
 """Minimum time until the robot was connected that is mentioned in the result, in milliseconds."""
 MAX_STOP_IDS = 10_000
-_UNKNOWN_PROGRAM = "nobody"
-"""Placeholder for the program of a robot that the graph does not list yet."""
+_UNKNOWN_PROGRAM = ""
+"""Placeholder for the program of a robot that the graph does not list yet; no node has this id."""
 _MAX_FOREIGN_REPLIES = 4
 
 

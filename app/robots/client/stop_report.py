@@ -162,14 +162,25 @@ class StopReport:
         ]
         return replace(self, robots=(*self.robots, *unreached)) if unreached else self
 
-    def with_late_reply(self, reply: RobotStop) -> StopReport:
-        """Return the report with a late reply applied; unchanged if it doesn't include the program."""
-        keys = ((robot.name, robot.program) for robot in self.robots)
-        if (reply.name, reply.program) not in keys:
+    def with_late_reply(self, late: StopReport) -> StopReport:
+        """Return the report with the results of robots replaced that replied after the time limit.
+
+        Args:
+            late: Results of all programs of these robots; robots that this report lacks are ignored.
+        """
+        names = set(late.names) & set(self.names)
+        if not names:
             return self
-        key = (reply.name, reply.program)
-        robots = (reply if (robot.name, robot.program) == key else robot for robot in self.robots)
-        return replace(self, robots=tuple(robots), elapsed_ms=max(self.elapsed_ms, reply.elapsed_ms or 0.0))
+        robots: dict[str, list[RobotStop]] = {name: [] for name in self.names}
+        for report in (self, late):
+            for robot in report.robots:
+                if robot.name in robots and (robot.name in names) == (report is late):
+                    robots[robot.name].append(robot)
+        return replace(
+            self,
+            robots=tuple(robot for each in robots.values() for robot in each),
+            elapsed_ms=max(self.elapsed_ms, late.elapsed_ms),
+        )
 
 
 def unreached_result(name: str, reason: str = "") -> RobotStop:

@@ -225,14 +225,14 @@ def test_failed_connection_is_retried_at_stop(broken, pepper) -> None:
 
 def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     pepper.silent = {"stop"}
-    late: list[RobotStop] = []
+    late: list[StopReport] = []
     report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
     assert not report.is_confirmed
     (command,) = pepper.heard("stop")
     pepper._say(command, "failed", "the brake is stuck")
     until(lambda: len(late) == 1)
-    assert late[0].problem == "Pepper may still move: the brake is stuck"
-    assert report.with_late_reply(late[0]).robots == (late[0],)
+    assert late[0].robots[0].problem == "Pepper may still move: the brake is stuck"
+    assert report.with_late_reply(late[0]).robots == late[0].robots
     pepper._say(command, "succeeded")
     until(lambda: len(late) == 2)
     assert report.with_late_reply(late[1]).is_confirmed
@@ -240,7 +240,7 @@ def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     pepper._say(command, "succeeded")
     assert stopper.stop_all(timeout_s=0.1, on_late=late.append).unconfirmed_names == ("Pepper",)
     assert len(late) == 2
-    assert report.with_late_reply(RobotStop("Other", True, 1.0)) is report
+    assert report.with_late_reply(StopReport((RobotStop("Other", True, 1.0),), 1.0)) is report
 
 
 def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
@@ -248,7 +248,7 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
     pepper.silent = {"stop"}
     free: list[bool] = []
 
-    def late(_robot: RobotStop) -> None:
+    def late(_report: StopReport) -> None:
         asking = threading.Thread(target=lambda: stopper.robots)
         asking.start()
         asking.join(2.0)

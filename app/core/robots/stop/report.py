@@ -54,10 +54,10 @@ class LateReply:
 
     Attributes:
         number: Number of the Stop; None for the Stop of a single robot.
-        robot: Result for the robot.
+        report: Results of all programs of the robot.
         mark: Value of `MovedRobots.mark` when the Stop of a single robot started.
     """
 
     number: int | None
-    robot: RobotStop
+    report: StopReport
     mark: int = 0

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from app.core.faults import error_text
 from app.core.robots.stop.channels import StopChannel, StopLine, StopNode
+from app.robots.client import limits
 from app.robots.client.dialects import dialect_of, new_id
 from app.robots.client.inbox import ReplyInbox, Senders
-from app.robots.client.limits import stop_timeout_s
 from app.robots.client.stop import PendingStops, StopRequest, StopTarget
 from app.robots.client.stop_report import RobotStop, StopReport
 from app.robots.description.description import Robot, RobotTopics
@@ -30,13 +30,9 @@ from nep.protocol.graph_view import GraphView
 
 _log = logging.getLogger("studio")
 NO_NETWORK = lazy("there is no connection to the network yet")
-POLL_INTERVAL_S = 0.02
-"""Interval in seconds at which the state of a connection is checked."""
-GRAPH_POLL_INTERVAL_S = 0.1
-"""Minimum interval in seconds between graph queries while the publisher of a reply is unknown."""
-GRAPH_TIMEOUT_S = 0.3
 
-LateReplies = list[tuple[Callable[[RobotStop], object], RobotStop]]
+OnLate = Callable[[StopReport], object]
+LateReplies = list[tuple[OnLate, StopReport]]
 
 
 @dataclass(frozen=True)
@@ -44,12 +40,12 @@ class _Delivery:
     """Connections of a pending Stop.
 
     Attributes:
-        on_late: Called with each reply after the timeout, or None.
+        on_late: Called with the results of all programs after each reply after the timeout, or None.
         program_key: Key of a program whose further commands the robot rejects, or None.
     """
 
     line: StopLine
-    on_late: Callable[[RobotStop], object] | None
+    on_late: OnLate | None
     program_key: str | None
 
 
@@ -96,8 +92,8 @@ class RobotStopper:
                 results += self._stops.receive(node, message, now)
             late_replies = self._late_replies_locked(results)
             self._changed.notify_all()
-        for notify, reply in late_replies:
-            notify(reply)
+        for notify, report in late_replies:
+            notify(report)
 
     def set_expected(self, targets: Iterable[StopTarget]) -> None:
         """Set the robots to stop without connecting to new ones, so that this doesn't block.
@@ -190,7 +186,7 @@ class RobotStopper:
         timeout_s: float | None = None,
         on_answer: Callable[[RobotStop], object] | None = None,
         program_key: str | None = None,
-        on_late: Callable[[RobotStop], object] | None = None,
+        on_late: OnLate | None = None,
         is_for_all: bool = False,
     ) -> StopReport:
         """Stop robots and wait until each has replied or timed out.
@@ -203,8 +199,9 @@ class RobotStopper:
             on_answer: Called in this thread for each reply, and at the end for each robot without a
                 reply.
             program_key: Key of a program whose further commands the robots reject (see `send_stop`).
-            on_late: Called in another thread (of the node or of `update_graph`) when a robot replies
-                after the timeout, or confirms the Stop after that.
+            on_late: Called in another thread (of the node or of `update_graph`) with the results of all
+                programs of a robot when one of them replies after the timeout, or confirms the Stop after
+                that.
             is_for_all: True to send the Stop to robots whose reply is not awaited as well.
 
         Returns:
@@ -219,7 +216,7 @@ class RobotStopper:
                 self._send(line, new_id("stop"), program_key)
         self._retry_missing_channels(requests)
         if timeout_s is None:
-            timeout_s = stop_timeout_s((line.target.robot for line in lines), self._max_timeout_s)
+            timeout_s = limits.stop_timeout_s((line.target.robot for line in lines), self._max_timeout_s)
         if requests:
             self._add_new_programs(requests)
         reported = self._wait_for_replies(requests, start_time_s + timeout_s, on_answer)
@@ -239,8 +236,8 @@ class RobotStopper:
             undelivered = [request for request in requests if not self._deliver(request)]
             with self._changed:
                 remaining_s = deadline_s - self._clock()
-                pause_s = min(remaining_s, GRAPH_POLL_INTERVAL_S) if self._inbox else remaining_s
-                pause_s = min(pause_s, POLL_INTERVAL_S) if undelivered else pause_s
+                pause_s = min(remaining_s, limits.STOP_LOOKUP_INTERVAL_S) if self._inbox else remaining_s
+                pause_s = min(pause_s, limits.CONNECTION_CHECK_INTERVAL_S) if undelivered else pause_s
                 self._changed.wait_for(lambda: self._has_new_replies(requests, reported), max(0.0, pause_s))
                 new_results = [
                     (request, node, result)
@@ -340,9 +337,7 @@ class RobotStopper:
                 return [line for line in self._lines.values() if line.target.is_expected]
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
-    def _start_request(
-        self, line: StopLine, program_key: str | None, on_late: Callable[[RobotStop], object] | None
-    ) -> StopRequest:
+    def _start_request(self, line: StopLine, program_key: str | None, on_late: OnLate | None) -> StopRequest:
         with self._changed:
             request = self._stops.start(line.target, self._view, self._clock())
             pending_ids = {each.id for each in self._stops.requests}
@@ -414,14 +409,14 @@ class RobotStopper:
     def _has_new_replies(self, requests: Sequence[StopRequest], reported: set[tuple[str, str]]) -> bool:
         if any(each.new_replies(reported) for each in requests) or all(each.is_settled for each in requests):
             return True
-        return bool(self._inbox) and self._clock() - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
+        return bool(self._inbox) and self._clock() - self._graph_queried_s >= limits.STOP_LOOKUP_INTERVAL_S
 
     def _query_graph_if_needed(self) -> None:
         # Queries the graph while there is none, or while the publisher of a reply is unknown.
         with self._changed:
             now = self._clock()
             is_due = self._view is None or (
-                bool(self._inbox) and now - self._graph_queried_s >= GRAPH_POLL_INTERVAL_S
+                bool(self._inbox) and now - self._graph_queried_s >= limits.STOP_LOOKUP_INTERVAL_S
             )
             if is_due:
                 self._graph_queried_s = now
@@ -437,7 +432,7 @@ class RobotStopper:
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
-            self.update_graph(self._node.graph(GRAPH_TIMEOUT_S))
+            self.update_graph(self._node.graph(limits.GRAPH_TIMEOUT_S))
 
     def _on_replies(self, messages: Sequence[Message]) -> None:
         # Checks the sender first: only messages of programs that must answer are decoded.
@@ -451,17 +446,19 @@ class RobotStopper:
                     results += self._stops.receive(node, message, self._clock())
             late_replies = self._late_replies_locked(results)
             self._changed.notify_all()
-        for notify, result in late_replies:
-            notify(result)
+        for notify, report in late_replies:
+            notify(report)
 
     def _late_replies_locked(self, results: Sequence[tuple[StopRequest, RobotStop]]) -> LateReplies:
         # Returns late results with their callbacks, which the caller invokes after releasing the lock.
-        late = [(self._deliveries.get(request.id), result) for request, result in results if request.is_over]
-        return [
-            (delivery.on_late, result)
-            for delivery, result in late
-            if delivery is not None and delivery.on_late is not None
-        ]
+        late_requests = {request.id: (request, result) for request, result in results if request.is_over}
+        late_replies: LateReplies = []
+        for request, result in late_requests.values():
+            delivery = self._deliveries.get(request.id)
+            if delivery is not None and delivery.on_late is not None:
+                report = StopReport(tuple(self._results_locked(request)), result.elapsed_ms or 0.0)
+                late_replies.append((delivery.on_late, report))
+        return late_replies
 
     def _create_report(
         self,
@@ -501,7 +498,7 @@ def stop_and_report(
     stopper: RobotStopper | None,
     names: tuple[str, ...],
     *,
-    on_late: Callable[[RobotStop], object],
+    on_late: OnLate,
     on_answer: Callable[[RobotStop], object] | None = None,
     program_key: str | None = None,
     is_for_all: bool = False,
