@@ -195,7 +195,8 @@ class StopRequest:
         for node in [node for node in other_nodes if node in replying_nodes][:MAX_SERVING_PROGRAMS]:
             self.program_names[node] = identity_of(view, node).node or node
             replies[node] = None
-        listening_nodes = [node for node in other_nodes if node not in replying_nodes]
+        earlier_nodes = {earlier.node_id for earlier in target.earlier_programs}  # required in any case
+        listening_nodes = [node for node in other_nodes if node not in replying_nodes | earlier_nodes]
         programs = [identity_of(view, node).node or node for node in listening_nodes[:MAX_NAMED_LISTENERS]]
         if len(listening_nodes) > MAX_NAMED_LISTENERS:
             programs = [

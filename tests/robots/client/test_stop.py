@@ -94,8 +94,20 @@ def test_other_messages_do_not_prove_a_stop(message: nep.Message) -> None:
     data = message.raw.replace(b"ID", request.id.encode())
     client.receive(nep.Message(message.topic, data, "json", "robot/answer", publisher=message.publisher))
     client.see(view({1: "own", 2: "evil", 3: "evil"}, receivers=["own"], announcers=["own"]))
-    assert not request.is_proven
+    assert (request.is_proven, request.is_refused, request.has_all_replies) == (False, False, False)
     assert unproven_robots([request]) == {"Pepper": request}
+
+
+def test_program_that_announces_the_robot_later_does_not_prove_a_stop_of_the_first_one() -> None:
+    client = StopClient()
+    request = client.start(view({2: "restarted"}, receivers=["restarted"], announcers=["restarted"]))
+    client.receive(stop_reply(2, request.id))
+    assert not request.is_proven
+    client.see(
+        view({1: "own", 2: "restarted"}, receivers=["own", "restarted"], announcers=["restarted", "own"])
+    )
+    client.receive(stop_reply(1, request.id))
+    assert request.is_proven
 
 
 def test_reply_that_arrives_before_its_publisher_is_listed_proves_a_stop() -> None:
@@ -109,7 +121,7 @@ def test_reply_that_arrives_before_its_publisher_is_listed_proves_a_stop() -> No
 
 def test_reply_of_a_robot_whose_program_is_unknown_counts_once_it_is_known() -> None:
     client = StopClient(StopTarget(PEPPER))
-    request = client.start(view({1: "own"}, receivers=["own"]))  # nobody announces it yet
+    request = client.start(view({1: "own"}))  # nobody announces it or receives its commands yet
     client.receive(stop_reply(1, request.id))
     assert not request.is_proven
     client.see(ALONE)
@@ -155,6 +167,17 @@ def test_earlier_program_of_the_robot_must_confirm_too() -> None:
     client.receive(stop_reply(1, request.id))
     assert not request.is_proven
     assert [result.program for result in request.results()] == ["", "old driver"]
+
+
+def test_earlier_program_that_only_receives_commands_must_confirm_too() -> None:
+    """A program publishes its replies from the first one on; until then, the graph lists no publisher."""
+    client = StopClient(StopTarget(PEPPER, OWN, earlier_programs=(Identity("before", "old driver"),)))
+    request = client.start(view({1: "own"}, receivers=["own", "before"], announcers=["own"]))
+    client.receive(stop_reply(1, request.id))
+    assert not request.is_proven
+    client.see(view({1: "own", 2: "before"}, receivers=["own", "before"], announcers=["own"]))
+    client.receive(stop_reply(2, request.id))
+    assert request.is_proven
 
 
 def test_replies_on_earlier_topics_count() -> None:

@@ -424,10 +424,15 @@ class RobotStopper:
             self._refresh_view()
 
     def _add_new_programs(self, requests: Sequence[StopRequest]) -> None:
-        # Programs newer than the last graph received the Stop too.
+        # Programs newer than the last graph received the Stop too. Without any graph, only robots whose
+        # programs can't be told apart are settled; the others wait for the first one.
         self._refresh_view()
         with self._changed:
-            self._stops.update(self._view or GraphView(0, 0), self._clock(), requests)
+            view = self._view
+            if view is None:
+                view = GraphView(0, 0)
+                requests = [each for each in requests if not each.target.dialect.is_identified]
+            self._stops.update(view, self._clock(), requests)
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
