@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import TextIO
 
 import nep
-from app.blocks import Program, compile_behaviour
+from app.blocks import Program, ProjectCompiler
+from app.blocks.model.project import Project
 from app.blocks.model.workspace import Workspace, parse_workspace
 from app.blocks.runtime.interrupts import without_interrupts
-from app.core.documents.document import read
+from app.core.projects.file_format import read_file
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_action_titles
 from app.core.robots.stop.stopper import RobotStopper
@@ -73,14 +74,17 @@ def run_file(
     stop_requested = interrupted or threading.Event()
     write_line = _LineWriter(out or sys.stdout, stop_requested)
     try:
-        name, workspace, descriptions = read(Path(path))
-        known_robots = _parse_descriptions(descriptions)
-        robot_names = used_robot_names(workspace)
+        project, compiler = read_file(Path(path)), ProjectCompiler()
+        known_robots = _parse_descriptions(project.robots)
+        robot_names = used_robot_names(project)
         with nep.node("behaviour runner", master=master) as node:
-            discovered = _with_trusted_virtual(_find_used_robots(workspace, node, robot_wait_s, known_robots))
+            found_robots = _find_used_robots(project, compiler, node, robot_wait_s, known_robots)
+            discovered = _with_trusted_virtual(found_robots)
             for claim in discovered.rejected_claims:
                 write_line(_("warning: {sentence}").format(sentence=claim))
-            program = compile_behaviour(workspace, discovered.robots, absent=known_robots, name=name)
+            program = compiler.compile(
+                project.pages, discovered.robots, absent=known_robots, name=project.name
+            )
             code = _rejection_exit_code(program, robot_names, discovered.robots, write_line)
             if code is not None:
                 return code
@@ -106,15 +110,19 @@ def run_file(
 
 
 def _find_used_robots(
-    workspace: Mapping[str, object], node: nep.Node, wait_s: float, known_robots: Sequence[Robot]
+    project: Project,
+    compiler: ProjectCompiler,
+    node: nep.Node,
+    wait_s: float,
+    known_robots: Sequence[Robot],
 ) -> FoundRobots:
-    robot_names = used_robot_names(workspace)
+    robot_names = used_robot_names(project)
     discovered = (
         find_robots(node, wait_s, expected=robot_names, previous=known_robots)
         if robot_names
         else FoundRobots()
     )
-    if compile_behaviour(workspace, discovered.robots, absent=known_robots).publishes:
+    if compiler.compile(project.pages, discovered.robots, absent=known_robots).publishes:
         discovered = find_robots(
             node, DISCOVERY_TIMEOUT_S, expected=(), previous=known_robots
         )  # publish blocks may move any of them
@@ -135,14 +143,15 @@ def _with_trusted_virtual(discovered: FoundRobots) -> FoundRobots:
     return replace(discovered, robots=tuple(robots))
 
 
-def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
+def used_robot_names(project: Project) -> tuple[str, ...]:
     """Return the sorted names of the robots used in scripts that have a start block.
 
     The result includes robots that the file does not describe.
     """
-    parsed = parse_workspace(workspace)
-    started = tuple(script for script in parsed.scripts if _START_BLOCK_TYPE.match(script[0].type))
-    blocks = Workspace(started, parsed.variables).all_blocks()
+    parsed_pages = (parse_workspace(page.workspace.blocks) for page in project.pages)
+    scripts = (script for parsed in parsed_pages for script in parsed.scripts)
+    started = tuple(script for script in scripts if _START_BLOCK_TYPE.match(script[0].type))
+    blocks = Workspace(started, {}).all_blocks()
     return tuple(sorted({block.field_text("ROBOT") for block in blocks if block.is_enabled} - {""}))
 
 

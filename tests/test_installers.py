@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.file_format import SUFFIX
+from app.core.projects.file_format import SUFFIX
 
 FOLDER = Path(__file__).parents[1] / "installers"
 TYPE = "application/x-nep-behaviour"

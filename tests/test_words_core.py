@@ -16,11 +16,11 @@ from msgpack import packb  # type: ignore[import-untyped]
 
 from app import errors as app_errors
 from app.core.alerts.alerts import Alerts
-from app.core.documents.file_format import parse_file
 from app.core.network import graph_changes
 from app.core.network.decode_checks import CheckResult
 from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.topics import Topic, Topics
+from app.core.projects.file_format import parse_file
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RESTART_TIMEOUT_S, Health
 from app.core.robots.health_facts import health_items

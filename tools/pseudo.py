@@ -62,8 +62,8 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
 
 def sentences_of_examples() -> Iterator[tuple[str, str, str]]:
     """Yield (context, English text, file) for the texts that are translated when an example is opened."""
-    from app.core.documents.examples import translated  # noqa: PLC0415 - as above
-    from app.core.documents.file_format import read_file  # noqa: PLC0415
+    from app.core.projects.examples import translated  # noqa: PLC0415 - as above
+    from app.core.projects.file_format import read_file  # noqa: PLC0415
 
     file_by_text: dict[tuple[str, str], str] = {}
     for path in sorted((ROOT / "resources" / "examples").glob("*.nepb")):

@@ -11,7 +11,6 @@ from typing import Protocol
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import ShowAlarms
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import PermissionQuestion
@@ -19,6 +18,7 @@ from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
+from app.core.storage.background_worker import BackgroundWorker
 from app.core.storage.settings import Settings
 from app.core.storage.user_file import read_stored
 from app.core.world.console import Console

@@ -15,10 +15,6 @@ from typing import TYPE_CHECKING
 
 from app.core.alarms import SessionAlarms
 from app.core.alerts.alerts import Alerts
-from app.core.documents.document import Document
-from app.core.documents.journal import Journal
-from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import SavedTabs
 from app.core.faults import FaultAlerts, log_errors
 from app.core.network.doctor import create_doctor
 from app.core.network.mailbox import Mailbox
@@ -45,6 +41,11 @@ from app.core.parts.programs import (
     alert_launch_failure,
 )
 from app.core.parts.robots import ConnectedRobots, RoomSync, StopConnections
+from app.core.projects.journal import Journal
+from app.core.projects.open_project import OpenProject
+from app.core.projects.open_projects import OpenProjects
+from app.core.projects.project_files import ProjectFiles
+from app.core.projects.saved_tabs import SavedTabs
 from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import SessionRecordings
 from app.core.reports.own_process import OwnProgram
@@ -140,8 +141,10 @@ class Session:
         self.last_robots = LastRobots(self.settings)
 
     def _add_programs(self, journal_folder: Path | None) -> None:
-        self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
-        self.tabs = SavedTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        self.documents = OpenProjects(lambda: OpenProject(lambda: Journal(journal_folder)))
+        warn = partial(self.console.add, "warn", "studio")
+        self.tabs = SavedTabs(self.settings, self.documents, warn)
+        self.files = ProjectFiles(self.documents, self.tabs, self.settings, warn)
         self.runs = Runs(
             self.documents, self.fleet, self, alerts=self.alerts, console=self.console,
             post_event=self._mailbox.post_event, clock=self._clock,
@@ -228,7 +231,7 @@ class Session:
     # -- public ----------------------------------------------------------------------------------------------
 
     @property
-    def document(self) -> Document:
+    def document(self) -> OpenProject:
         """Behaviour of the current tab."""
         return self.documents.current
 
@@ -238,7 +241,7 @@ class Session:
         connected = {link.name for link in self.fleet.connected}
         return tuple(name for name in self.launcher.starting_robots if name not in connected)
 
-    def confirm_discard(self, document: Document) -> bool:
+    def confirm_discard(self, document: OpenProject) -> bool:
         """Return True if the user confirms discarding work that can't be saved.
 
         The first call raises an alert and returns False; a second call confirms.

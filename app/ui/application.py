@@ -20,8 +20,8 @@ from PySide6.QtWidgets import QApplication
 
 from app import resources
 from app.core.alerts.alerts import Alerts
-from app.core.documents.journal import newer_work_names, unsaved_work
-from app.core.documents.versions import move_old_versions
+from app.core.projects.journal import newer_work_names, unsaved_work
+from app.core.projects.versions import move_old_versions
 from app.core.reports import studio_versions
 from app.core.reports.crash_reports import CrashLog, CrashReports, show_crash_alert
 from app.core.reports.not_installed import alert_missing, missing_libraries

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.core.documents.file_format import SUFFIX
+from app.core.projects.file_format import SUFFIX
 
 __all__ = [
     "APP_ICON",

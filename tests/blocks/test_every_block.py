@@ -6,7 +6,8 @@ import ast
 
 import pytest
 
-from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.compiler.program_names import COMMANDS
 from app.blocks.model.fields import StatementInput, ValueInput
 from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.toolbox.catalogue import Catalogue, categories

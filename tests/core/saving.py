@@ -13,9 +13,9 @@ import sys
 import threading
 from pathlib import Path
 
-from app.core.documents.document import Document
-from app.core.documents.file_format import read_file
-from app.core.documents.journal import Journal
+from app.core.projects.file_format import read_file
+from app.core.projects.journal import Journal
+from app.core.projects.open_project import OpenProject
 from app.errors import DocumentError
 
 
@@ -26,7 +26,7 @@ def blocks(number: int) -> dict[str, object]:
 
 
 def save_for_ever(path: Path, journals: Path, begin: int, saved: int) -> None:
-    document = Document(lambda: Journal(journals))
+    document = OpenProject(lambda: Journal(journals))
     if path.exists():
         document.open(path)
     number = begin
@@ -39,7 +39,7 @@ def save_for_ever(path: Path, journals: Path, begin: int, saved: int) -> None:
 
 def look(path: Path) -> str:
     try:
-        return f"whole {len(read_file(path).workspace['blocks']['blocks'])}"  # type: ignore[index,call-overload]
+        return f"whole {len(read_file(path).always.workspace.blocks['blocks']['blocks'])}"  # type: ignore[index,call-overload]
     except FileNotFoundError:
         return "none yet"
     except DocumentError as error:

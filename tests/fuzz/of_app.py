@@ -17,10 +17,11 @@ IS_THERE = all(importlib.util.find_spec(each) for each in ("platformdirs", "json
 
 if IS_THERE:  # optional: not dependencies of the library
     from app.blocks.model.program import Program
+    from app.blocks.model.project import Project
     from app.blocks.model.workspace import parse_workspace
     from app.blocks.runtime.variables import VariableValue
-    from app.core.documents.file_format import BehaviourFile, parse_file, write_file
     from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject
+    from app.core.projects.file_format import parse_file, write_file
     from app.core.robots.voices import RobotSound
     from app.core.storage.settings import Settings
     from app.errors import DescriptionError, DocumentError
@@ -50,7 +51,7 @@ if IS_THERE:  # optional: not dependencies of the library
     )
     def files_of_behaviours(data: bytes) -> None:
         made = parse_file(data, Path("a.nepb"))
-        assert isinstance(made, BehaviourFile)
+        assert isinstance(made, Project)
         parse_workspace(made.workspace)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "a.nepb"

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app import resources
-from app.core.documents.workspace_json import WorkspaceJson
+from app.blocks.model.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
 from tests.still import LOOK
 

@@ -1,5 +1,5 @@
-"""Compiler from a workspace to a program.
+"""Compiler from the pages of a project to one program.
 
-Templates are filled with syntax trees, from which readable source and executable code are generated.
-`compiler.compile_behaviour` is the entry point; `problems` contains the messages shown before Run.
+Templates are filled with syntax trees, from which readable source and executable code are generated
+(`page_compiler`), and the code of the pages is put together (`linker`). `compiler` is the entry point.
 """

@@ -10,11 +10,12 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
+from app.blocks.compiler.program_names import PageNames
 from app.blocks.model.block import Block
 from app.blocks.model.fields import Argument, ValueInput
 from app.blocks.model.mutators import Branches, FunctionInput, Inputs, Items, function_name, inputs_of
-from app.blocks.model.names import PythonNames
 from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from nep.i18n import _
@@ -46,16 +47,72 @@ class Function:
     has_result: bool
 
 
+ModuleKey = tuple[Literal["id", "name"], str]
+"""Id or name of a function, by which a call on another page refers to it."""
+
+
+@dataclass(frozen=True)
+class ModuleFunction:
+    """Part of a function on a module page that its callers on other pages depend on.
+
+    Attributes:
+        definition_id: Id of the block that defines the function, unique in the project.
+        name: Name given by the user.
+        inputs: Inputs in order.
+        has_result: True if the function returns a result.
+    """
+
+    definition_id: str
+    name: str
+    inputs: tuple[FunctionInput, ...]
+    has_result: bool
+
+
+def module_functions(workspace: Workspace, block_prefix: str) -> dict[ModuleKey, ModuleFunction]:
+    """Return the functions that a module page defines, by id and by name.
+
+    Args:
+        workspace: Parsed page.
+        block_prefix: Prefix of the ids of its blocks.
+    """
+    functions: dict[ModuleKey, ModuleFunction] = {}
+    for script in workspace.scripts:
+        first = script[0]
+        if first.type in _HAS_RESULT and first.is_enabled:
+            name = function_name(first)
+            function = ModuleFunction(first.id, name, inputs_of(first.extra_state), _HAS_RESULT[first.type])
+            functions["id", first.id.removeprefix(block_prefix)] = function
+            functions.setdefault(("name", name), function)
+    return functions
+
+
 class Lowering:
     """Rewriting of a workspace, and look-up of its functions.
+
+    Args:
+        workspace: Parsed page.
+        catalogue: Block descriptions, to which those of the rewritten blocks are added.
+        names: Names in the page.
+        modules: Functions of other pages that can be called.
+        block_prefix: Prefix of the ids of the page's blocks.
 
     Attributes:
         workspace: Rewritten workspace.
         variables: Names of the variables by id, without the inputs of functions.
+        module_lookups: Results of all look-ups in ``modules``.
     """
 
-    def __init__(self, workspace: Workspace, catalogue: Catalogue, names: PythonNames) -> None:
-        self._catalogue = catalogue
+    def __init__(
+        self,
+        workspace: Workspace,
+        catalogue: Catalogue,
+        names: PageNames,
+        modules: Mapping[ModuleKey, ModuleFunction],
+        block_prefix: str,
+    ) -> None:
+        self._catalogue, self._names, self._block_prefix = catalogue, names, block_prefix
+        self._modules, self._called_functions = modules, dict[str, Function]()
+        self.module_lookups: dict[ModuleKey, ModuleFunction | None] = {}
         self.variables = workspace.variables  # without inputs of functions
         self._functions_by_id: dict[str, Function] = {}
         for script in workspace.scripts:
@@ -87,13 +144,30 @@ class Lowering:
         )
 
     def _find_function(self, placed_block: PlacedBlock) -> Function | None:
-        function = self._functions_by_id.get(str(placed_block.extra_state.get("function")))
-        function = function or self._functions_by_name.get(function_name(placed_block))
+        id, name = str(placed_block.extra_state.get("function")), function_name(placed_block)
+        function = (
+            self._functions_by_id.get(self._block_prefix + id)
+            or self._find_in_modules(("id", id))
+            or self._functions_by_name.get(name)
+            or self._find_in_modules(("name", name))
+        )
         return (
             None
             if function is None or (placed_block.type == CALL_RESULT and not function.has_result)
             else function
         )
+
+    def _find_in_modules(self, key: ModuleKey) -> Function | None:
+        function = self.module_lookups[key] = self._modules.get(key)
+        if function is None:
+            return None
+        id = function.definition_id
+        if id not in self._called_functions:
+            python_name = self._names.new_name(function.name, "function", ("function", id))
+            self._called_functions[id] = Function(
+                PlacedBlock(id, ""), function.name, python_name, {}, function.inputs, function.has_result
+            )
+        return self._called_functions[id]
 
     def _lower(self, placed_block: PlacedBlock) -> PlacedBlock:
         inner = {name: tuple(map(self._lower, chain)) for name, chain in placed_block.inputs.items()}
@@ -193,10 +267,10 @@ class Lowering:
         return replace(placed_block, type=block.type)
 
 
-def _parse_function(placed_block: PlacedBlock, names: PythonNames) -> Function:
+def _parse_function(placed_block: PlacedBlock, names: PageNames) -> Function:
     inputs = inputs_of(placed_block.extra_state)
     name = function_name(placed_block)
-    python = names.new_name(name, "function")
+    python = names.new_name(name, "function", ("function", placed_block.id))
     parameters = {each.id: names.new_name(each.name, "input") for each in inputs}
     return Function(placed_block, name, python, parameters, inputs, _HAS_RESULT[placed_block.type])
 

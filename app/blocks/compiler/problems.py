@@ -1,4 +1,4 @@
-"""Problems of a workspace, as messages shown before Run."""
+"""Problems of the blocks of a page, as messages shown before Run."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from app.blocks.compiler.conflicts import Conflict
 from app.blocks.compiler.foreign import EQUIVALENT_BLOCKS
+from app.blocks.compiler.problem_list import ProblemList
 from app.blocks.model.block import Block
 from app.blocks.model.block_text import block_text, label, label_of_unknown
 from app.blocks.model.fields import Argument, Field, FieldError, TextField, ValueInput, VariableField
-from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
 from nep.i18n import _, format_list, lazy, pgettext
 
-_SEVERITY_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
 _SLOT_TYPE_NAMES = {
     "Number": lazy("a number"),
     "String": lazy("a text"),
@@ -34,63 +33,42 @@ _RESOURCE_NAMES = {
     "light": lazy("the light"),
 }
 """Display names of the resources of Studio's own robots; resources of other robots are shown by name."""
-_START_BLOCK = "events_started"
 
 
-class ProblemCollector:
-    """Collector of the problems that the compiler finds; duplicate messages of a block are dropped."""
+class ProblemCollector(ProblemList):
+    """Collector of the problems that the compiler finds on one page."""
 
     def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:
+        super().__init__()
         self._catalogue = catalogue
         self._workspace = workspace
-        self._problems: dict[tuple[str | None, str], Problem] = {}
-
-    def problems(self) -> tuple[Problem, ...]:
-        """Return all problems, the most severe first."""
-        return tuple(sorted(self._problems.values(), key=lambda problem: _SEVERITY_ORDER[problem.severity]))
 
     def label(self, placed_block: PlacedBlock, block: Block | None) -> str:
         """Return the label of a block for use in messages."""
         return label_of_unknown(placed_block) if block is None else label(placed_block, block)
-
-    def check_starts(self, starts: int) -> None:
-        """Report a workspace that contains blocks but no script that can start.
-
-        Args:
-            starts: Number of scripts with a start block.
-        """
-        if starts or not self._workspace.scripts:
-            return
-        subject = pgettext("block", "when started")
-        self._add(
-            "warning", None, None, subject,
-            _("No event block starts these blocks, so they don't run. Put “{start}” above "
-              "them.").format(start=subject),
-            fix=_("Add “when started”"), fix_action=f"add:{_START_BLOCK}",
-        )  # fmt: skip
 
     def report_unattached(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block that is neither below a start block nor in a slot of another block."""
         name = self.label(placed_block, block)
         if block.shape in ("value", "boolean"):
             template = _("{block} isn't used. Drag it into an empty slot of another block.")
-            self._add("info", placed_block, block, name, template.format(block=name))
+            self.add("info", placed_block, block, name, template.format(block=name))
             return
         message = _("{block} doesn't run. Put it below “{start}”.")
         start = pgettext("block", "when started")
-        self._add("info", placed_block, block, name, message.format(block=name, start=start))
+        self.add("info", placed_block, block, name, message.format(block=name, start=start))
 
     def report_misplaced(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block at an invalid position, which the editor prevents but a file may contain."""
         name = self.label(placed_block, block)
         message = _("{block} can't be used here. It stays in the file but is skipped.")
-        self._add("warning", placed_block, block, name, message.format(block=name))
+        self.add("warning", placed_block, block, name, message.format(block=name))
 
     def report_too_deep(self, placed_block: PlacedBlock) -> None:
         """Report a block that is nested too deeply for Python."""
         block = self._catalogue.blocks.get(placed_block.type)
         name = self.label(placed_block, block)
-        self._add(
+        self.add(
             "error", placed_block, block, name,
             _(
 
@@ -103,7 +81,7 @@ class ProblemCollector:
     def report_no_message(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a block that reads the received message but is not in a script started by a message."""
         name = self.label(placed_block, block)
-        self._add(
+        self.add(
             "warning", placed_block, block, name,
             _("{block} only works below “when a message arrives”.").format(block=name),
         )  # fmt: skip
@@ -114,47 +92,14 @@ class ProblemCollector:
         message = _(
             "“{name}” only works inside its own function. It stays in the file but is skipped."
         ).format(name=name)
-        self._add("warning", placed_block, block, name, message)
+        self.add("warning", placed_block, block, name, message)
 
     def report_undefined(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a call of an undefined function."""
-        self._add(
+        self.add(
             "error", placed_block, block, self.label(placed_block, block), block.undefined_message,
             fix=_("Define the function"), fix_action=f"define:{placed_block.id}",
         )  # fmt: skip
-
-    def report_never_set(
-        self, placed_block: PlacedBlock, block: Block, id: str, name: str, *, is_list: bool
-    ) -> None:
-        """Report a variable that is read but never set, so that its value remains 0.
-
-        Args:
-            placed_block: First block that reads the variable.
-            block: Description of the block.
-            id: Id of the variable.
-            name: Name of the variable.
-            is_list: True if the variable is used as a list.
-        """
-        subject = f"“{name}”"
-        self._add(
-            "warning", placed_block, block, subject, _("{name} is used but never set.").format(name=subject),
-            fix=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
-            fix_action=f"begin:{'list' if is_list else 'number'}:{id}",
-        )  # fmt: skip
-
-    def report_never_received(self, placed_block: PlacedBlock, block: Block, name: str) -> None:
-        """Report a broadcast that no script receives."""
-        subject = f"“{name}”"
-        self._add(
-            "warning", placed_block, block, subject, _("Nothing receives {name}.").format(name=subject),
-            fix=_("Add “when I receive”"), fix_action=f"receive:{name}",
-        )  # fmt: skip
-
-    def report_never_sent(self, placed_block: PlacedBlock, block: Block, name: str) -> None:
-        """Report a script that waits for a broadcast which is never sent."""
-        subject = f"“{name}”"
-        message = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
-        self._add("info", placed_block, block, subject, message)
 
     def report_conflict(self, conflict: Conflict) -> None:
         """Report two scripts that use the same resource of a robot, at the block of the second script."""
@@ -170,7 +115,7 @@ class ProblemCollector:
             action=conflict.first.action.title, other=name, robot=conflict.second.robot,
             part=_("the {part}").format(part=conflict.resource) if resource is None else _(resource),
         )  # fmt: skip
-        self._add(
+        self.add(
             "warning", placed_block, self._catalogue.blocks.get(placed_block.type), name, message,
             fix=_("Run one after the other") if conflict.reordering else None,
             fix_action=f"after:{':'.join(conflict.reordering)}" if conflict.reordering else None,
@@ -180,7 +125,7 @@ class ProblemCollector:
         """Report an invalid field value."""
         name = self.label(placed_block, block)
         message = _("{block} {what_is_wrong}. It stays in the file but is skipped.")
-        self._add("error", placed_block, block, name, message.format(block=name, what_is_wrong=error))
+        self.add("error", placed_block, block, name, message.format(block=name, what_is_wrong=error))
 
     def report_unsupported(
         self, placed_block: PlacedBlock, block: Block | None, parent: PlacedBlock | None
@@ -209,7 +154,7 @@ class ProblemCollector:
             and placed_block.type.startswith("robot_")
         ):
             message = _("{robot} isn't connected, so {block} will be skipped.")
-            self._add(
+            self.add(
                 "warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks),
                 fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
@@ -219,7 +164,7 @@ class ProblemCollector:
             return True
         if isinstance(robot, str) and block.robot is not None and not self._is_supported(robot, block):
             message = _("{robot} can't do this, so {block} will be skipped.")
-            self._add("warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks))
+            self.add("warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks))
             return True
         return False
 
@@ -231,14 +176,14 @@ class ProblemCollector:
                 "This file uses “{block}”, which no connected robot supports. It stays in the file but is "
                 "skipped."
             )
-            self._add("warning", placed_block, None, name, message.format(block=name), style="robot")
+            self.add("warning", placed_block, None, name, message.format(block=name), style="robot")
         elif equivalent is not None:
             equivalent_label = label(PlacedBlock("", equivalent.type), equivalent)
             message = _(
                 "“{block}” belongs to another program and can't run here. It stays in the file but is "
                 "skipped. “{own_block}” does the same."
             )
-            self._add(
+            self.add(
                 "warning", placed_block, None, name, message.format(block=name, own_block=equivalent_label),
                 fix=_("Show “{block}”").format(block=equivalent_label),
                 fix_action=f"point.block:{equivalent.type}",
@@ -247,13 +192,13 @@ class ProblemCollector:
             message = _(
                 "“{block}” isn't known to this version of NEP Studio. It stays in the file but is skipped."
             )
-            self._add("warning", placed_block, None, name, message.format(block=name))
+            self.add("warning", placed_block, None, name, message.format(block=name))
         else:
             message = _(
                 "“{block}” belongs to another program and can't run here. It stays in the file but is "
                 "skipped."
             )
-            self._add("warning", placed_block, None, name, message.format(block=name))
+            self.add("warning", placed_block, None, name, message.format(block=name))
 
     def check_unknown(self) -> None:
         """Report unknown blocks that the compiler didn't reach because they are inside skipped blocks."""
@@ -284,7 +229,7 @@ class ProblemCollector:
                     continue
                 reported_ids.add(id)
                 name = self.label(placed_block, block)
-                self._add(
+                self.add(
                     "warning", placed_block, block, name,
                     _(
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
@@ -329,14 +274,14 @@ class ProblemCollector:
             message = _("{block} needs {what}. Drag one into its slot.").format(
                 block=name, what=_(_SLOT_TYPE_NAMES[argument.check])
             )
-            self._add("error", placed_block, block, name, message)
+            self.add("error", placed_block, block, name, message)
             return message
         return None
 
     def report_hints(self, placed_block: PlacedBlock, block: Block) -> None:
         """Report a wait without time limit, and invalid values in the input of an action."""
         if block.type == "control_wait_until" and not _is_literal(placed_block, "CONDITION"):
-            self._add(
+            self.add(
                 "info", placed_block, block, self.label(placed_block, block),
                 self._wait_forever_message(placed_block, block),
                 fix=_("Add a time limit"), fix_action=f"limit:{placed_block.id}",
@@ -363,7 +308,7 @@ class ProblemCollector:
             message = _(
                 "{block} on {topic} moves {robots}. Studio asks for permission first; Stop ends the movement."
             )
-            self._add(
+            self.add(
                 "info", placed_block, block, name, message.format(block=name, topic=topic, robots=robot_names)
             )
 
@@ -384,34 +329,7 @@ class ProblemCollector:
         for problem in action.problems(action.complete(literal_values)):
             if problem not in existing_problems:
                 name = self.label(placed_block, block)
-                self._add("error", placed_block, block, name, f"{name}: {problem.message}.")
-
-    def _add(
-        self,
-        severity: Severity,
-        placed_block: PlacedBlock | None,
-        block: Block | None,
-        subject: str,
-        message: str,
-        *,
-        fix: str | None = None,
-        fix_action: str | None = None,
-        style: str | None = None,
-    ) -> None:
-        id = None if placed_block is None else placed_block.id
-        self._problems.setdefault(
-            (id, message),
-            Problem(
-                severity=severity,
-                block_id=id,
-                category=block.style if block is not None else style,
-                subject=subject,
-                message=message,
-                fix=fix,
-                fix_action=fix_action,
-                icon=block.icon if block is not None else "circle-help",
-            ),
-        )
+                self.add("error", placed_block, block, name, f"{name}: {problem.message}.")
 
 
 def _is_literal(placed_block: PlacedBlock, name: str) -> bool:

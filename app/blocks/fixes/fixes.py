@@ -10,6 +10,8 @@ from app.blocks.model.mutators import function_name, inputs_of
 from app.blocks.model.workspace import PlacedBlock, is_enabled, saved_blocks
 from app.blocks.toolbox.catalogue import categories
 
+BLOCK_FIXES = frozenset({"limit", "define", "after"})
+"""Verbs of the actions that name blocks; other actions name types, variables or broadcasts."""
 DEFAULT_TIME_LIMIT_S = 10
 LEFT_PX, TOP_PX = 40, 40
 SCRIPT_SPACING_PX = 420

@@ -88,12 +88,17 @@ def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
                 pending.extend(connection[name] for name in ("block", "shadow") if name in connection)
 
 
-def parse_workspace(saved: Mapping[str, object]) -> Workspace:
-    """Parse a workspace saved by Blockly. Never raises; invalid parts are dropped."""
+def parse_workspace(saved: Mapping[str, object], block_prefix: str = "") -> Workspace:
+    """Parse a workspace saved by Blockly. Never raises; invalid parts are dropped.
+
+    Args:
+        saved: Saved workspace.
+        block_prefix: Text that is put before the ids of all blocks, to distinguish the pages of a project.
+    """
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     ids = UniqueTexts("~")
-    scripts = tuple(_parse_chain(top, 0, ids, is_shadow=False) for top in _as_list(tops))
+    scripts = tuple(_parse_chain(top, 0, ids, block_prefix, is_shadow=False) for top in _as_list(tops))
     variables: dict[str, str] = {}
     for variable in _as_list(saved.get("variables")):
         if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
@@ -123,32 +128,34 @@ def _as_list(saved: object) -> Sequence[object]:
     return saved if isinstance(saved, (list, tuple)) else ()
 
 
-def _parse_chain(saved: object, depth: int, ids: UniqueTexts, *, is_shadow: bool) -> tuple[PlacedBlock, ...]:
+def _parse_chain(
+    saved: object, depth: int, ids: UniqueTexts, prefix: str, *, is_shadow: bool
+) -> tuple[PlacedBlock, ...]:
     # A loop instead of recursion, because a script may be long.
     chain: list[PlacedBlock] = []
     while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
-        chain.append(_parse_block(saved, depth, ids, is_shadow=is_shadow))
+        chain.append(_parse_block(saved, depth, ids, prefix, is_shadow=is_shadow))
         next_connection = saved.get("next")
         saved = next_connection.get("block") if isinstance(next_connection, Mapping) else None
     return tuple(chain)
 
 
 def _parse_block(
-    saved: Mapping[str, object], depth: int, ids: UniqueTexts, *, is_shadow: bool
+    saved: Mapping[str, object], depth: int, ids: UniqueTexts, prefix: str, *, is_shadow: bool
 ) -> PlacedBlock:
     fields = saved.get("fields")
     saved_inputs = saved.get("inputs")
     connections = saved_inputs if isinstance(saved_inputs, Mapping) else {}
     inputs: dict[str, tuple[PlacedBlock, ...]] = {}
     saved_id = saved.get("id")
-    id = ids.make_unique(saved_id if isinstance(saved_id, str) and saved_id else "block")
+    id = ids.make_unique(prefix + (saved_id if isinstance(saved_id, str) and saved_id else "block"))
     if depth < MAX_DEPTH:
         for name, connection in connections.items():
             if isinstance(connection, Mapping):
                 block = connection.get("block")
                 inner = block if isinstance(block, Mapping) else connection.get("shadow")
                 inputs[str(name)] = _parse_chain(
-                    inner, depth + 1, ids, is_shadow=not isinstance(block, Mapping)
+                    inner, depth + 1, ids, prefix, is_shadow=not isinstance(block, Mapping)
                 )
     return PlacedBlock(
         id=id,

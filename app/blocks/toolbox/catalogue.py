@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -38,6 +39,12 @@ class Catalogue:
             for category in categories():
                 for block in category.make_blocks(robot, robots_with_absent) if category.make_blocks else ():
                     self.blocks.setdefault(block.type, block)
+
+    def copy(self) -> Catalogue:
+        """Return a catalogue to which descriptions can be added without changing this one."""
+        copied = copy.copy(self)
+        copied.blocks = dict(self.blocks)
+        return copied
 
 
 def categories() -> tuple[Category, ...]:

@@ -12,12 +12,12 @@ from functools import partial
 
 import orjson
 
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.faults import error_text
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import Job
 from app.core.network.topics import Topic, key_of
 from app.core.network.watches import WatchHandle
+from app.core.storage.background_worker import BackgroundWorker
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _

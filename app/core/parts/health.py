@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from app.core.documents.open_documents import Documents
 from app.core.network.traffic import Traffic
+from app.core.projects.open_projects import OpenProjects
 from app.core.reports.own_process import OwnProgram
 from app.core.robots.health import Health
 from app.core.robots.launcher import Launcher
@@ -51,7 +51,7 @@ class HealthChecks(SessionPart):
         *,
         runs: Runs,
         launcher: Launcher,
-        documents: Documents,
+        documents: OpenProjects,
         settings: Settings,
         own_program: OwnProgram,
     ) -> None:

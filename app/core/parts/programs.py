@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import OPEN_DOCTOR_LABEL, ConnectRobot, OpenDoctor
-from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import SavedTabs
 from app.core.faults import log_errors
 from app.core.network.web_pages import WebPages
+from app.core.projects.open_projects import OpenProjects
+from app.core.projects.saved_tabs import SavedTabs
 from app.core.robots.fleet import Fleet
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import Launcher, LaunchFailed
@@ -26,7 +26,7 @@ class OpenBehaviourTabs(SessionPart):
 
     task = lazy("save the open tabs")
 
-    def __init__(self, live: LiveWorld, fleet: Fleet, documents: Documents, tabs: SavedTabs) -> None:
+    def __init__(self, live: LiveWorld, fleet: Fleet, documents: OpenProjects, tabs: SavedTabs) -> None:
         self._live, self._fleet, self._documents, self._tabs = live, fleet, documents, tabs
         self._fleet_revision = self._topics_revision = -1
 

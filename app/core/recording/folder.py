@@ -11,9 +11,9 @@ from pathlib import Path
 
 import platformdirs
 
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.opener import LocalOpener, RecordingOpener
+from app.core.storage.background_worker import BackgroundWorker
 from nep.errors import NepError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.reader import Recording

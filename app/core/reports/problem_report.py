@@ -22,8 +22,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.documents.file_format import DISK_FULL_ERRNOS, SUFFIX
 from app.core.faults import error_text, log_folder
+from app.core.projects.file_format import DISK_FULL_ERRNOS, SUFFIX
 from app.core.reports.crash_reports import CrashReports, read_reports
 from app.core.reports.privacy import reportable_settings, without_home
 from app.core.reports.studio_versions import format_versions

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from app.blocks.model import deep_json
 from app.blocks.model.program import Program
 from app.blocks.model.workspace import saved_blocks
 from app.core.run.requests import RequestedRun
-from app.core.storage import deep_json
 
 _CONTENT_KEYS = ("type", "fields", "inputs", "extraState", "enabled", "disabledReasons")
 

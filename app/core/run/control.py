@@ -14,7 +14,7 @@ from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts.alerts import Alerts
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import actions_by_robot
 from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
@@ -84,7 +84,7 @@ class Runs:
         self._create_runner = create_runner
         self.starting_robots: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
         self.before_stop: Callable[[], object] = tuple  # called by Stop before it stops robots
-        self.document: Document | None = None  # the run's behaviour
+        self.document: OpenProject | None = None  # the run's behaviour
         self._runner: Runner | None = None
         self._current_request: RequestedRun | None = None  # the current run, else the last
         self._trial = Trial()
@@ -101,7 +101,7 @@ class Runs:
         fleet.robots_in_use = lambda: self.used_robots
         self._stop_reporter = StopReporter(fleet, alerts, console)
         self._run = RunState()
-        self._view: tuple[RunState, Document, RunView] | None = None
+        self._view: tuple[RunState, OpenProject, RunView] | None = None
         self._stop_number = self._stop_mark = 0
         self._stopped_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
@@ -226,7 +226,7 @@ class Runs:
         value = self.values.get(id) if self.document is document else None
         self._trial.set_value(document, stack, value.text if value is not None else _("no value yet"))
 
-    def is_running_or_pending(self, document: Document) -> bool:
+    def is_running_or_pending(self, document: OpenProject) -> bool:
         """Return True if this behaviour is running, or will be run when another program has stopped."""
         return (self.active and self.document is document) or (
             self._pending_request is not None and self._pending_request.document is document

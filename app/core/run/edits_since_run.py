@@ -8,7 +8,7 @@ from app.blocks.model.program import Program
 
 
 class RunDocument(Protocol):
-    """Part of the interface of `Document` that `EditsSinceRun` uses."""
+    """Part of the interface of `OpenProject` that `EditsSinceRun` uses."""
 
     edits: int
 

@@ -8,21 +8,21 @@ from typing import Protocol
 
 from app.blocks.compiler.stack import SHOW_BLOCK_ID, Stack
 from app.blocks.model.program import Program
-from app.core.documents.document import Document
-from app.core.documents.problems import CONNECT_PREFIX
+from app.core.projects.open_project import OpenProject
+from app.core.projects.problems import CONNECT_PREFIX
 from app.robots.description.description import Robot
 from app.robots.description.inputs import display_unit
 from nep.i18n import _
 
 
 class OpenBehaviours(Protocol):
-    """Part of the interface of `Documents` that a run uses."""
+    """Part of the interface of `OpenProjects` that a run uses."""
 
     @property
-    def current(self) -> Document:
+    def current(self) -> OpenProject:
         """Behaviour of the current tab, to which Run applies."""
 
-    def title(self, document: Document) -> str:
+    def title(self, document: OpenProject) -> str:
         """Return the title of a behaviour."""
 
 
@@ -36,7 +36,7 @@ class RequestedRun:
         stack: Stack to run; None for the whole behaviour.
     """
 
-    document: Document
+    document: OpenProject
     starts_paused: bool = False
     stack: Stack | None = None
 

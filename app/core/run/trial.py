@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.run.requests import RequestedRun
 from app.robots.description.description import Robot
 from nep.i18n import _
@@ -25,7 +25,7 @@ class TriedValue:
         number: Serial number of the trial.
     """
 
-    document: Document
+    document: OpenProject
     block: str
     text: str
     number: int
@@ -65,7 +65,7 @@ class Trial:
         self.set_value(request.document, request.stack, text)
         return text
 
-    def set_value(self, document: Document, stack: Stack, text: str) -> None:
+    def set_value(self, document: OpenProject, stack: Stack, text: str) -> None:
         """Set the value of a tried block.
 
         Args:

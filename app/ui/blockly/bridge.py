@@ -10,7 +10,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal, Slot
 from PySide6.QtGui import QGuiApplication
 
-from app.core.storage import deep_json
+from app.blocks.model import deep_json
 
 Json = dict[str, object]
 CLIPBOARD_PREFIX = '{"nepStudio":'

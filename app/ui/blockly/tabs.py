@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from app.core.documents.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
+from app.blocks.model.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
 
 
 @dataclass

@@ -12,7 +12,7 @@ from PySide6.QtCore import QByteArray, QMarginsF, QPoint, Signal
 from PySide6.QtGui import QPageLayout
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.core.documents.workspace_json import WorkspaceJson
+from app.blocks.model.workspace_json import WorkspaceJson
 from app.ui.blockly.bridge import Json
 from app.ui.blockly.host import BlocklyHost
 from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.blocks import Problem
-from app.core.documents.problems import Fix, ProblemLine, problem_lines
+from app.core.projects.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
@@ -31,7 +31,7 @@ from nep.i18n import _, lazy, ngettext
 if TYPE_CHECKING:
     from app.blocks import Program
     from app.core.alerts.alerts import ActiveAlert
-    from app.core.documents.document import Document
+    from app.core.projects.open_project import OpenProject
     from app.robots.description.description import Robot
 
 STATUS_BY_SEVERITY = {"error": "error", "warning": "warn", "info": "info"}
@@ -197,7 +197,7 @@ class ProblemsPanel(PanelWidget):
         self.status_label.setText(_("Checked as you build"))
         lines = problem_lines(
             program.problems,
-            document.workspace if program.absent else {},  # parsed only if robots are missing
+            document.project.pages if program.absent else (),  # parsed only if robots are missing
             self._missing_robots(document),
             [link.robot for link in self.session.fleet.connected],
             VIRTUAL_ROBOT_MODULES,
@@ -210,7 +210,7 @@ class ProblemsPanel(PanelWidget):
             self._problem_lines = lines
             self._show(lines)
 
-    def _missing_robots(self, document: Document) -> list[Robot]:
+    def _missing_robots(self, document: OpenProject) -> list[Robot]:
         # As described in the behaviour, else as last reported on the network.
         robots = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
         return list({**robots, **{robot.name: robot for robot in document.absent_robots}}.values())

@@ -13,8 +13,8 @@ from PySide6.QtCore import QKeyCombination, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.documents.titles import recent_titles
 from app.core.faults import log_errors
+from app.core.projects.titles import recent_titles
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, ShowToast
@@ -33,9 +33,9 @@ from app.ui.shell.docking.dock import Dock, dock_for_kinds
 from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
 from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
-from app.ui.shell.documents import FlushBeforeClose
 from app.ui.shell.focus_ring import FocusRing
 from app.ui.shell.keyboard import PanelFocus
+from app.ui.shell.projects import FlushBeforeClose
 from app.ui.shell.start_page.open_work import open_work
 from app.ui.shell.start_page.page import Example, StartPage
 from app.ui.shell.window_state import WindowState

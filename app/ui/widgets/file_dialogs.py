@@ -10,7 +10,7 @@ from typing import Protocol
 from PySide6.QtCore import QStandardPaths, Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from app.core.documents.file_format import SUFFIX
+from app.core.projects.file_format import SUFFIX
 from nep.i18n import _, lazy
 
 

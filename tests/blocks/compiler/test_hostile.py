@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.blocks import editor_definitions
-from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.compiler.program_names import COMMANDS
 from app.blocks.model.fields import StatementInput, ValueInput, VariableField
 from app.blocks.toolbox.catalogue import Catalogue
 from app.errors import DescriptionError

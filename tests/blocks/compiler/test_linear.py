@@ -15,8 +15,9 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.names import PythonNames
+from app.blocks.model.project import Project
 from app.blocks.model.workspace import parse_workspace
-from app.core.documents.problems import problem_lines
+from app.core.projects.problems import problem_lines
 from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
 
 Saved = dict[str, object]
@@ -98,7 +99,8 @@ def test_time_to_list_problems_is_linear_in_number_of_missing_robots() -> None:
         saved = strangers(count)
         missing = [robot(f"R{n}") for n in range(count)]
         problems = compile_behaviour(saved, (here,), absent=missing).problems
-        return steps(lambda: problem_lines(problems, saved, missing, (here,), ()))
+        pages = Project.of_blocks("", saved).pages
+        return steps(lambda: problem_lines(problems, pages, missing, (here,), ()))
 
     work(2)
     assert work(4 * 20) < 5 * work(20)

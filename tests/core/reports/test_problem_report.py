@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.file_format import BehaviourFile, encode_file, read_file
+from app.blocks.model.project import Project
+from app.core.projects.file_format import encode_file, read_file
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import CrashReports
 from app.core.reports.problem_report import (
@@ -85,7 +86,7 @@ def test_report_contains_no_network_keys_recent_files_or_home_folder(parts: Repo
 
 
 def test_report_includes_only_given_documents_with_unique_names(parts: ReportParts, tmp_path: Path) -> None:
-    data = encode_file(BehaviourFile("A/B: c", BLOCKS, {}))
+    data = encode_file(Project.of_blocks("A/B: c", BLOCKS, {}))
     found = create_report(
         parts, "", [ReportedWork("A/B: c", data), ReportedWork("A_B_ c", data), ReportedWork("...", data)]
     )
@@ -93,7 +94,7 @@ def test_report_includes_only_given_documents_with_unique_names(parts: ReportPar
     assert names == ["work/A_B_ c 2.nepb", "work/A_B_ c.nepb", "work/___.nepb"]
     with zipfile.ZipFile(io.BytesIO(found)) as archive:
         archive.extractall(tmp_path)
-    assert read_file(tmp_path / "work" / "A_B_ c.nepb").workspace == BLOCKS
+    assert read_file(tmp_path / "work" / "A_B_ c.nepb").always.workspace.blocks == BLOCKS
 
 
 def test_report_is_created_without_a_log(tmp_path: Path) -> None:

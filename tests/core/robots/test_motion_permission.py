@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.blocks.compiler.compiler import invoked_actions
+from app.blocks.compiler.page_compiler import invoked_actions
 from app.blocks.model.program import Program
 from app.core.robots.motion.permission import (
     MayNotMoveError,

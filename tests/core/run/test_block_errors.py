@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.run.block_errors import BlockErrors
 from app.core.run.requests import RequestedRun
 from app.core.session import Session
@@ -17,8 +17,8 @@ from tests.blocks.samples import block, number, started, text, workspace
 
 
 @pytest.fixture
-def document(tmp_path: Path) -> Iterator[Document]:
-    """Document of a session that is never started and has no sockets."""
+def document(tmp_path: Path) -> Iterator[OpenProject]:
+    """Open project of a session that is never started and has no sockets."""
     made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_processes=False)
     yield made.document
     made.close()
@@ -29,7 +29,7 @@ def waiting(seconds: dict[str, object] | None, lines: str = "Hello") -> dict[str
     return workspace(started(block("messages_write", "p", VALUE=text(lines)), wait))
 
 
-def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Document) -> None:
+def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: OpenProject) -> None:
     soon = text("soon")
     document.apply_edit(waiting(soon))
     errors = BlockErrors()
@@ -43,7 +43,7 @@ def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Do
     assert errors.by_block == {}
 
 
-def test_error_of_deleted_block_is_cleared(document: Document) -> None:
+def test_error_of_deleted_block_is_cleared(document: OpenProject) -> None:
     soon = text("soon")
     document.apply_edit(waiting(soon))
     errors = BlockErrors()
@@ -53,7 +53,7 @@ def test_error_of_deleted_block_is_cleared(document: Document) -> None:
     assert errors.discard_fixed()
 
 
-def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: Document) -> None:
+def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: OpenProject) -> None:
     wait = block("control_wait_until", "w")
     document.apply_edit(workspace(started(wait)))
     wanted, errors = RequestedRun(document), BlockErrors()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from app.blocks.compiler.stack import Stack
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.run.requests import RequestedRun
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
-def document(*connected: str) -> Document:
-    made = Document()
+def document(*connected: str) -> OpenProject:
+    made = OpenProject()
     made.set_connected([robot("Pepper"), robot("Ada")])
     gap = block("control_wait_until", "gap")
     made.apply_edit(workspace(started(say("Hi") | {"id": "hi"}, say("Hi", "Ada") | {"id": "ada"}, gap)))

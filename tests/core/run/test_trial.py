@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.blocks.compiler.stack import Stack
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.run.requests import RequestedRun
 from app.core.run.trial import Trial
 from tests.blocks.samples import block, robot, say, started, workspace
@@ -13,7 +13,7 @@ BATTERY = Stack("bat", "value", block("robot_pepper_get_battery", "bat", ROBOT="
 
 def began(stack: Stack | None) -> tuple[Trial, str]:
     """Return a started trial and the description of its block."""
-    document = Document()
+    document = OpenProject()
     document.set_connected([robot("Pepper")])
     document.apply_edit(workspace(started(say("Hi") | {"id": "hi"})))
     wanted = RequestedRun(document, stack=stack)
@@ -41,7 +41,7 @@ def test_empty_output_line_is_an_unknown_value() -> None:
 def test_next_run_clears_the_trial_value() -> None:
     trial, _words = began(BATTERY)
     trial.parse_line("84")
-    trial.prepare(RequestedRun(Document()))
+    trial.prepare(RequestedRun(OpenProject()))
     assert trial.value is None
     assert trial.parse_line("printed") is None
 

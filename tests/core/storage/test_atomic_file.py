@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.file_format import read_file
-from app.core.documents.journal import Journal, unsaved_work
-from app.core.documents.versions import move_old_versions, save_version
+from app.blocks.model.project import Project
+from app.core.projects.file_format import read_file
+from app.core.projects.journal import Journal, unsaved_work
+from app.core.projects.versions import move_old_versions, save_version
 from app.core.storage.atomic_file import read_regular_file, write_atomically
 from app.core.storage.settings import Settings
 from app.errors import DocumentError
@@ -179,7 +180,7 @@ def modes(folder: Path) -> dict[str, int]:
 def test_user_data_files_are_private_regardless_of_umask(tmp_path: Path) -> None:
     home = tmp_path / "home"
     Settings(home).set("a", 1)
-    Journal(home / "journal").write("x", None, "{}", {})
+    Journal(home / "journal").write(Project.of_blocks("x", {}), None)
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"{}")
     kept = save_version(document, home / "earlier")

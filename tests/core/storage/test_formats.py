@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.backpack import Backpack
-from app.core.documents.file_format import BehaviourFile, read_file, write_file
-from app.core.documents.journal import newer_work_names, unsaved_work
+from app.blocks.model.project import Project
+from app.core.projects.backpack import Backpack
+from app.core.projects.file_format import read_file, write_file
+from app.core.projects.journal import newer_work_names, unsaved_work
 from app.core.storage.settings import FORMAT_VERSION, Settings
 from app.errors import DocumentError
 from app.ui.shell.docking.workbench import STATE_VERSION
@@ -111,7 +112,7 @@ def test_layout_state_version_changes_only_with_the_settings_format() -> None:
 
 
 def test_unsaved_work_of_a_newer_version_is_listed_and_not_modified(tmp_path: Path) -> None:
-    before = write(tmp_path / "a.json", {**JOURNAL, "format": 2, "workspace": "in another way"})
+    before = write(tmp_path / "a.json", {**JOURNAL, "format": 3, "workspace": "in another way"})
     write(tmp_path / "b.json", {**JOURNAL, "name": "Other", "format": 1})
     assert newer_work_names(tmp_path) == ["Mine"]
     assert [each.name for each in unsaved_work(tmp_path)] == ["Other"]
@@ -121,7 +122,7 @@ def test_unsaved_work_of_a_newer_version_is_listed_and_not_modified(tmp_path: Pa
 def test_unsaved_work_of_an_older_version_is_restored(tmp_path: Path) -> None:
     write(tmp_path / "a.json", JOURNAL)
     (found,) = unsaved_work(tmp_path)
-    assert (found.name, found.workspace) == ("Mine", {"blocks": 1})
+    assert (found.name, found.project.always.workspace.blocks) == ("Mine", {"blocks": 1})
     assert newer_work_names(tmp_path) == []
     assert newer_work_names(tmp_path / "none") == []
 
@@ -168,11 +169,11 @@ def test_own_backpack_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: 
 
 def test_behaviour_of_a_newer_version_is_rejected_with_a_message_and_not_modified(tmp_path: Path) -> None:
     path = tmp_path / "Mine.nepb"
-    before = write(path, {"format": "nep-behaviour", "version": 2, "workspace": {"blocks": {}}})
+    before = write(path, {"format": "nep-behaviour", "version": 3, "workspace": {"blocks": {}}})
     with pytest.raises(DocumentError) as raised:
         read_file(path)
     assert str(raised.value) == (
-        "Mine.nepb was saved by a newer NEP Studio (version 2) and is unchanged; update NEP Studio"
+        "Mine.nepb was saved by a newer NEP Studio (version 3) and is unchanged; update NEP Studio"
     )
     assert path.read_bytes() == before
 
@@ -190,6 +191,8 @@ def test_unknown_fields_of_a_behaviour_file_are_preserved_on_save(tmp_path: Path
         },
     )
     found = read_file(path)
-    write_file(path, BehaviourFile("Other", found.workspace, found.robots, found.unknown_fields))
+    write_file(
+        path, Project.of_blocks("Other", found.always.workspace.blocks, found.robots, found.unknown_fields)
+    )
     assert json.loads(path.read_text())["later"] == [1]
     assert json.loads(path.read_text())["workspace"] == {"later": {"inside": 1}}

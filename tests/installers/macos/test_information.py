@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.documents.file_format import SUFFIX
+from app.core.projects.file_format import SUFFIX
 from installers.macos.information import (
     DOCUMENTED_KEYS,
     LANGUAGES,

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.core.documents.backpack import Backpack
+from app.core.projects.backpack import Backpack
 from app.ui.panels.behaviour.backpack_storage import BackpackController
 from tests.ui.blockly_person import START, Person, workspace
 

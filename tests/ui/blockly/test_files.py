@@ -8,8 +8,8 @@ import random
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.core.documents.workspace_json import WorkspaceJson
-from app.core.storage import deep_json
+from app.blocks.model import deep_json
+from app.blocks.model.workspace_json import WorkspaceJson
 from tests.ui.blockly_person import DEFINITIONS, PICTURE, START, UNKNOWN, WAIT_MS, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]

@@ -11,8 +11,8 @@ from PySide6.QtTest import QTest
 
 from app import resources
 from app.blocks import editor_definitions
-from app.core.documents.examples import translated
-from app.core.documents.file_format import read_file
+from app.core.projects.examples import translated
+from app.core.projects.file_format import read_file
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from app.ui.blockly.view import BlocklyView
@@ -196,7 +196,7 @@ def test_scripts_and_notes_of_translated_examples_do_not_overlap(qtbot, language
     with qtbot.waitSignal(view.ready, timeout=WAIT_MS):
         view.show()
     for path in sorted((resources.folder() / "examples").glob("*.nepb")):
-        state = translated(read_file(path)).workspace
+        state = translated(read_file(path)).always.workspace.blocks
         view.load(state)
         first = state["blocks"]["blocks"][0]["id"]
         them.wait_for(f"!!document.querySelector('.nepTab:not([hidden]) [data-id={json.dumps(first)}]')")

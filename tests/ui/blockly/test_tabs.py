@@ -9,7 +9,7 @@ import signal
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.core.documents.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
+from app.blocks.model.workspace_json import EMPTY_WORKSPACE, WorkspaceJson
 from app.ui.blockly.tabs import Tabs
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, outlined, workspace
 

@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 
-from app.core.documents.workspace_json import WorkspaceJson
+from app.blocks.model.workspace_json import WorkspaceJson
 from app.ui.blockly.view import BlocklyView
 from tests.ui.blockly_person import DEFINITIONS, START, TOKENS, WAIT_MS, Person, outlined, workspace
 

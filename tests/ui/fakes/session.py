@@ -15,11 +15,12 @@ from functools import partial
 
 from app.core import session as session_module
 from app.core.alerts.intents import Inspect
-from app.core.documents.open_documents import Documents
-from app.core.documents.saved_tabs import SavedTabs
 from app.core.network import doctor as doctor_module
 from app.core.network.master import MasterState
 from app.core.network.topics import Topic
+from app.core.projects.open_projects import OpenProjects
+from app.core.projects.project_files import ProjectFiles
+from app.core.projects.saved_tabs import SavedTabs
 from app.core.robots.robot_link import RobotLink, topics_of
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
@@ -33,7 +34,7 @@ from tests.ui import sample_data
 from tests.ui.fakes.images import Images
 from tests.ui.fakes.network import Network
 from tests.ui.fakes.processes import Launcher, Runner
-from tests.ui.fakes.storage import Document, Settings
+from tests.ui.fakes.storage import OpenProject, Settings
 
 ADDRESS = "127.0.0.1:7780"
 TICK_S = 1 / 30
@@ -85,7 +86,7 @@ _open: list[Session] = []
 class Session(session_module.Session):
     """Session without master, topics and robots, with an empty behaviour. `close_sessions` closes it."""
 
-    documents: Documents
+    documents: OpenProjects
     launcher: Launcher
     doctor: Doctor
 
@@ -100,9 +101,11 @@ class Session(session_module.Session):
             start_processes=False,
         )
         post = self._mailbox.post_event
-        self.documents = Documents(Document)
+        self.documents = OpenProjects(OpenProject)
         self.document.key = "behaviour-1"
-        self.tabs = SavedTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        warn = partial(self.console.add, "warn", "studio")
+        self.tabs = SavedTabs(self.settings, self.documents, warn)
+        self.files = ProjectFiles(self.documents, self.tabs, self.settings, warn)
         self.runs = Runs(
             self.documents, self.fleet, self,
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
@@ -122,10 +125,10 @@ class Session(session_module.Session):
         _open.append(self)
 
     @property
-    def document(self) -> Document:
+    def document(self) -> OpenProject:
         """Behaviour of the current tab."""
         current = self.documents.current
-        assert isinstance(current, Document)
+        assert isinstance(current, OpenProject)
         return current
 
     @property
@@ -250,7 +253,7 @@ class Session(session_module.Session):
         session.live.images.camera = lambda _topic: sample_data.picture()
         session.document.name = "Greeting"
         session.document.source = sample_data.PROGRAM
-        session.document.workspace = sample_data.WORKSPACE
+        session.document.set_blocks(sample_data.WORKSPACE)
         session.document.found = sample_data.PROBLEMS
         session.document.absent_blocks = ("b8", "b9")
         session.console.clear()

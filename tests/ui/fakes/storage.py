@@ -8,8 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.blocks import Problem, Program
-from app.core.documents import document as document_module
-from app.core.documents import journal as journal_module
+from app.blocks.model.project import Project
+from app.blocks.model.workspace_json import WorkspaceJson
+from app.core.projects import journal as journal_module
+from app.core.projects import open_project as project_module
 from app.core.storage import settings as settings_module
 
 
@@ -31,30 +33,28 @@ class Journal(journal_module.Journal):
         super().__init__(Path("no such folder"))
         self.kept: str | None = None
 
-    def write(
-        self,
-        name: str,
-        path: Path | None,
-        text: str,
-        robots: Mapping[str, Mapping[str, object]],
-        unknown_fields: Mapping[str, object] | None = None,
-    ) -> None:
-        self.kept = text
+    def write(self, project: Project, path: Path | None) -> None:
+        self.kept = project.always.workspace.text
 
     def discard(self) -> None:
         self.kept = None
 
 
-class Document(document_module.Document):
-    """Real document whose compiler results a test can define."""
+class OpenProject(project_module.OpenProject):
+    """Real project whose compiler results a test can define."""
 
     def __init__(self) -> None:
         super().__init__(Journal)
-        self._timer = lambda: 0.0  # compile time 0: the document compiles synchronously
+        self._timer = lambda: 0.0  # compile time 0: the project compiles synchronously
         self.found: tuple[Problem, ...] | None = None
         self.sensors: tuple[tuple[str, str], ...] | None = None
         self.source: str | None = None
         self.absent_blocks: tuple[str, ...] | None = None
+
+    def set_blocks(self, blocks: Mapping[str, object]) -> None:
+        """Replace the blocks without an edit, as if the project had been opened with them."""
+        page = self.project.always.with_workspace(WorkspaceJson.from_blocks(blocks))
+        self.project = self.project.with_page(page)
 
     def _compile_job(self) -> Callable[[], Program]:
         compiling = super()._compile_job()

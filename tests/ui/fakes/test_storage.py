@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from app.blocks import Problem, Program
-from app.core.documents.document import Document
-from app.core.documents.journal import Journal
 from app.core.network.doctor import Doctor
+from app.core.projects.journal import Journal
+from app.core.projects.open_project import OpenProject
 from app.core.storage.settings import MAX_RECENT_FILES, Settings
 from nep.programs.doctor import Finding
 from tests.blocks.samples import block, started, text, workspace, write
@@ -67,11 +67,11 @@ def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> No
 
 
 class Kept:
-    """Document and the content of its journal."""
+    """Open project and the content of its journal."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
-        self.document = Document(lambda: Journal(folder)) if folder is not None else storage.Document()
+        self.document = OpenProject(lambda: Journal(folder)) if folder is not None else storage.OpenProject()
 
     @property
     def blocks(self) -> object:
@@ -133,7 +133,7 @@ def test_document_compiles_its_blocks_once_per_edit(kept: Kept) -> None:
 
 
 def test_fake_document_returns_the_given_compiler_results() -> None:
-    document = storage.Document()
+    document = storage.OpenProject()
     document.apply_edit(FIRST)
     told = (Problem("info", "b", None, "x", "x is slow."),)
     document.found, document.source, document.sensors, document.absent_blocks = (

@@ -7,7 +7,7 @@ from PySide6.QtCore import QBuffer, QIODevice, QPoint, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app.core.documents.workspace_json import WorkspaceJson
+from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
@@ -99,7 +99,8 @@ def test_only_replacing_the_document_reloads_the_editor(panel, window) -> None:
     panel.refresh()
     assert document.workspace == {"blocks": {"blocks": [{"type": "x"}]}}
     assert editor(panel).count("load") == 0
-    document.workspace, document.revision = {"blocks": {}}, 1
+    document.set_blocks({"blocks": {}})
+    document.revision = 1
     document.definitions_revision = 1
     panel.refresh()
     assert editor(panel).last("load") == {"blocks": {}}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from app import resources
-from app.core.documents.file_format import read_file
+from app.core.projects.file_format import read_file
 from app.ui.panels.base import Panel
 from app.ui.panels.first_steps.panel import HINT_DELAY_S, PROGRESS_SETTING, FirstStepsPanel
 from app.ui.panels.first_steps.steps import (
@@ -77,7 +77,7 @@ def test_each_step_is_completed_once_and_stays_completed() -> None:
 
 def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
     window.session.join(pepper())
-    shipped = read_file(min(resources.path("examples").glob("*.nepb"))).workspace
+    shipped = read_file(min(resources.path("examples").glob("*.nepb"))).always.workspace.blocks
     tops = shipped["blocks"]["blocks"]
     build(panel, *tops)
     assert panel.completed_ids == {"robot"}

@@ -88,7 +88,7 @@ def test_missing_robot_is_one_row_that_lists_possible_replacements(panel, window
     document.found, document.edits, document.absent_blocks = tuple(absent), 7, ("b0", "b1", "b2")
     monkeypatch.setattr(type(document), "absent_robots", (pepper("Pepper 2"),))
     say = {"type": "robot_virtual_pepper_do_say", "fields": {"ROBOT": "Pepper 2"}}
-    document.workspace = {"blocks": {"blocks": [{**say, "id": f"b{n}"} for n in range(3)]}}
+    document.set_blocks({"blocks": {"blocks": [{**say, "id": f"b{n}"} for n in range(3)]}})
     panel.refresh()
     (row,) = panel.rows
     assert row.accessibleName() == "warning: Pepper 2 isn't connected, so 3 blocks will be skipped."

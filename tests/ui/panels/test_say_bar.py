@@ -72,7 +72,7 @@ def test_room_shows_the_words_heard_by_the_robot(panel, window) -> None:
 
 def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None:
     hat = {"type": "robot_pepper_when_heard", "fields": {"ROBOT": "Pepper", "WORD": "quiz"}}
-    window.session.document.workspace = {"blocks": {"blocks": [hat]}}
+    window.session.document.set_blocks({"blocks": {"blocks": [hat]}})
     press(panel.say_bar.suggestions_button)
     assert [action.text() for action in menu(panel).actions()] == ["quiz", "hello"]
     choose(panel, "quiz")

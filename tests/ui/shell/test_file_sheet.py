@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.core.documents.folder import entries_of, free_name, name_problem
+from app.core.projects.folder import entries_of, free_name, name_problem
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.file_sheet import FileSheet, FolderLocation, known_locations

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from app.blocks.model.project import Project
 from app.core.alerts.intents import OpenBehaviour
-from app.core.documents.document import Document
-from app.core.documents.versions import free_path
+from app.core.projects.file_format import write_file
+from app.core.projects.open_project import OpenProject
+from app.core.projects.versions import free_path
 from app.core.run.view import RunState
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
@@ -19,25 +21,18 @@ BLOCKS = {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started",
 
 
 @pytest.fixture
-def document(window: MainWindow) -> Document:
+def document(window: MainWindow) -> OpenProject:
     return window.session.document
 
 
 def saved(path: Path) -> Path:
     """Write a behaviour file and return its path."""
-    other = Document(_NoJournal)  # type: ignore[arg-type,return-value]
-    other.workspace = BLOCKS
-    other.save(path)
+    write_file(path, Project.of_blocks(path.stem, BLOCKS))
     return path
 
 
-class _NoJournal:
-    def write(self, *_what: object) -> None: ...
-    def discard(self) -> None: ...
-
-
 def test_saving_a_new_behaviour_opens_the_file_dialog(
-    commands: Commands, document: Document, answers: Answers, tmp_path
+    commands: Commands, document: OpenProject, answers: Answers, tmp_path
 ) -> None:
     document.apply_edit(BLOCKS)
     answers.path = tmp_path / "Story.nepb"
@@ -370,7 +365,7 @@ def test_failed_save_raises_an_alert_until_the_behaviour_is_saved_elsewhere(
     assert list(window.session.alerts.active) == []
 
 
-def test_fix_changes_the_blocks_and_the_fix_counter(commands: Commands, document: Document) -> None:
+def test_fix_changes_the_blocks_and_the_fix_counter(commands: Commands, document: OpenProject) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
     document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [wait]}})
     before = document.fixes

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from app.ui.shell import documents
-from app.ui.shell.documents import FlushBeforeClose
+from app.ui.shell import projects
 from app.ui.shell.main_window import MainWindow
+from app.ui.shell.projects import FlushBeforeClose
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 BLOCKS = {"blocks": {"languageVersion": 0, "blocks": [{"type": "events_started", "id": "a"}]}}
@@ -33,15 +33,15 @@ def test_window_closes_immediately_without_an_editor(qapp) -> None:
 
 
 def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch) -> None:
-    monkeypatch.setattr(documents, "MAX_FLUSH_MS", 2000)
+    monkeypatch.setattr(projects, "MAX_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
     waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.can_close()))
     assert not waits.can_close()
     assert not waits.can_close()
     assert len(editor.done) == 1
     editor.done[0]()
-    qtbot.waitUntil(lambda: closed == [True], timeout=documents.MAX_FLUSH_MS - 100)
-    qtbot.wait(documents.MAX_FLUSH_MS)  # the timeout follows and closes nothing twice
+    qtbot.waitUntil(lambda: closed == [True], timeout=projects.MAX_FLUSH_MS - 100)
+    qtbot.wait(projects.MAX_FLUSH_MS)  # the timeout follows and closes nothing twice
     assert closed == [True]
 
 

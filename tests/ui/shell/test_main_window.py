@@ -12,9 +12,10 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QTabBar, QWidget
 
+from app.blocks.model.project import Project
 from app.core.alerts.intents import Inspect
-from app.core.documents.journal import Journal, unsaved_work
 from app.core.faults import RepeatFilter
+from app.core.projects.journal import Journal, unsaved_work
 from app.core.run.view import RunState, RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -492,8 +493,8 @@ def test_recovery_of_work_after_a_crash_is_offered_without_a_dialog(
     qtbot, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     for name in ("Story", "Tale", "Song"):
-        text = '{"blocks": {"blocks": [{"type": "events_started"}]}}'
-        Journal(home / "journal").write(name, None, text, {})
+        blocks = {"blocks": {"blocks": [{"type": "events_started"}]}}
+        Journal(home / "journal").write(Project.of_blocks(name, blocks), None)
     for file in (home / "journal").glob("*.json"):
         entry = json.loads(file.read_text("utf-8"))
         file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")

@@ -10,8 +10,8 @@ from PySide6.QtGui import QRegion
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from app.core.documents.document import Document
 from app.core.network.topics import Topic
+from app.core.projects.open_project import OpenProject
 from app.core.storage.settings import RecentFile
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.command_palette import CommandPalette
@@ -312,7 +312,7 @@ def test_panels_topics_and_files_are_found(
 
 def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWindow, tmp_path: Path) -> None:
     path = tmp_path / "Tour.nepb"
-    Document().save(path)
+    OpenProject().save(path)
     window.start.examples = (Example(path, "Tour guide", "Shows the room", ()),)
     palette.dismiss()
     palette.open()

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
 
-from app.core.documents.file_format import read_file
+from app.core.projects.file_format import read_file
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import ALERT_ID, CrashReports, show_crash_alert
 from app.core.session import Session
@@ -143,7 +143,7 @@ def test_behaviours_are_included_in_a_report_only_if_enabled_each_time(
     assert b"of-mine" not in b"".join(inside(tmp_path / "without.zip").values())
     found = inside(tmp_path / "with.zip")
     (tmp_path / "it.nepb").write_bytes(found["work/New behaviour.nepb"])
-    assert read_file(tmp_path / "it.nepb").workspace == SECRET
+    assert read_file(tmp_path / "it.nepb").always.workspace.blocks == SECRET
     sheet.dismiss()
     assert window.commands.run("help.report")
     assert not sheet.work.isChecked()

@@ -10,8 +10,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.documents.diff import Difference
-from app.core.documents.versions import save_version
+from app.core.projects.block_diff import Difference
+from app.core.projects.versions import save_version
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.version_history import VersionHistorySheet, difference_text
 from app.ui.shell.main_window import MainWindow

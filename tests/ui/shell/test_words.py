@@ -32,8 +32,8 @@ from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.dialogs.version_history import VersionHistorySheet
-from app.ui.shell.documents import unknown_type_text
 from app.ui.shell.main_window import MainWindow, Placeholder
+from app.ui.shell.projects import unknown_type_text
 from app.ui.shell.start_page.page import all_examples_text, read_examples
 from app.ui.text import plain
 from app.ui.theme.theme import Theme

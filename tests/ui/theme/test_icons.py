@@ -15,7 +15,7 @@ from PySide6.QtSvg import QSvgRenderer
 from app import resources
 from app.blocks import Problem
 from app.blocks.toolbox.catalogue import Catalogue
-from app.core.documents.problems import ProblemLine
+from app.core.projects.problems import ProblemLine
 from app.ui.panels.problems import ProblemRow
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.theme import icons

@@ -1,5 +1,5 @@
 // Backpack: stacks of blocks kept for other files, other instances of Studio and the next start. The window
-// stores the contents (`app/core/documents/backpack.py`); all behaviours share them.
+// stores the contents (`app/core/projects/backpack.py`); all behaviours share them.
 import * as Blockly from 'blockly/core';
 import {countBlocks} from './bin';
 import {withoutTypeChecks} from './checker';

@@ -6,8 +6,8 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
+from app.core.storage.background_worker import BackgroundWorker
 from nep.errors import NepError, RecordingError
 from nep.recordings.formats.message_counts import TopicStats
 from nep.recordings.reader import Recording

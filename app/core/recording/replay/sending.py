@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.faults import error_text
 from app.core.network.source import Job
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import MAX_TARGETS, Arming, Target
+from app.core.storage.background_worker import BackgroundWorker
 from nep.errors import BadTopicError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.message import Message

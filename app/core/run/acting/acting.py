@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Protocol
 
 from app.core.alerts.alerts import Alerts
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.run.acting.arming import ARMED_S, Arming, Target
@@ -33,6 +32,7 @@ from app.core.run.acting.shelf import (
 )
 from app.core.run.acting.templates import is_editable, is_plain_text
 from app.core.storage.atomic_file import write_atomically
+from app.core.storage.background_worker import BackgroundWorker
 from app.core.storage.settings import Settings
 from app.core.storage.user_file import read_stored
 from app.core.world.console import Console

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from PySide6.QtCore import SignalInstance
 
-from app.core.documents.backpack import Backpack, BackpackStack
-from app.core.storage import deep_json
+from app.blocks.model import deep_json
+from app.core.projects.backpack import Backpack, BackpackStack
 from app.errors import BackpackError
 from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext

@@ -13,9 +13,9 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.core.documents.backpack import Backpack
-from app.core.documents.rename import name_problem
-from app.core.documents.titles import unique_titles
+from app.core.projects.backpack import Backpack
+from app.core.projects.rename import name_problem
+from app.core.projects.titles import unique_titles
 from app.core.reports.not_installed import MissingLibraries, alert_missing, missing_libraries
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
@@ -32,9 +32,9 @@ from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
-    from app.core.documents.document import Document
-    from app.core.documents.workspace_json import WorkspaceJson
+    from app.blocks.model.workspace_json import WorkspaceJson
     from app.core.network.watches import Suspendable, Watch
+    from app.core.projects.open_project import OpenProject
     from app.core.robots.robot_link import RobotLink
     from app.core.run.control import Runs
 
@@ -551,7 +551,7 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     }
 
 
-def tab_states(documents: Iterable[Document], runs: Runs) -> list[TabState]:
+def tab_states(documents: Iterable[OpenProject], runs: Runs) -> list[TabState]:
     """Return the data of the tabs of all open behaviours."""
     open_documents = list(documents)
     states = []

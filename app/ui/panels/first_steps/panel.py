@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QAction, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.documents.examples import example_block_ids
+from app.core.projects.examples import example_block_ids
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.first_steps.steps import (

@@ -12,7 +12,6 @@ from PySide6.QtCore import QEvent, QFile, Qt, QUrl
 from PySide6.QtGui import QAction, QImage, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
-from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, read_preview
@@ -21,6 +20,7 @@ from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
 from app.core.recording.topic_choice import file_stem
 from app.core.recording.topic_choice import free_path as free
+from app.core.storage.background_worker import BackgroundWorker
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.recordings.columns import THUMBNAIL_SIZE, columns, crop_to_thumbnail

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from PySide6.QtCore import QUrl
 
 from app.blocks.compiler.stack import Stack
-from app.core.documents.document import Document
-from app.core.documents.journal import UnsavedWork
+from app.blocks.model import deep_json
+from app.core.projects.journal import UnsavedWork
+from app.core.projects.open_project import OpenProject
 from app.core.session import Session
-from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.other_programs import open_externally
 from app.ui.shell.commands.printing import PrintCommands
 from app.ui.shell.commands.program_pictures import ImageCommands
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
@@ -162,7 +162,7 @@ class BehaviourCommands:
     """
 
     def __init__(
-        self, shell: Shell, session: Session, files: DocumentController, dialogs: FileDialogs
+        self, shell: Shell, session: Session, files: ProjectController, dialogs: FileDialogs
     ) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._version_sheet: version_history.VersionHistorySheet | None = None
@@ -275,7 +275,7 @@ class BehaviourCommands:
     def save_tab_as(self, key: str) -> bool:
         """Show a tab and ask for a file to save its behaviour to; return False if there is no such tab."""
 
-        def save_as(document: Document) -> None:
+        def save_as(document: OpenProject) -> None:
             self._files.show(document)
             self._files.save_as()
 
@@ -301,7 +301,7 @@ class BehaviourCommands:
     def save_tab(self, key: str) -> bool:
         """Show a tab and save its behaviour; return False if there is no such tab."""
 
-        def save(document: Document) -> None:
+        def save(document: OpenProject) -> None:
             self._files.show(document)
             self._files.save()
 
@@ -313,7 +313,7 @@ class BehaviourCommands:
         Nothing is opened for a behaviour that was never saved.
         """
 
-        def show(document: Document) -> None:
+        def show(document: OpenProject) -> None:
             if document.path is None:
                 return
             folder = document.path.parent
@@ -328,7 +328,7 @@ class BehaviourCommands:
             tab_position.key, lambda document: self._files.move(document, tab_position.position)
         )
 
-    def _apply_to_document(self, key: str, act: Callable[[Document], object]) -> bool:
+    def _apply_to_document(self, key: str, act: Callable[[OpenProject], object]) -> bool:
         document = self._session.documents.find_by_key(key)
         if document is not None:
             act(document)
@@ -399,7 +399,7 @@ class BehaviourCommands:
             )
         document = self._session.document
         title = self._session.documents.title(document)
-        self._version_sheet.show_for(document.name, document.path, document.workspace, title=title)
+        self._version_sheet.show_for(document.project, document.path, title=title)
 
     def clear_recent(self) -> None:
         """Clear the list of recent files and show a toast with an Undo button."""

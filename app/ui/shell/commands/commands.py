@@ -21,7 +21,7 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS, Handlers
 from app.ui.shell.commands.variables import VariableCommands
 from app.ui.shell.commands.view import ViewCommands
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from app.ui.shell.stop_keys import StopKeys
 from app.ui.widgets.file_dialogs import FileDialogs
 
@@ -34,7 +34,7 @@ class Commands:
     def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
         shortcuts = Shortcuts(session.settings, shell.log_problem, COMMANDS)
         self.session = session
-        self.files = DocumentController(
+        self.files = ProjectController(
             session, dialogs, shell.show_toast, partial(show_blocks_panel, shell), shell.editor
         )
         self.behaviours = BehaviourCommands(shell, session, self.files, dialogs)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.core.documents.titles import recent_titles
+from app.core.projects.titles import recent_titles
 from app.core.session import Session
 from app.ui.panels.base import Panel, numbered_title
 from app.ui.shell.actions.actions import Actions

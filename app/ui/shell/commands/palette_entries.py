@@ -6,8 +6,8 @@ import datetime as dt
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from app.core.documents.titles import recent_titles
 from app.core.networks.networks import topic_label
+from app.core.projects.titles import recent_titles
 from app.core.session import Session
 from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 from PySide6.QtGui import QGuiApplication, QImage
 
-from app.core.documents.document import Document
+from app.core.projects.open_project import OpenProject
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.settings import closed_tabs_folder
@@ -28,7 +28,7 @@ IMAGE_KINDS = (
 )
 
 
-def suggested_path(document: Document) -> Path:
+def suggested_path(document: OpenProject) -> Path:
     """Return the suggested path, without extension, of a file that is exported from a behaviour.
 
     The folder is that of the behaviour's file; for files in Studio's own folder it is the home folder.

@@ -10,12 +10,12 @@ from PySide6.QtCore import QLocale, QUrl, qVersion
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from app.core.documents.file_format import BehaviourFile, encode_file
+from app.core.projects.file_format import encode_file
 from app.core.reports.crash_reports import ALERT_ID
 from app.core.session import Session
 from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
@@ -41,7 +41,7 @@ class ReportCommands:
         self,
         shell: Shell,
         session: Session,
-        files: DocumentController,
+        files: ProjectController,
         dialogs: FileDialogs,
         clock: Callable[[], float] = time.time,
     ) -> None:
@@ -79,7 +79,7 @@ class ReportCommands:
         return [
             problem_report.ReportedWork(
                 documents.title(each),
-                encode_file(BehaviourFile(each.name, each.workspace, each.robots, each.unknown_fields)),
+                encode_file(each.project),
             )
             for each in documents
             if not each.is_blank

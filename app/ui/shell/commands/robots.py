@@ -13,7 +13,7 @@ from app.ui.shell.commands.shell import Shell
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.dialogs.other_networks import OtherNetworksSheet
 from app.ui.shell.dialogs.web_pages import WebPagesSheet
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from nep.i18n import _
 
 
@@ -48,7 +48,7 @@ class RobotCommands:
     """Handlers of the commands for robots and for access to the network."""
 
     def __init__(
-        self, shell: Shell, session: Session, files: DocumentController, undo: Callable[[], object]
+        self, shell: Shell, session: Session, files: ProjectController, undo: Callable[[], object]
     ) -> None:
         # `undo` reverts the last edit of the blocks.
         self._shell, self._session, self._files, self._undo = shell, session, files, undo

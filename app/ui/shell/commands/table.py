@@ -24,7 +24,7 @@ from app.ui.shell.commands.robots import RobotCommands, RobotReplacement
 from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.commands.variables import VariableCommands
 from app.ui.shell.commands.view import TEXT_SIZE_STEP_PERCENT, ViewCommands, parse_topic_field
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from app.ui.theme.theme import TEXT_PERCENT_RANGE
 from nep.i18n import _, lazy
 from nep.programs.alarms import AlarmCondition
@@ -46,7 +46,7 @@ class Handlers:
 
     session: Session
     shell: Shell
-    files: DocumentController
+    files: ProjectController
     variables: VariableCommands
     behaviours: BehaviourCommands
     robots: RobotCommands

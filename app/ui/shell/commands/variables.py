@@ -10,7 +10,7 @@ from app.blocks.model.workspace import PlacedBlock, Workspace, parse_workspace
 from app.core.session import Session
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.documents import DocumentController
+from app.ui.shell.projects import ProjectController
 from nep.i18n import _, ngettext, pgettext
 from nep.system.lazy_import import lazy_module
 
@@ -41,7 +41,7 @@ class VariableCommands:
     The handlers ask for names and show toasts; the block editor applies the edits.
     """
 
-    def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
+    def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._sheet: name_sheet.NameSheet | None = None
         self._last_found_ids: dict[str, str] = {}  # id of the block found last, by variable

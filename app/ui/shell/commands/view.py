@@ -28,8 +28,8 @@ from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.docking.layout_file import MAX_BYTES, LayoutFileError, decode_layout, encode_layout
 from app.ui.shell.docking.layouts import layout_named
-from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
+from app.ui.shell.projects import ProjectController
 from app.ui.speaker import has_voice_engine, voice_text
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
@@ -103,7 +103,7 @@ def parse_topic_field(text: str) -> tuple[str, str]:
 class ViewCommands:
     """Handlers of the commands for layouts, sheets and the theme; call `set_actions` before any of them."""
 
-    def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
+    def __init__(self, shell: Shell, session: Session, files: ProjectController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
         self.shortcuts = keys
         self._palette: command_palette.CommandPalette | None = None

@@ -24,8 +24,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.documents.file_format import SUFFIX
-from app.core.documents.folder import (
+from app.core.projects.file_format import SUFFIX
+from app.core.projects.folder import (
     INVALID_CHARACTERS,
     MAX_NAME_LENGTH,
     FolderEntry,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
@@ -12,9 +12,10 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.core.documents.diff import Difference, difference
-from app.core.documents.file_format import read_file
-from app.core.documents.versions import Version, namesakes_of, versions_of
+from app.blocks.model.project import Project
+from app.core.projects.block_diff import Difference, difference
+from app.core.projects.file_format import read_file
+from app.core.projects.versions import Version, namesakes_of, versions_of
 from app.errors import DocumentError
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text.dates import date_time_text
@@ -74,8 +75,7 @@ class VersionHistorySheet(Overlay):
         # `open_copy` gets the file of a version and a name for the copy.
         super().__init__(theme, window, _("Earlier versions"))
         self._open_copy, self._save = open_copy, save
-        self._current_workspace: Mapping[str, object] = {}
-        self._name = ""
+        self._current_project = Project.of_blocks("", {})
         self._versions: dict[str, Version] = {}
         self._unread_ids: deque[str] = deque()
         self.heading = label("", "heading", wrap=True)
@@ -111,22 +111,20 @@ class VersionHistorySheet(Overlay):
 
     def show_for(
         self,
-        name: str,
+        project: Project,
         path: Path | None,
-        workspace: Mapping[str, object],
         now: dt.datetime | None = None,
         title: str = "",
     ) -> None:
         """Open the sheet with the versions of a file, compared with the current blocks.
 
         Args:
-            name: Name of the behaviour.
+            project: Current content of the behaviour.
             path: File of the behaviour, or None if it isn't saved to a file.
-            workspace: Current blocks.
             now: Current time, for the formatted dates; default: the system time.
             title: Name with folder, if another open behaviour has the same name.
         """
-        self._name, self._current_workspace = name, workspace
+        self._current_project, name = project, project.name
         moment = now if now is not None else dt.datetime.now().astimezone()
         own_versions = versions_of(path) if path is not None else []
         namesakes = namesakes_of(path) if path is not None else []
@@ -180,9 +178,7 @@ class VersionHistorySheet(Overlay):
         note = reason = ""
         try:
             version = self._versions[id]
-            note = difference_text(
-                difference(read_file(version.copy, version.name).workspace, self._current_workspace)
-            )
+            note = difference_text(difference(read_file(version.copy, version.name), self._current_project))
         except DocumentError as error:
             reason = error.reason
         self.rows.update_entry(id, note, reason)
@@ -210,7 +206,7 @@ class VersionHistorySheet(Overlay):
         written = dt.datetime.fromtimestamp(version.written_s).astimezone()
         self.dismiss()
         name = _("{name}, {day} {clock}").format(
-            name=self._name,
+            name=self._current_project.name,
             day=day_text(written.day, written.month),
             clock=f"{written.hour}.{written.minute:02d}",
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import orjson
 
-from app.core.storage import deep_json
+from app.blocks.model import deep_json
 from app.errors import AppError
 from app.ui.shell.docking.dock import parse_key
 from app.ui.shell.docking.layouts import LAYOUTS

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.documents.examples import ABOUT, NAME
+from app.core.projects.examples import ABOUT, NAME
 from app.core.storage.atomic_file import read_regular_file
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import EmptyPageArt, RobotArt, StepsArt

@@ -1,0 +1,386 @@
+"""Commands for files of behaviours, with their dialogs and toasts: open, save, close and recover.
+
+All operations can be undone, therefore none of them asks for confirmation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol, runtime_checkable
+
+from PySide6.QtCore import QObject, QTimer
+
+from app.core.alerts.intents import Intent, OpenBehaviour, SaveBehaviourAs
+from app.core.projects.file_format import SUFFIX, file_type_hint
+from app.core.projects.journal import UnsavedWork
+from app.core.projects.open_project import OpenProject
+from app.core.projects.project_files import ClosedProject
+from app.core.session import Session
+from app.core.storage.settings import closed_tabs_folder
+from app.errors import AppError, DocumentError
+from app.ui.widgets.file_dialogs import FileDialogs
+from nep.i18n import _, ngettext
+
+MAX_FLUSH_MS = 500
+RECORDING, LAYOUT = OTHER_SUFFIXES = (".mcap", ".nep-layout")
+
+
+@runtime_checkable
+class SupportsFlush(Protocol):
+    """Interface of a panel that can hold an edit which the document doesn't contain yet."""
+
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Apply the pending edit to the document, then call ``callback``."""
+
+
+@runtime_checkable
+class SupportsShowCurrent(Protocol):
+    """Interface of a panel that shows the current behaviour."""
+
+    def show_current(self) -> None:
+        """Update the panel to the current behaviour immediately, without waiting for the next tick."""
+
+
+class ProjectController:
+    """Controller that runs the file operations of the session and shows their results.
+
+    Args:
+        session: Session with the open projects.
+        dialogs: File dialogs.
+        show_toast: Shows a toast.
+        show_editor: Called when a behaviour was opened or reopened.
+        editor: Returns the panel with the block editor, or None before it is created.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        dialogs: FileDialogs,
+        show_toast: Callable[..., object],
+        show_editor: Callable[[], object],
+        editor: Callable[[], object],
+    ) -> None:
+        self._session, self.dialogs, self._show_toast, self._show_editor = (
+            session,
+            dialogs,
+            show_toast,
+            show_editor,
+        )
+        self._documents = session.documents
+        self._editor = editor
+        self.open_recording: Callable[[Path], object] = lambda _path: None
+        """Opens a recording that was dropped on the window or passed at startup."""
+        self.open_layout: Callable[[Path], object] = lambda _path: None
+        """Opens a layout file that was dropped on the window or passed at startup."""
+
+    def new(self) -> None:
+        """Create an empty behaviour in a new tab."""
+        self.run_after_flush(lambda: self._open_tab(self._documents.new))
+
+    def ask_open(self) -> None:
+        """Ask for a behaviour file and open it."""
+        self._session.alerts.resolve("strange")
+        path = self._session.document.path
+        self.dialogs.open(str(path.parent if path is not None else Path.home()), self.open)
+
+    def open(self, path: Path) -> None:
+        """Open a behaviour file in a tab; an error is shown as an alert."""
+        self.run_after_flush(lambda: self._open_tab(lambda: self._session.files.open(path)))
+
+    def open_all(self, paths: Sequence[Path]) -> None:
+        """Open files from the command line, from a drop, or from a later start of Studio.
+
+        Of several recordings or layout files only the last one is opened. Files of unknown types are
+        listed in an alert.
+        """
+        self._session.alerts.resolve("strange")
+        unknown_files = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHER_SUFFIXES}]
+        for path in paths:
+            if path.suffix.lower() == SUFFIX:
+                self.open(path)
+        for suffix, open_file in ((LAYOUT, self.open_layout), (RECORDING, self.open_recording)):
+            for path in [each for each in paths if each.suffix.lower() == suffix][-1:]:  # only one is shown
+                open_file(path)
+        if unknown_files:
+            self._raise_alert(
+                unknown_type_text(unknown_files), OpenBehaviour(), _("Open another file"), alert="strange"
+            )
+
+    def open_example(self, path: Path) -> None:
+        """Open a copy of an example in a new tab."""
+        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
+
+    def copy(self, path: Path, name: str) -> None:
+        """Open a copy of a saved version in a new tab, without writing a file.
+
+        Args:
+            path: File of the version.
+            name: Name of the copy.
+        """
+
+        def open_copy() -> None:
+            self._documents.copy(path, name)
+            self._show_toast(_("Opened {name} as a copy").format(name=name))
+
+        self.run_after_flush(lambda: self._open_tab(open_copy))
+
+    def recover(self, unsaved: Sequence[UnsavedWork]) -> None:
+        """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
+        self.run_after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(unsaved)))
+
+    def close(self, *documents: OpenProject) -> None:
+        """Close the tabs of documents, stopping their programs.
+
+        Unsaved changes are saved to the document's file or, if it has none, to a new file in the list
+        of recent files. The toast offers to restore overwritten files. If saving fails, the tab stays
+        open and an alert is shown.
+        """
+
+        def close_documents() -> None:
+            runs = self._session.runs
+            closed_projects = []
+            for document in documents:
+                if runs.is_running_or_pending(document):
+                    runs.stop()
+                try:
+                    closed_projects.append(self._session.files.close(document))
+                except AppError as error:
+                    self._documents.show(document)
+                    self._report_save_error(error)
+            self._notify_closed([each for each in closed_projects if each.is_saved])
+
+        self.run_after_flush(close_documents)
+
+    def reopen(self) -> None:
+        """Reopen the most recently closed tab."""
+
+        def reopen_document() -> None:
+            if self._documents.reopen() is None:
+                self._show_toast(_("No closed tabs"))
+
+        self.run_after_flush(lambda: self._open_tab(reopen_document))
+
+    def show(self, document: OpenProject) -> None:
+        """Show the tab of a document, without waiting for the next tick."""
+        self._documents.show(document)
+        editor = self._editor()
+        if isinstance(editor, SupportsShowCurrent):
+            editor.show_current()
+
+    def duplicate(self, document: OpenProject) -> None:
+        """Open a copy of a document in a new tab."""
+        self.run_after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
+
+    def rename(self, document: OpenProject, name: str) -> bool:
+        """Rename a behaviour and its file; return False on failure, which is shown as an alert.
+
+        The toast has an Undo button.
+        """
+        old_name = document.name
+        if name.strip() == old_name:
+            return True
+        try:
+            self._session.files.rename(document, name)
+        except AppError as error:
+            self._raise_alert(alert_text(error), SaveBehaviourAs(), _("Save somewhere else"))
+            return False
+        message = _("Renamed {name} to {other}").format(name=old_name, other=document.name)
+        self._show_toast(message, _("Undo"), lambda: self.rename(document, old_name))
+        return True
+
+    def move(self, document: OpenProject, position: int) -> None:
+        """Move the tab of a document to a position, counted from 0."""
+        self._documents.move(document, position)
+        self._session.tabs.save()
+
+    def save(self) -> None:
+        """Save the current behaviour; if it has no file, ask for one."""
+        if self._session.document.path is None:
+            self.save_as()
+        else:
+            self.run_after_flush(lambda: self._save(None))
+
+    def save_as(self) -> None:
+        """Ask for a file and save the current behaviour to it."""
+        document = self._session.document
+        current_path = document.path
+        folder = (
+            current_path.parent
+            if current_path is not None and current_path.parent != closed_tabs_folder()
+            else Path.home()
+        )
+        suggestion = str(folder / f"{document.name}{SUFFIX}")
+        self.dialogs.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
+
+    def fix(self, action: str) -> bool:
+        """Apply a fix to the blocks of the current behaviour.
+
+        Args:
+            action: Action of a problem, such as ``limit:ID``.
+
+        Returns:
+            False if the action isn't a fix or can't be applied.
+        """
+        document = self._session.document
+        if not document.can_fix(action):
+            return False
+
+        def apply_fix() -> None:
+            document.fix(action)
+
+        self.run_after_flush(apply_fix)
+        return True
+
+    def run_after_flush(self, callback: Callable[[], None]) -> None:
+        """Call a function after the pending edit of the block editor was applied to the document."""
+        editor = self._editor()
+        if isinstance(editor, SupportsFlush):
+            editor.flush(callback)
+        else:
+            callback()
+
+    def _save(self, path: Path | None) -> None:
+        document = self._session.document
+        try:
+            result = self._session.files.save(document, path)
+        except AppError as error:
+            self._report_save_error(error)
+            return
+        self._session.alerts.resolve("file")
+        earlier = result.version
+        if earlier is None or result.reason == "edited":
+            self._show_toast(_("Saved {name}").format(name=document.name))
+            return
+        template = (
+            _("Saved {name}. The previous file is under Earlier versions.")
+            if result.reason == "replaced"
+            else _(
+                "Saved {name}. Another program had changed the file; its version is under Earlier versions."
+            )
+        )
+        copy_name = _("{name} (previous version)").format(name=document.name)
+        message = template.format(name=document.name)
+        self._show_toast(message, _("Open"), lambda: self.copy(earlier.copy, copy_name))
+
+    def _open_tab(self, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except AppError as error:
+            self._raise_alert(alert_text(error), OpenBehaviour(), _("Open another file"))
+            return
+        self._session.tabs.save()
+        self._session.alerts.resolve("file")
+        self._show_editor()
+
+    def _notify_closed(self, closed_projects: Sequence[ClosedProject]) -> None:
+        # Shows a toast that names the saved behaviours and offers undo.
+        if not closed_projects:
+            return
+        count = len(closed_projects)
+        if count > 1:
+            message = ngettext("Saved {count} behaviour", "Saved {count} behaviours", count).format(
+                count=count
+            )
+        else:
+            (closed,) = closed_projects
+            template = (
+                _("Closed {name}. You'll find it under Recent.") if closed.is_new_file else _("Saved {name}")
+            )
+            message = template.format(name=closed.name)
+        restorable = [each for each in closed_projects if each.version is not None]
+        if restorable:
+            self._show_toast(
+                message,
+                _("Undo"),
+                lambda: self._open_tab(lambda: self._session.files.undo_close(restorable)),
+            )
+        else:
+            self._show_toast(message)
+
+    def _report_save_error(self, error: Exception) -> None:
+        self._raise_alert(alert_text(error), SaveBehaviourAs(), _("Save somewhere else"))
+
+    def _raise_alert(self, text: AlertText, intent: Intent, button: str, alert: str = "file") -> None:
+        self._session.alerts.raise_alert(
+            alert, "error", text.title, text.detail, button=button, intent=intent
+        )
+
+
+class AlertText(NamedTuple):
+    """Text of an alert.
+
+    Attributes:
+        title: Problem, as a sentence.
+        detail: Advice, or "".
+    """
+
+    title: str
+    detail: str
+
+
+def alert_text(error: Exception) -> AlertText:
+    """Return the text of the alert for an error while a file is opened or saved."""
+    if not isinstance(error, DocumentError):
+        return AlertText(_as_sentence(str(error)), "")
+    has_file_name = error.path is not None and error.reason.startswith(
+        error.path.name
+    )  # the name is not capitalised
+    title = f"{error.reason}." if has_file_name else _as_sentence(error.reason)
+    return AlertText(title, _as_sentence(error.advice))
+
+
+def unknown_type_text(paths: Sequence[Path]) -> AlertText:
+    """Return the text of the alert for files of unknown types."""
+    names = [path.name or str(path) for path in paths]
+    text, others = _("{file} isn't a behaviour"), len(names) - 1
+    if others:
+        text = ngettext(
+            "{file} and {count} more aren't behaviours", "{file} and {count} more aren't behaviours", others
+        )
+    return AlertText(f"{text.format(file=names[0], count=others)}.", _as_sentence(file_type_hint()))
+
+
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+class FlushBeforeClose(QObject):
+    """Helper that applies the pending edit of the block editor before the window closes.
+
+    The window closes after at most 0.5 s, even if the block editor doesn't respond.
+    """
+
+    def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
+        # `close` is called once if `can_close` had to wait.
+        super().__init__(parent)
+        self._editor, self._close = editor, close
+        self._is_requested = self._is_ready = self._is_waiting = False
+
+    def can_close(self) -> bool:
+        """Return True if the window can be closed now.
+
+        The first call requests the pending edit. If it returns False, the window is closed when the
+        edit has arrived.
+        """
+        if not self._is_requested:
+            self._is_requested, self._is_ready = True, False
+            editor = self._editor()
+            if isinstance(editor, SupportsFlush):
+                editor.flush(self._on_flushed)
+            else:
+                self._is_ready = True
+            self._is_waiting = not self._is_ready
+            if self._is_waiting:
+                QTimer.singleShot(MAX_FLUSH_MS, self, self._on_flushed)
+        return self._is_ready
+
+    def reset(self) -> None:
+        """Reset the state after closing the window was cancelled."""
+        self._is_requested = self._is_ready = self._is_waiting = False
+
+    def _on_flushed(self) -> None:
+        self._is_ready = True
+        if self._is_waiting:
+            self._is_waiting = False
+            QTimer.singleShot(0, self, self._close)
