@@ -30,7 +30,8 @@ Example:
 
 from __future__ import annotations
 
-from app.robots.driver.call import Call, Canceled, Clock, Failed, Link, MonotonicClock
+from app.clock import Clock, MonotonicClock
+from app.robots.driver.call import Call, Canceled, Failed, Link
 from app.robots.driver.declare import Kind, action, detections, event, picture, safe_stop, sensor
 from app.robots.driver.driver import Driver
 from app.robots.driver.process import install_exception_hook, main

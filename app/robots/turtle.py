@@ -13,9 +13,10 @@ from dataclasses import replace
 
 import cv2
 
+from app.clock import Clock, MonotonicClock
 from app.robots.description.json_access import finite_float
 from app.robots.diffdrive import DIFFDRIVE, DiffDrive
-from app.robots.driver.call import Clock, Link, MonotonicClock
+from app.robots.driver.call import Link
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens

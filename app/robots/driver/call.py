@@ -5,39 +5,13 @@ from __future__ import annotations
 import logging
 import sys
 import threading
-import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
+from app.clock import Clock
+
 _JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
-
-
-class Clock(Protocol):
-    """Interface of a monotonic clock, which tests can replace."""
-
-    def now(self) -> float:
-        """Return the monotonic time in seconds."""
-
-    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait until the event is set; return False on timeout.
-
-        Args:
-            event: Event to wait for.
-            timeout_s: Timeout in seconds; None for no limit.
-        """
-
-
-class MonotonicClock:
-    """Monotonic clock of the computer."""
-
-    def now(self) -> float:
-        """Return the monotonic time in seconds."""
-        return time.monotonic()
-
-    def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait until the event is set; return False on timeout."""
-        return event.wait(timeout_s)
 
 
 class Canceled(Exception):  # noqa: N818 - not an error; named like the state in the reply

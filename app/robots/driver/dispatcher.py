@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
-from app.robots.driver.call import Clock
+from app.clock import Clock
 from nep.system.log_rarely import SuppressedErrors
 
 _MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting

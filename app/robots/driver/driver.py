@@ -15,11 +15,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import nep
+from app.clock import Clock, MonotonicClock
 from app.errors import DescriptionError, RobotValueError
 from app.robots.description.description import MAX_BYTES, parse, thing_description, topic_of
 from app.robots.description.inputs import input_problems
 from app.robots.description.json_access import as_object
-from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
+from app.robots.driver.call import Call, Canceled
 from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import Kind
 from app.robots.driver.dispatcher import Dispatcher

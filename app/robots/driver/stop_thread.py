@@ -6,7 +6,8 @@ import logging
 import threading
 from collections.abc import Callable
 
-from app.robots.driver.call import Clock, Failed
+from app.clock import Clock
+from app.robots.driver.call import Failed
 from app.robots.identity import MAX_ERROR_LENGTH, MAY_MOVE_MESSAGE
 from nep.i18n import _
 from nep.system.log_rarely import SuppressedErrors

@@ -14,7 +14,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from app.robots.driver.call import Call, Canceled, Clock, Failed
+from app.clock import Clock
+from app.robots.driver.call import Call, Canceled, Failed
 from app.robots.driver.dispatcher import Dispatcher
 from app.robots.driver.stop_thread import StopThread
 from app.robots.driver.task import ProgramId, Task, TaskReply

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Mapping
 
-from app.robots.driver.call import Clock
+from app.clock import Clock
 from app.robots.virtual.room import OtherRobot
 
 PRESENCE_TIMEOUT_S = 1.5

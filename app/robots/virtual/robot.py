@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
-from app.robots.driver.call import Call, Canceled, Failed, Link, MonotonicClock
+from app.clock import MonotonicClock
+from app.robots.driver.call import Call, Canceled, Failed, Link
 from app.robots.driver.common_actions import battery_sensor, distance_sensor, position_sensor
 from app.robots.driver.declare import EventSpec, detections, event, picture, sensor
 from app.robots.driver.schema import Suggested

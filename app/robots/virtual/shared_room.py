@@ -7,7 +7,8 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Protocol
 
-from app.robots.driver.call import Clock, Link
+from app.clock import Clock
+from app.robots.driver.call import Link
 from app.robots.virtual.neighbours import Neighbours
 from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import cv2
 
+from app.clock import Clock
 from app.robots.description.json_access import finite_float
-from app.robots.driver.call import Clock, Link
+from app.robots.driver.call import Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
 from app.robots.virtual.canvas import Picture

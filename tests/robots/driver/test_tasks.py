@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from app.robots.driver.call import Canceled, MonotonicClock
+from app.clock import MonotonicClock
+from app.robots.driver.call import Canceled
 from app.robots.driver.task import Task, TaskReply
 from app.robots.driver.tasks import Tasks
 from tests.robots.conftest import eventually
