@@ -18,14 +18,21 @@ from typing import TextIO
 
 import nep
 from app.blocks import Program, ProjectCompiler
+from app.blocks.interrupts import without_interrupts
 from app.blocks.model.project import Project
 from app.blocks.model.workspace import Workspace, parse_workspace
-from app.blocks.runtime.interrupts import without_interrupts
+from app.blocks.runtime.events import (
+    LinePrinted,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramRunning,
+    RunnerEvent,
+)
 from app.core.projects.file_format import read_file
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_action_titles
 from app.core.robots.stop.stopper import RobotStopper
-from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.runner import Runner
 from app.errors import AppError, DescriptionError
 from app.robots.client.discovery import FoundRobots, find_robots
 from app.robots.client.limits import DISCOVERY_TIMEOUT_S, LATE_DISCOVERY_INTERVAL_S, ROBOT_WAIT_S
@@ -338,13 +345,15 @@ class _RunEvents:
         self.unresponsive_robots: tuple[str, ...] = ()
 
     def __call__(self, event: RunnerEvent) -> None:
-        if event.kind == "running" and event.description != self._last_description:
+        if isinstance(event, ProgramRunning) and event.description != self._last_description:
             self._last_description = event.description
             if event.description:
                 self._write_line(event.description)
-        elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
+        elif isinstance(event, LinePrinted | ProgramFailed | ProgramEnded) and (
+            event.text or not isinstance(event, ProgramEnded)
+        ):
             self._write_line(event.text)
-        if event.kind == "ended":
+        if isinstance(event, ProgramEnded):
             self.is_ok, self.unresponsive_robots = event.is_ok, event.unresponsive_robots
             if event.elapsed_s is not None:
                 self._write_line(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import sys
 
-from app.blocks.runtime.interrupts import without_interrupts
+from app.blocks.interrupts import without_interrupts
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.pure.calculation import (
     absolute,

@@ -9,6 +9,8 @@ from app.blocks.model.program import Program
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
+from app.blocks.runtime.scheduler import ScriptGroup
+from app.clock import ThreadClock
 from app.robots.description.description import Robot
 from tests.blocks.samples import robot
 
@@ -25,6 +27,7 @@ class FakeLink:
         self.invoked: list[tuple[str, str, dict[str, object]]] = []
         self.calls: list[RobotCall] = []
         self.canceled: list[RobotCall] = []
+        self.groups: list[tuple[str, str]] = []
         self.published: list[tuple[str, object]] = []
         self.sensors: dict[tuple[str, str], object] = {}
         self.topics: dict[str, object] = {}
@@ -57,6 +60,15 @@ class FakeLink:
 
     def cancel(self, call: RobotCall) -> None:
         self.canceled.append(call)
+
+    def hold_motions(self, group: ScriptGroup) -> None:
+        self.groups.append(("hold", group.name))
+
+    def resume_motions(self, group: ScriptGroup) -> None:
+        self.groups.append(("resume", group.name))
+
+    def end_motions(self, group: ScriptGroup) -> None:
+        self.groups.append(("end", group.name))
 
     def sensor(self, robot: str, name: str) -> object:
         return self.sensors.get((robot, name))
@@ -93,12 +105,17 @@ class Play:
         link: FakeLink | None = None,
         *,
         asked: Callable[[ProgramQuestion | None], None] | None = None,
+        clock: ThreadClock | None = None,
     ) -> None:
         self.program = program
         self.link = link or FakeLink()
         self.lines: list[str] = []
         self.runtime = Runtime(
-            self.lines.append, labels=program.labels, readings=program.readings, on_question=asked
+            self.lines.append,
+            labels=program.labels,
+            readings=program.readings,
+            on_question=asked,
+            clock=clock,
         )
         self.robots = robots
         self.steps: list[str] = []

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 import nep
+from app.blocks.runtime.events import ProgramRunning
 from app.core import faults
 from app.core.alerts.intents import ShowLog
 from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_text
 from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound
 from app.core.robots.stop.report import StopCompleted
-from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.client.stop_report import StopReport
@@ -193,13 +193,13 @@ def test_event_handler_that_raises_does_not_block_other_events(
     monkeypatch.setattr(session.runs, "on_stop", stopped.append)
     done = StopCompleted(1, StopReport((), 0.0))
     for _ in range(29):
-        for event in (RunnerEvent("running", 1), done, MasterFound(ADDRESS)):
+        for event in (ProgramRunning(run=1), done, MasterFound(ADDRESS)):
             session._mailbox.post_event(event)
         session.tick()
     assert stopped == [done] * 29
     assert session.live.master.kind == "connected"
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
-    assert alert.detail.startswith("Studio can't handle RunnerEvent: ValueError")
+    assert alert.detail.startswith("Studio can't handle ProgramRunning: ValueError")
     assert alert.intent == ShowLog()
     once = RepeatFilter()
     assert sum(once.filter(record) is not None for record in caplog.records) == 2  # the first, and the tenth
@@ -239,7 +239,7 @@ def test_stop_and_messages_are_processed_when_part_of_a_tick_raises(
     for _ in range(2):
         session._mailbox.post("/log", [message])
         session._mailbox.post("/faces", [message])
-        session._mailbox.post_event(RunnerEvent("running", 1))
+        session._mailbox.post_event(ProgramRunning(run=1))
         session._mailbox.post_event(StopCompleted(1, StopReport((), 0.0)))
         session.tick()
     assert len(stopped) == 2

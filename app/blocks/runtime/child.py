@@ -7,9 +7,8 @@ name, "value": …}`` (set a variable), ``{"do": "breakpoints", "blocks": [ids]}
 "question": number, "text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}`` when
 robots connect or restart.
 
-Output: ``{"is": "ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" | "ask" |
-"ended", …}``; question 0 of "ask" means that no question is open. When the input is closed, the program stops
-its robots and exits.
+Output: the events of `app.blocks.runtime.events`. When the input is closed, the program stops its robots and
+exits.
 """
 
 from __future__ import annotations
@@ -28,9 +27,25 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TextIO
 
+import msgspec
+
 import nep
 from app.blocks.model.program import Program
 from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.events import (
+    BlocksTraced,
+    CommandReplaced,
+    LinePrinted,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramReady,
+    ProgramRunning,
+    QuestionChanged,
+    RunnerEvent,
+    VariablesChanged,
+    limited,
+)
 from app.blocks.runtime.network import Network
 from app.blocks.runtime.publishing import PublishGuard, guarded_topics
 from app.blocks.runtime.questions import ProgramQuestion
@@ -42,6 +57,8 @@ from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.crash_trace import enable_crash_trace
+
+_encode = msgspec.json.Encoder().encode
 
 SAMPLE_INTERVAL_S = 1 / 30
 VARIABLES_PERIOD_SAMPLES = 3
@@ -67,14 +84,9 @@ class RunnerOutput:
         """Called with each line that the program prints."""
         self._dropped_count = 0
 
-    def send(self, kind: str, **content: object) -> None:
-        """Write one JSON object as a line; do nothing if the pipe is closed.
-
-        Args:
-            kind: Value of ``is``.
-            content: Further members of the object.
-        """
-        line = json.dumps({"is": kind, **content}, default=str)
+    def send(self, event: RunnerEvent) -> None:
+        """Write an event as a line; do nothing if the pipe is closed."""
+        line = _encode(event).decode()
         with self._lock:
             try:
                 self._stream.write(line + "\n")
@@ -98,22 +110,16 @@ class RunnerOutput:
         """Send the queued lines, at most `MAX_LINES` in total."""
         while self._remaining_lines > 0:
             try:
-                self.send("print", text=self._printed.get_nowait())
+                self.send(LinePrinted(text=self._printed.get_nowait()))
             except queue.Empty:
                 break
             self._remaining_lines -= 1
             if self._remaining_lines == 0:
-                self.send(
-                    "print",
-                    text=_("no more lines are shown: the limit of {count} lines has been reached").format(
-                        count=MAX_LINES
-                    ),
-                )
+                text = _("no more lines are shown: the limit of {count} lines has been reached")
+                self.send(LinePrinted(text=text.format(count=MAX_LINES)))
         if self._dropped_count:
-            self.send(
-                "print",
-                text=_("{count} lines were dropped: too many at once").format(count=self._dropped_count),
-            )
+            text = _("{count} lines were dropped: too many at once")
+            self.send(LinePrinted(text=text.format(count=self._dropped_count)))
             self._dropped_count = 0
 
 
@@ -193,9 +199,11 @@ class Run:
 
     def _send_question(self, question: ProgramQuestion | None) -> None:
         if question is None:
-            self._out.send("ask", question=0)
+            self._out.send(QuestionChanged())
         else:
-            self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
+            self._out.send(
+                QuestionChanged(question=question.id, text=question.text, choices=question.choices)
+            )
 
     def answer(self, command: Mapping[str, object]) -> None:
         """Pass the user's answer to the open question; command "answer"."""
@@ -232,14 +240,18 @@ class Run:
             self._out.on_print = partial(node.log.info, "%s")
             silent_robots = self._run_with_node(node)
             error = self._runtime.error
+            self._runtime.scheduler.record_stop()
+            self._send_trace()
             if error is not None:
                 node.log.error("%s", error.sentence)
-                self._out.send("error", block=error.block, sentence=error.sentence)
+                self._out.send(ProgramFailed(block=error.block, text=limited(error.sentence)))
             self._send_replacements()
             self._out.send_printed()
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._started_at, 3)
-            self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent_robots)
+            self._out.send(
+                ProgramEnded(is_ok=error is None, elapsed_s=elapsed_s, unresponsive_robots=silent_robots)
+            )
             node.close(FLUSH_TIMEOUT_S if self._stop_timeout_s == 0.0 else 2 * STOP_TIMEOUT_S)
         return error is None
 
@@ -303,34 +315,44 @@ class Run:
     def _send_variables(self) -> None:
         changes = self._variables.changes()
         if changes:
-            self._out.send("variables", values=[value.to_json() for value in changes])
+            self._out.send(VariablesChanged(values=tuple(changes)))
+
+    def _send_trace(self) -> None:
+        records = self._runtime.scheduler.take_trace()
+        if records:
+            self._out.send(BlocksTraced(records=records))
 
     def _report_until_finished(self) -> None:
-        runtime, status_text, last_report = self._runtime, self._runtime.status_text, None
+        runtime, status_text = self._runtime, self._runtime.status_text
+        last_report: object = None
         sample_counter = itertools.count()
         while not runtime.finished.wait(SAMPLE_INTERVAL_S):
             if next(sample_counter) % VARIABLES_PERIOD_SAMPLES == 0:
                 self._send_variables()
             snapshot = runtime.scheduler.snapshot()
-            activity, warning = status_text.text(snapshot.blocks), status_text.warning(snapshot.blocks)
+            self._send_trace()
             self._out.send_printed()
             self._send_replacements()
-            if (snapshot, activity, warning) == last_report:
-                continue
-            last_report = (snapshot, activity, warning)
+            event: ProgramPaused | ProgramRunning
             if snapshot.is_paused:
-                reading = status_text.block_text(snapshot.next_block)
-                self._out.send(
-                    "paused", block=snapshot.next_block, blocks=snapshot.blocks, says=reading, warning=warning
+                event = ProgramPaused(
+                    block=snapshot.next_block,
+                    description=limited(status_text.block_text(snapshot.next_block)),
+                    warning=limited(status_text.warning(snapshot.blocks)),
                 )
             else:
-                self._out.send("running", blocks=snapshot.blocks, says=activity)
+                event = ProgramRunning(description=limited(status_text.text(snapshot.blocks)))
+            report = (event, snapshot.blocks if snapshot.is_paused else ())
+            if report != last_report:
+                last_report = report
+                self._out.send(event)
 
     def _send_replacements(self) -> None:
         for replacement in self._runtime.replacements.take_new():
-            self._out.send(
-                "warning", block=replacement.block, sentence=replacement.message, count=replacement.count
+            event = CommandReplaced(
+                block=replacement.block, text=limited(replacement.message), count=replacement.count
             )
+            self._out.send(event)
 
 
 def _parse_string_map(decoded: object) -> dict[str, str]:
@@ -362,7 +384,7 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     out = RunnerOutput(stdout or sys.stdout)
     commands = read_commands(stdin or sys.stdin)
     sys.stdout = PrintStream(out)
-    out.send("ready")
+    out.send(ProgramReady())
     command = next((command for command in commands if command.get("do") == "start"), None)
     if command is None:
         return 0
@@ -371,12 +393,14 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
         threading.Thread(target=_run_commands, args=(run, commands), name="orders", daemon=True).start()
         return 0 if run.run() else 1
     except BehaviourError as error:
-        out.send("error", block=error.block, sentence=error.sentence)
+        out.send(ProgramFailed(block=error.block, text=limited(error.sentence)))
     except (AppError, NepError) as error:
-        out.send("error", block=None, sentence=_("The program can't start: {error}.").format(error=error))
+        text = _("The program can't start: {error}.").format(error=error)
+        out.send(ProgramFailed(text=limited(text)))
     except (KeyError, TypeError, ValueError, SyntaxError) as error:
-        out.send("error", block=None, sentence=_("The program can't be loaded: {error}.").format(error=error))
-    out.send("ended", ok=False, elapsed_s=0.0, silent=[])
+        text = _("The program can't be loaded: {error}.").format(error=error)
+        out.send(ProgramFailed(text=limited(text)))
+    out.send(ProgramEnded(is_ok=False, elapsed_s=0.0))
     return 1
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from app.blocks.runtime.scheduler import ScriptGroup
 from app.robots.client.task import RobotTask
 
 
@@ -52,6 +53,18 @@ class ProgramLink(Protocol):
 
     def cancel(self, call: RobotCall) -> None:
         """Cancel a command."""
+        ...
+
+    def hold_motions(self, group: ScriptGroup) -> None:
+        """Stop the motions of a group's scripts (such as a speed) until `resume_motions`."""
+        ...
+
+    def resume_motions(self, group: ScriptGroup) -> None:
+        """Resume the motions that `hold_motions` stopped."""
+        ...
+
+    def end_motions(self, group: ScriptGroup) -> None:
+        """Stop and discard the motions of a group's scripts."""
         ...
 
     def sensor(self, robot: str, name: str) -> object:

@@ -12,6 +12,7 @@ from typing import Protocol
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
+from app.blocks.runtime.scheduler import ScriptGroup
 from app.robots.client.dialects import dialect_of, new_id
 from app.robots.client.heartbeat import Heartbeat
 from app.robots.client.inbox import ReplyInbox, Senders
@@ -268,14 +269,28 @@ class Network:
         """Resume the motions that `pause_robots` stopped."""
         self._motions.resume_all()
 
+    def hold_motions(self, group: ScriptGroup) -> None:
+        """Stop the motions of a group's scripts until `resume_motions`."""
+        self._motions.hold(group)
+
+    def resume_motions(self, group: ScriptGroup) -> None:
+        """Resume the motions that `hold_motions` stopped."""
+        self._motions.resume(group)
+
+    def end_motions(self, group: ScriptGroup) -> None:
+        """Stop and discard the motions of a group's scripts."""
+        self._motions.end(group)
+
     def suspend_motions(self) -> AbstractContextManager[None]:
         """Return a context manager that stops the motions of the calling script during a delay at a block."""
         return self._motions.suspend()
 
-    def _stop_motion(self, robot: Robot) -> None:
+    def _stop_motion(self, robot: Robot) -> bool:
         pending_calls = [call for call in list(self._calls.values()) if call.robot == robot.name]
-        if all(self._motions.is_motion(call) for call in pending_calls):
-            self._send_stop(robot)
+        if not all(self._motions.is_motion(call) for call in pending_calls):
+            return False
+        self._send_stop(robot)
+        return True
 
     def _stop_for_pause(self, robot: Robot) -> None:
         for call in list(self._calls.values()):

@@ -94,7 +94,7 @@ class Questions:
         question = ProgramQuestion(next(self._ids), question_text[:MAX_QUESTION_LENGTH], choices=choices)
         self._update_queue(self._queue.append, question)
         try:
-            self._scheduler.wait_until(lambda: question.answer is not None, None)
+            self._scheduler.wait_until(lambda: question.answer is not None, None, cause="answer")
         finally:  # also if the script ends meanwhile
             self._update_queue(self._queue.remove, question)
         return question.answer or ""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from typing import Protocol
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.link import ProgramLink, RobotCall
-from app.blocks.runtime.scheduler import EndScript, Scheduler
+from app.blocks.runtime.scheduler import EndScript, Scheduler, Script, current_script
 from app.robots.client import limits
 from app.robots.client.dialects import dialect_of
 from app.robots.client.task import is_silent
@@ -106,7 +105,7 @@ class _Command:
     call: RobotCall
     action: Action
     block: str | None
-    script: int
+    script: Script | None
 
 
 class Replacements:
@@ -130,9 +129,9 @@ class Replacements:
             action: Description of the action.
             block: Id of the block.
         """
-        self._commands.append(_Command(call, action, block, threading.get_ident()))
+        self._commands.append(_Command(call, action, block, current_script()))
 
-    def record_early_end(self, call: RobotCall, *, names_robot: bool) -> None:
+    def record_early_end(self, call: RobotCall, *, names_robot: bool) -> bool:
         """Record that the robot cancelled a command although there was no pause or stop.
 
         Such a command is reported only if a later command of another script replaced it.
@@ -140,14 +139,17 @@ class Replacements:
         Args:
             call: Cancelled command.
             names_robot: True to include the name of the robot in the message.
+
+        Returns:
+            True if a command of another script replaced it.
         """
         replaced = next((each for each in self._commands if each.call is call), None)
         if replaced is None or replaced.block is None:
-            return
+            return False
         later_commands = list(self._commands)[self._commands.index(replaced) + 1 :]
         replacing = next((each for each in later_commands if _replaces(each, replaced)), None)
-        if replacing is None or replacing.script == replaced.script:
-            return
+        if replacing is None or replacing.script is replaced.script:
+            return False
         template = _("“{action}” was replaced by “{other}”")
         if names_robot:
             template = _("{robot}: “{action}” was replaced by “{other}”")
@@ -158,6 +160,7 @@ class Replacements:
         with self._lock:
             count = self._counts[key] = self._counts.get(key, 0) + 1
             self._new_replacements[key] = Replacement(replaced.block, message, count)
+        return True
 
     def take_new(self) -> tuple[Replacement, ...]:
         """Return the replacements since the last call; repeated ones are combined with their count."""
@@ -323,20 +326,24 @@ class RobotHandle:
     def _run_action(
         self, robot: Robot, action: Action, input: Mapping[str, object], activity: str
     ) -> RobotCall:
+        whole_input, scheduler = input, self._runtime.scheduler
         while True:
             call = self._runtime.link().invoke(self._name, action.name, input)
-            self._runtime.replacements.record_command(call, action, self._runtime.scheduler.block())
+            self._runtime.replacements.record_command(call, action, scheduler.block())
             try:
                 self._wait_for_reply(robot, action, call, activity)
             except EndScript:  # the program continues, but the robot must stop
                 self._runtime.link().cancel(call)
                 raise
             if call.state == "canceled" and not call.is_canceled_by_pause:
-                self._runtime.replacements.record_early_end(call, names_robot=self._runtime.robot_count > 1)
+                names_robot = self._runtime.robot_count > 1
+                is_replaced = self._runtime.replacements.record_early_end(call, names_robot=names_robot)
+                scheduler.record_interruption("replaced" if is_replaced else "canceled")
             if not call.is_canceled_by_pause or call.state != "canceled":
                 return call
-            self._wait_while_paused(action, is_remainder_unknown(action, input, call))
-            remaining = remaining_input(action, input, call)
+            restarts = scheduler.must_restart_block()
+            self._wait_while_paused(action, not restarts and is_remainder_unknown(action, input, call))
+            remaining = whole_input if restarts else remaining_input(action, input, call)
             if remaining is None:
                 return call
             input = remaining
@@ -351,6 +358,7 @@ class RobotHandle:
         if is_unknown:
             skipped_message = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
             self._runtime.write(skipped_message.format(**names))
+            self._runtime.scheduler.record_skip("unknown_remainder")
 
     def _wait_for_reply(self, robot: Robot, action: Action, call: RobotCall, activity: str) -> None:
         scheduler, dialect = self._runtime.scheduler, dialect_of(robot)
@@ -362,7 +370,8 @@ class RobotHandle:
             )
         can_pause = action.cancellable and dialect.can_cancel
         time_limit_s = action.timeout_s or limits.DEFAULT_ACTION_TIMEOUT_S
-        deadline = time.monotonic() + time_limit_s + limits.PROGRAM_MARGIN_S
+        clock = scheduler.clock
+        deadline = clock.now() + time_limit_s + limits.PROGRAM_MARGIN_S
         is_waiting = bool(call.waits_for) and call.state == "accepted"
         if is_waiting:
             self._runtime.status_text.set_text(_waiting_text(robot, call))
@@ -371,14 +380,14 @@ class RobotHandle:
             return call.done or (can_pause and scheduler.is_script_paused())
 
         while not scheduler.wait_for(
-            ready, min(limits.COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - time.monotonic()))
+            ready, min(limits.COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - clock.now()))
         ):
             if is_waiting:  # the time limit starts with the action
-                deadline = time.monotonic() + time_limit_s + limits.PROGRAM_MARGIN_S
+                deadline = clock.now() + time_limit_s + limits.PROGRAM_MARGIN_S
                 is_waiting = not call.has_started
                 self._runtime.status_text.set_text(_waiting_text(robot, call) if is_waiting else activity)
             error_text = self._silence_error(robot, call)
-            if error_text is None and time.monotonic() >= deadline:
+            if error_text is None and clock.now() >= deadline:
                 error_text = _("{name} didn't finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=time_limit_s
                 )
@@ -389,7 +398,7 @@ class RobotHandle:
             self._cancel_for_pause(call)
 
     def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
-        if not is_silent(robot, call.last_reply_s, time.monotonic()):
+        if not is_silent(robot, call.last_reply_s, self._runtime.scheduler.clock.now()):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 

@@ -19,9 +19,10 @@ from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.pure import calculation, clock, lists, texts
 from app.blocks.runtime.questions import QuestionCallback, Questions
 from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
-from app.blocks.runtime.scheduler import EndScript, Scheduler, StopProgram
+from app.blocks.runtime.scheduler import EndScript, Scheduler, ScriptGroup, StopProgram
 from app.blocks.runtime.triggers import ScriptTrigger, ThresholdTrigger, change_detector, event_matches
 from app.blocks.runtime.variables import short_text
+from app.clock import ThreadClock
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
@@ -103,6 +104,7 @@ class Runtime:
         readings: Blocks as text by id.
         on_question: Called with the question to show, or None; without this callback, questions raise
             BehaviourError.
+        clock: Clock of all waits (default: that of the computer).
     """
 
     def __init__(
@@ -112,6 +114,7 @@ class Runtime:
         labels: Mapping[str, str] | None = None,
         readings: Mapping[str, str] | None = None,
         on_question: QuestionCallback | None = None,
+        clock: ThreadClock | None = None,
     ) -> None:
         self._write_line = write_line
         self._labels = labels or {}
@@ -123,7 +126,7 @@ class Runtime:
         self._count_lock = threading.Lock()
         self._running = 0
         self._timer_start_s = 0.0
-        self.scheduler = Scheduler()
+        self.scheduler = Scheduler(clock)
         self.status_text = StatusText(self.scheduler.block, readings or {})
         self.replacements = Replacements()
         self._calls = CallStack(self.scheduler)
@@ -152,6 +155,7 @@ class Runtime:
         """
         self._link = link
         self.reset_timer()
+        self.scheduler.trace.restart()
         self._robots = {robot.name: robot for robot in robots}
         self._calls.raise_recursion_limit()
         link.set_callbacks(self.scheduler.wake_scripts, self._on_external_stop)
@@ -182,6 +186,7 @@ class Runtime:
         with suppress(EndScript):
             self.scheduler.start_run()
             script()
+        self.scheduler.finish_run()
 
     def _run_for_events(self, trigger: ScriptTrigger, script: Script) -> None:
         while True:
@@ -206,7 +211,7 @@ class Runtime:
                 body()
             except Exception as error:  # noqa: BLE001 (every error is reported at its block)
                 block = self.scheduler.block()
-                self._fail(explain(error, self._labels.get(block or "", ""), block))
+                self._on_script_error(explain(error, self._labels.get(block or "", ""), block))
             finally:
                 on_end()
 
@@ -223,6 +228,49 @@ class Runtime:
         if is_last:
             self.scheduler.stop()  # ends scripts that only wait for broadcasts
             self.finished.set()
+
+    def _on_script_error(self, error: BehaviourError) -> None:
+        group = self.scheduler.current_script().group
+        self.scheduler.record_failure(error.sentence)
+        if group.ends_program:
+            self._fail(error)
+        else:
+            self.end_group(group, error)
+
+    # ---- groups of scripts
+
+    def hold_group(self, group: ScriptGroup, *, restarts_blocks: bool = False) -> None:
+        """Suspend the scripts of a group and the motions of robots that they started.
+
+        Args:
+            group: Group of scripts.
+            restarts_blocks: True to run an interrupted wait or action from its beginning after
+                `resume_group`, False to run what is left of it.
+        """
+        group.hold(restarts_blocks=restarts_blocks)
+        self._require_link().hold_motions(group)
+
+    def resume_group(self, group: ScriptGroup) -> None:
+        """Resume the scripts and motions of a group after `hold_group`.
+
+        Args:
+            group: Group of scripts.
+        """
+        self._require_link().resume_motions(group)
+        group.resume()
+
+    def end_group(self, group: ScriptGroup, error: BehaviourError | None = None) -> None:
+        """End the scripts of a group and the motions of robots that they started.
+
+        Args:
+            group: Group of scripts.
+            error: Error that ended the group, or None.
+        """
+        if error is None:
+            group.end()
+        else:
+            group.fail(error)
+        self._require_link().end_motions(group)
 
     def _fail(self, error: BehaviourError) -> None:
         if self.error is None and not self.scheduler.is_stopping:
@@ -375,7 +423,7 @@ class Runtime:
     def broadcast_and_wait(self, name: str) -> None:
         """Start the scripts that receive a broadcast, and wait until they have ended."""
         deliveries = self._broadcasts.send(name)
-        self.scheduler.wait_until(lambda: all(each.done for each in deliveries), None)
+        self.scheduler.wait_until(lambda: all(each.done for each in deliveries), None, cause="broadcast")
 
     # ---- event blocks
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
 
 from app.blocks.model.program import Variable
 from app.blocks.runtime import values
@@ -27,8 +28,11 @@ To save time, larger ones are shown as their number of digits.
 _ELLIPSIS = "…"
 
 
-@dataclass(frozen=True)
-class VariableValue:
+_Text = Annotated[str, Meta(max_length=MAX_TEXT_LENGTH)]
+_Item = Annotated[str, Meta(max_length=MAX_ITEM_LENGTH)]
+
+
+class VariableValue(Struct, frozen=True):
     """Value of a variable for display.
 
     Attributes:
@@ -41,40 +45,9 @@ class VariableValue:
 
     id: str
     kind: ValueKind
-    text: str
-    items: tuple[str, ...] = ()
+    text: _Text
+    items: Annotated[tuple[_Item, ...], Meta(max_length=MAX_ITEMS)] = ()
     length: int = 0
-
-    def to_json(self) -> dict[str, object]:
-        """Return the value as a JSON object."""
-        return {
-            "id": self.id,
-            "kind": self.kind,
-            "text": self.text,
-            "items": list(self.items),
-            "length": self.length,
-        }
-
-    @classmethod
-    def from_json(cls, decoded: object) -> VariableValue | None:
-        """Create a value from the result of `to_json`; return None if the argument is not an object.
-
-        Texts are truncated to their limits.
-        """
-        if not isinstance(decoded, Mapping):
-            return None
-        items, length = decoded.get("items"), decoded.get("length")
-        kind = str(decoded.get("kind"))
-        is_known = kind in ("number", "text", "boolean", "list", "unknown", "other")
-        return cls(
-            str(decoded.get("id"))[:MAX_TEXT_LENGTH],
-            cast("ValueKind", kind) if is_known else "other",
-            str(decoded.get("text", ""))[: MAX_TEXT_LENGTH + 1],
-            tuple(str(each)[: MAX_ITEM_LENGTH + 1] for each in items[:MAX_ITEMS])
-            if isinstance(items, list)
-            else (),
-            length if isinstance(length, int) else 0,
-        )
 
 
 class VariableWatch:

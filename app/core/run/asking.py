@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.core.run.runner import Runner, RunnerEvent
+from app.blocks.runtime.events import QuestionChanged, RunnerEvent
+from app.core.run.runner import Runner
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class OpenQuestion:
 
     def on_event(self, event: RunnerEvent) -> None:
         """Apply an event that asks a question or withdraws one; other events are ignored."""
-        if event.kind == "ask" and self._runner is not None:
+        if isinstance(event, QuestionChanged) and self._runner is not None:
             number = event.question
             self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import IO
 
 MAX_LINE_LENGTH = 1_000_000
@@ -14,7 +14,6 @@ PROTOCOL_PREFIX = b'{"is"'
 MAX_LINES_PER_S = 1_000
 MAX_BYTES_PER_S = 20_000_000
 THROTTLE_PAUSE_S = 0.02
-MAX_TEXT_LENGTH = 2_000
 
 
 class OutputReader:
@@ -108,13 +107,3 @@ class RateLimiter:
             return 0
         count, self.rejected_count = self.rejected_count, 0
         return count
-
-
-def parse_texts(value: object) -> tuple[str, ...]:
-    """Return the items of a list as strings; empty if the value is not a list."""
-    return tuple(str(each) for each in value) if isinstance(value, (list, tuple)) else ()
-
-
-def text_of(fields: Mapping[str, object], name: str) -> str:
-    """Return a field as a string, shortened for display; "" if the field is missing."""
-    return str(fields.get(name, ""))[:MAX_TEXT_LENGTH]

@@ -12,6 +12,18 @@ from typing import Protocol
 
 from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program, Variable
+from app.blocks.runtime.events import (
+    BlocksTraced,
+    CommandReplaced,
+    LinePrinted,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramRunning,
+    RunnerEvent,
+    VariablesChanged,
+)
+from app.blocks.runtime.trace import RunningBlocks
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts.alerts import Alerts
 from app.core.projects.open_project import OpenProject
@@ -25,7 +37,7 @@ from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.requests import OpenBehaviours, RequestedRun
 from app.core.run.run_warnings import RunWarnings
-from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.runner import Runner
 from app.core.run.stop_job import stop_program, stop_robot
 from app.core.run.stop_reports import StopReporter
 from app.core.run.trial import Trial, TriedValue
@@ -107,7 +119,8 @@ class Runs:
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
-        self.ran_blocks: frozenset[str] = frozenset()  # since the start, also between two ticks
+        self._traced = RunningBlocks()  # of the program's trace
+        self._earlier_blocks: frozenset[str] = frozenset()  # that began in earlier runs
         self._errors = BlockErrors()
         self._warnings = RunWarnings(lambda text: self._console.add("warn", self._run.name, text))
         self.values: Mapping[str, VariableValue] = {}
@@ -130,6 +143,11 @@ class Runs:
     def used_robots(self) -> tuple[str, ...]:
         """Names of the robots that the running or paused program uses."""
         return self._used_robots if self.active else ()
+
+    @property
+    def ran_blocks(self) -> frozenset[str]:
+        """Ids of all blocks that have begun since Studio was started."""
+        return self._earlier_blocks | self._traced.begun
 
     @property
     def tried_value(self) -> TriedValue | None:
@@ -369,40 +387,48 @@ class Runs:
         """Apply an event of the program's process. Events of earlier runs are ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
-        run = self._mark_started(event)
         self.open_question.on_event(event)
-        match event.kind:
-            case "running" if run.state in {"running", "paused"}:
-                if event.description and event.description != run.description:
-                    self._run = replace(self._run, description=event.description)
-                    self._console.add("info", run.name, event.description)
-                self._mark_blocks(running=event.blocks, stopped=self.stopped_blocks)
-            case "paused" if run.state in {"running", "paused"}:
-                self._run = replace(
-                    self._run,
-                    state="paused",
-                    paused_at=block_label(event.description, event.blocks, self._labels),
-                    pause_start_s=run.pause_start_s or self._clock(),
-                    warning=event.text,
-                )
-                self._mark_blocks(stopped=event.blocks)
-            case "error" if self.active:  # blocks interrupted by Stop fail; that is expected
+        match event:
+            case BlocksTraced() | ProgramRunning() | ProgramPaused() if self.active:
+                self._on_progress(event)
+            case ProgramFailed() if self.active:  # blocks interrupted by Stop fail; that is expected
                 self._on_error(event)
-            case "warning" if self.active and self.document is not None:
-                self._warnings.add(event.blocks[0], event.text, event.count, self.document.edits)
+            case CommandReplaced() if self.active and self.document is not None:
+                self._warnings.add(event.block, event.text, event.count, self.document.edits)
                 self.blocks_revision += 1
-            case "print":
+            case LinePrinted():
                 self._on_print(event)
-            case "variables":
+            case VariablesChanged():
                 self._show_values({**self.values, **{value.id: value for value in event.values}})
-            case "ended":
+            case ProgramEnded():
                 self._on_end(event)
 
-    def _mark_started(self, event: RunnerEvent) -> RunState:
+    def _on_progress(self, event: BlocksTraced | ProgramRunning | ProgramPaused) -> None:
         # The run's clock starts with the first event of its scripts.
-        if event.kind in {"running", "paused"} and self.active and not self._run.is_started:
+        if not self._run.is_started:
             self._run = replace(self._run, is_started=True, started_s=self._clock())
-        return self._run
+        run, previous_blocks = self._run, self._traced.blocks
+        match event:
+            case BlocksTraced():
+                self._traced.apply(event.records)
+                if self._traced.blocks != previous_blocks:
+                    self._mark_blocks(running=self._traced.blocks, stopped=self.stopped_blocks)
+            case ProgramRunning():
+                if event.description and event.description != run.description:
+                    self._run = replace(run, description=event.description)
+                    self._console.add("info", run.name, event.description)
+                self._mark_blocks(running=previous_blocks, stopped=self.stopped_blocks)
+            case ProgramPaused():
+                next_block = () if event.block is None else (event.block,)
+                blocks = tuple(dict.fromkeys((*next_block, *previous_blocks)))
+                self._run = replace(
+                    run,
+                    state="paused",
+                    paused_at=block_label(event.description, blocks, self._labels),
+                    pause_start_s=run.pause_start_s or self._clock(),
+                    warning=event.warning,
+                )
+                self._mark_blocks(stopped=blocks)
 
     def on_stop(self, event: StopCompleted | RobotReplied | RobotStopped | LateReply) -> None:
         """Handle an event of a Stop: a reply, a late reply or the result.
@@ -478,6 +504,7 @@ class Runs:
             return
         self.open_question.reset(runner)
         self._runner, self._used_robots, self._labels = runner, program.robots, program.labels
+        self._earlier_blocks, self._traced = self.ran_blocks, RunningBlocks()
         self._robots.start(runner, requested_actions, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
         self._fleet.moved.record_command((robot.name for robot in robots), "behaviour")
@@ -535,7 +562,7 @@ class Runs:
         if self._run.state in {"ready", "proven"}:
             self._start(request)
 
-    def _on_print(self, event: RunnerEvent) -> None:
+    def _on_print(self, event: LinePrinted) -> None:
         # Shown in the Console, or as the value of a tried block.
         value = self._trial.parse_line(event.text)
         if value is None:
@@ -543,14 +570,14 @@ class Runs:
         else:
             self._run = replace(self._run, value=value)
 
-    def _on_error(self, event: RunnerEvent) -> None:
+    def _on_error(self, event: ProgramFailed) -> None:
         self._console.add("error", self._run.name, event.text)
-        if event.blocks:
-            self._set_errors({event.blocks[0]: event.text})
+        if event.block is not None:
+            self._set_errors({event.block: event.text})
         else:
             self._alerts.raise_alert("program", "error", _("The behaviour was stopped."), event.text)
 
-    def _on_end(self, event: RunnerEvent) -> None:
+    def _on_end(self, event: ProgramEnded) -> None:
         self._runner = None
         self._robots.stop()
         if not self.active:
@@ -619,5 +646,4 @@ class Runs:
 
     def _mark_blocks(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped
-        self.ran_blocks |= set(running)
         self.blocks_revision += 1

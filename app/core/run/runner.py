@@ -11,23 +11,32 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
+from msgspec.structs import replace
+
 from app.blocks.model.program import Program
-from app.blocks.runtime.variables import VariableValue
+from app.blocks.runtime.events import (
+    AnyEvent,
+    BlocksTraced,
+    LinePrinted,
+    ProgramEnded,
+    ProgramPaused,
+    ProgramReady,
+    ProgramRunning,
+    QuestionChanged,
+    VariablesChanged,
+)
+from app.blocks.runtime.events import RunnerEvent as RunnerEvent
 from app.core.faults import CONSOLE_EXTRA
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
-from app.core.run.child_output import OutputReader, RateLimiter, parse_texts, text_of
+from app.core.run.child_output import OutputReader, RateLimiter
 from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, source_root
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
-
-EventKind = Literal[
-    "ready", "running", "paused", "error", "warning", "print", "variables", "ask", "ended"
-]  # fmt: skip
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
@@ -43,8 +52,8 @@ MEMORY_CHECK_INTERVAL_S = 0.1
 PIPE_TIMEOUT_S = 0.5
 """Time in seconds that pipes may stay open after the process has exited, held by child processes."""
 MAX_EVENTS_PER_S = 300
-MAX_BLOCKS = 100
-MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
+_UNLIMITED_EVENTS = (ProgramReady, BlocksTraced, VariablesChanged, QuestionChanged)
+"""Events that `MAX_EVENTS_PER_S` doesn't limit, because later ones can't be understood without them."""
 MIN_REPORTED_BYTES = 10_000
 MAX_ERROR_LENGTH = 100_000
 MAX_ERROR_LINES = 200
@@ -52,43 +61,7 @@ MAX_ERROR_LINES = 200
 
 _run_numbers = itertools.count(1)
 _log = logging.getLogger("studio.runner")
-
-
-@dataclass(frozen=True)
-class RunnerEvent:
-    """Event of a program's process. The kinds of events to which an attribute belongs are in parentheses.
-
-    Attributes:
-        kind: Kind of event.
-        run: Id of the run.
-        blocks: Ids of the running blocks (running), of the blocks before which the program is paused,
-            the next one first (paused), or of the block that failed or caused the warning (error,
-            warning).
-        description: Description of the running block (running), or of the next block (paused).
-        text: Printed line (print); message (error); warning (warning, paused); reason for a failure
-            (ended); question (ask).
-        is_ok: True if the program ended without a failed block (ended).
-        elapsed_s: Duration of the run in seconds (ended).
-        unresponsive_robots: Names of robots that did not reply to the Stop that the program sent at its
-            end (ended).
-        values: Variables that have changed (variables).
-        count: Number of occurrences (warning).
-        question: Number of the question; 0 withdraws the open question (ask).
-        choices: Possible answers; empty if any answer is allowed (ask).
-    """
-
-    kind: EventKind
-    run: int
-    blocks: tuple[str, ...] = ()
-    description: str = ""
-    text: str = ""
-    is_ok: bool = True
-    elapsed_s: float | None = None
-    unresponsive_robots: tuple[str, ...] = ()
-    values: tuple[VariableValue, ...] = ()
-    count: int = 1
-    question: int = 0
-    choices: tuple[str, ...] = ()
+_decode = msgspec.json.Decoder(AnyEvent).decode
 
 
 class Runner:
@@ -124,7 +97,7 @@ class Runner:
         self._commands: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
         self._start_s = 0.0
         self._ended, self._output_ended = threading.Event(), threading.Event()
-        self._end_event: RunnerEvent | None = None
+        self._end_event: ProgramEnded | None = None
 
     @property
     def pid(self) -> int | None:
@@ -289,18 +262,18 @@ class Runner:
             event = self._parse_event(line)
             if event is None:
                 output.unexpected_bytes += len(line)
-            elif event.kind == "ended":
+            elif isinstance(event, ProgramEnded):
                 self._end_event = event
                 break
-            elif event.kind in ("ready", "variables", "ask") or limiter.try_acquire():
+            elif isinstance(event, _UNLIMITED_EVENTS) or limiter.try_acquire():
                 self._deliver(event, limiter)
         self._report_dropped(limiter.rejected_count, output.unexpected_bytes)
         child.popen.stdout.close()
         self._output_ended.set()
 
     def _deliver(self, event: RunnerEvent, limiter: RateLimiter) -> None:
-        if event.kind in ("running", "paused") and self.state in ("running", "paused"):
-            self.state = "paused" if event.kind == "paused" else "running"
+        if isinstance(event, ProgramRunning | ProgramPaused) and self.state in ("running", "paused"):
+            self.state = "paused" if isinstance(event, ProgramPaused) else "running"
         rejected_count = limiter.take_rejected_count()
         if rejected_count:
             self._report_dropped(rejected_count, 0)
@@ -313,12 +286,12 @@ class Runner:
                 "{count} lines were dropped: too many at once",
                 event_count,
             ).format(count=event_count)
-            self._on_event(RunnerEvent("print", self.run, text=text))
+            self._on_event(LinePrinted(run=self.run, text=text))
         if unexpected_bytes >= MIN_REPORTED_BYTES:
             text = _("{size} MB of unexpected output were discarded").format(
                 size=number(unexpected_bytes / 1e6, ".1f")
             )
-            self._on_event(RunnerEvent("print", self.run, text=text))
+            self._on_event(LinePrinted(run=self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
         while not child.has_ended and not self._output_ended.wait(MEMORY_CHECK_INTERVAL_S):
@@ -336,9 +309,7 @@ class Runner:
         end_event = self._end_event
         if end_event is None:
             text = "" if was_stopped else self._failure_reason(child, is_hung=is_hung)
-            end_event = RunnerEvent(
-                "ended", self.run, text=text, is_ok=was_stopped, elapsed_s=self._elapsed()
-            )
+            end_event = ProgramEnded(run=self.run, text=text, is_ok=was_stopped, elapsed_s=self._elapsed())
         self._on_event(end_event)
         self._ended.set()
 
@@ -378,59 +349,9 @@ class Runner:
 
     def _parse_event(self, line: bytes) -> RunnerEvent | None:
         try:
-            event = json.loads(line)
-        except (ValueError, RecursionError):
+            event = _decode(line)
+        except (msgspec.DecodeError, RecursionError):
             return None
-        if not isinstance(event, Mapping):
-            return None
-        kind = event.get("is")
-        block = event.get("block")
-        first_block = (block,) if isinstance(block, str) else ()
-        blocks = (
-            *first_block,
-            *(each for each in parse_texts(event.get("blocks"))[:MAX_BLOCKS] if each not in first_block),
-        )
-        if kind == "ready":
-            return RunnerEvent("ready", self.run)
-        if kind in ("running", "paused"):
-            description, text = text_of(event, "says"), text_of(event, "warning")
-            return RunnerEvent(kind, self.run, blocks=blocks, description=description, text=text)
-        if kind == "error":
-            return RunnerEvent(
-                "error", self.run, blocks=first_block, text=text_of(event, "sentence"), is_ok=False
-            )
-        if kind == "warning" and first_block:
-            count = event.get("count")
-            text = text_of(event, "sentence")
-            return RunnerEvent(
-                "warning",
-                self.run,
-                blocks=first_block,
-                text=text,
-                count=count if isinstance(count, int) else 1,
-            )
-        if kind in ("print", "ask"):
-            question = event.get("question")
-            question_number = question if isinstance(question, int) else 0
-            choices = tuple(
-                each[:MAX_CHOICE_LENGTH] for each in parse_texts(event.get("choices"))[:MAX_CHOICES]
-            )
-            return RunnerEvent(
-                kind, self.run, text=text_of(event, "text"), question=question_number, choices=choices
-            )
-        if kind == "variables":
-            value_list = event.get("values")
-            values = map(VariableValue.from_json, value_list if isinstance(value_list, list) else ())
-            return RunnerEvent(
-                "variables", self.run, values=tuple(each for each in values if each is not None)
-            )
-        if kind == "ended":
-            elapsed_s = event.get("elapsed_s")
-            return RunnerEvent(
-                "ended",
-                self.run,
-                is_ok=event.get("ok") is True,
-                elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
-                unresponsive_robots=parse_texts(event.get("silent")),
-            )
-        return None
+        if isinstance(event, ProgramEnded) and event.elapsed_s is None:
+            event = replace(event, elapsed_s=self._elapsed())
+        return replace(event, run=self.run)

@@ -10,13 +10,28 @@ import json
 import queue
 import threading
 from dataclasses import replace
+from typing import TypeVar
 
+import msgspec
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime import child
+from app.blocks.runtime.events import (
+    AnyEvent,
+    LinePrinted,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramReady,
+    ProgramRunning,
+    RunnerEvent,
+    VariablesChanged,
+)
 from tests.blocks.samples import block, get, number, say, stack, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
+
+Event = TypeVar("Event", bound=RunnerEvent)
 
 LONG_S = 30.0
 
@@ -49,7 +64,7 @@ class Child:
 
     def __init__(self, capsys_disabled) -> None:
         self.stdin, self.stdout = Pipe(), Pipe()
-        self.said: list[dict[str, object]] = []
+        self.said: list[RunnerEvent] = []
         self.code: list[int] = []
         self.thread = threading.Thread(target=self._main)
         self.thread.start()
@@ -65,12 +80,14 @@ class Child:
         sources = [each.source for each in robots]
         self.order(do="start", program=program.to_json(), robots=sources, master=master, **more)
 
-    def until(self, kind: str, **content: object) -> dict[str, object]:
-        """Wait for a report of this kind with this content and return it."""
+    def until(self, kind: type[Event], **content: object) -> Event:
+        """Wait for an event of this kind with this content and return it."""
         while True:
-            said = json.loads(next(self.stdout))
+            said = msgspec.json.decode(next(self.stdout), type=AnyEvent)
             self.said.append(said)
-            if said["is"] == kind and all(said.get(name) == value for name, value in content.items()):
+            if isinstance(said, kind) and all(
+                getattr(said, name) == value for name, value in content.items()
+            ):
                 return said
 
     def end(self) -> int:
@@ -99,12 +116,12 @@ def pepper(master):
 
 
 def test_program_runs_to_end_and_stops_its_robot(running, pepper, master):
-    running.until("ready")
+    running.until(ProgramReady)
     running.start(workspace(started(say("Hi"), write(text("done")))), [pepper.described], master.address)
-    ended = running.until("ended")
+    ended = running.until(ProgramEnded)
     assert running.end() == 0
-    assert (ended["ok"], ended["silent"]) == (True, [])
-    assert {"is": "print", "text": "done"} in running.said
+    assert (ended.is_ok, ended.unresponsive_robots) == (True, ())
+    assert LinePrinted(text="done") in running.said
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
     assert len(pepper.heard("stop")) == 1
 
@@ -112,16 +129,16 @@ def test_program_runs_to_end_and_stops_its_robot(running, pepper, master):
 def test_running_block_is_reported_with_its_text(running, pepper, master):
     pepper.slow = {"say"}
     running.start(workspace(started(say("Touch my head.") | {"id": "s"})), [pepper.described], master.address)
-    assert running.until("running", says="Pepper says “Touch my head.”")["blocks"] == ["s"]
+    assert running.until(ProgramRunning, description="Pepper says “Touch my head.”")
     running.order(do="stop")
-    assert running.until("ended")["ok"] is True
+    assert running.until(ProgramEnded).is_ok is True
 
 
 def test_error_names_its_block(running, pepper, master):
     pepper.refuses = {"say": "no voice"}
     running.start(workspace(started(say("Hi") | {"id": "s"})), [pepper.described], master.address)
-    assert running.until("error") == {"is": "error", "block": "s", "sentence": "Pepper: no voice."}
-    assert running.until("ended")["ok"] is False
+    assert running.until(ProgramFailed) == ProgramFailed(block="s", text="Pepper: no voice.")
+    assert running.until(ProgramEnded).is_ok is False
     assert running.end() == 1
     assert len(pepper.heard("stop")) == 1
 
@@ -129,26 +146,26 @@ def test_error_names_its_block(running, pepper, master):
 def test_program_can_be_paused_stepped_and_resumed(running, master):
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     running.start(workspace(started(first, second)), master=master.address, paused=True)
-    paused = running.until("paused")
-    assert (paused["block"], paused["says"]) == ("a", "write “1” to the console")
+    paused = running.until(ProgramPaused)
+    assert (paused.block, paused.description) == ("a", "write “1” to the console")
     running.order(do="step")
-    assert running.until("paused", block="b")["blocks"] == ["b"]
-    assert {"is": "print", "text": "1"} in running.said
+    assert running.until(ProgramPaused, block="b")
+    assert LinePrinted(text="1") in running.said
     running.order(do="go")
-    assert running.until("ended")["ok"] is True
+    assert running.until(ProgramEnded).is_ok is True
 
 
 def test_breakpoint_pauses_before_its_block_and_resume_runs_the_block(running, master):
     marked = write(text("two")) | {"id": "two", "data": '{"pause": true}'}
     saved = workspace(started(write(text("one")), marked, write(text("three"))))
     running.start(saved, master=master.address)
-    assert running.until("paused")["block"] == "two"
-    assert {"is": "print", "text": "one"} in running.said
-    assert {"is": "print", "text": "two"} not in running.said
+    assert running.until(ProgramPaused).block == "two"
+    assert LinePrinted(text="one") in running.said
+    assert LinePrinted(text="two") not in running.said
     running.order(do="go")
-    assert running.until("ended")["ok"] is True
-    assert {"is": "print", "text": "three"} in running.said
-    assert len([each for each in running.said if each["is"] == "paused"]) == 1
+    assert running.until(ProgramEnded).is_ok is True
+    assert LinePrinted(text="three") in running.said
+    assert len([each for each in running.said if isinstance(each, ProgramPaused)]) == 1
 
 
 @pytest.mark.parametrize(
@@ -159,8 +176,8 @@ def test_trial_value_is_formatted_for_display(running, master, shown, written):
     saved = workspace(started(write(shown)))
     program = replace(compile_behaviour(saved, []), shows_value=True)
     running.order(do="start", program=program.to_json(), robots=[], master=master.address)
-    assert running.until("print")["text"] == written
-    running.until("ended")
+    assert running.until(LinePrinted).text == written
+    running.until(ProgramEnded)
 
 
 def test_breakpoint_changed_during_run_takes_effect_at_once(running, master):
@@ -169,16 +186,16 @@ def test_breakpoint_changed_during_run_takes_effect_at_once(running, master):
         block("control_wait", "rest", SECONDS=number(0.01)),
     )
     running.start(workspace(started(block("control_forever", BODY=[wait, rest]))), master=master.address)
-    running.until("running")
+    running.until(ProgramRunning)
     running.order(do="breakpoints", blocks=["one"])
-    assert running.until("paused")["block"] == "one"
+    assert running.until(ProgramPaused).block == "one"
     running.order(do="breakpoints", blocks=["rest"])
     running.order(do="go")
-    assert running.until("paused")["block"] == "rest"
-    assert [each["block"] for each in running.said if each["is"] == "paused"] == ["one", "rest"]
+    assert running.until(ProgramPaused).block == "rest"
+    assert [each.block for each in running.said if isinstance(each, ProgramPaused)] == ["one", "rest"]
     running.order(do="breakpoints", blocks="no list")
     running.order(do="stop")
-    running.until("ended")
+    running.until(ProgramEnded)
 
 
 @pytest.mark.parametrize("data", ['{"pause": false}', '{"pause": true', "[]", '["pause"]', "pause", 7, None])
@@ -191,7 +208,7 @@ def test_invalid_or_unrelated_block_data_is_not_a_breakpoint(data):
 def test_heartbeat_continues_while_paused(running, pepper, master):
     saved = workspace(started(say("Hi")))
     running.start(saved, [pepper.described], master.address, paused=True)
-    running.until("paused")
+    running.until(ProgramPaused)
     before = len(pepper.heard("alive"))
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: len(pepper.heard("alive")) >= before + 3, LONG_S)
@@ -204,7 +221,7 @@ def test_program_ends_and_stops_robot_when_its_stdin_closes(running, pepper, mas
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("alive")), LONG_S)
     running.stdin.end()
-    assert running.until("ended")["ok"] is True
+    assert running.until(ProgramEnded).is_ok is True
     assert running.end() == 0
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
@@ -213,7 +230,7 @@ def test_program_ends_and_stops_robot_when_its_stdin_closes(running, pepper, mas
 def test_robot_that_does_not_confirm_final_stop_is_named(running, pepper, master):
     pepper.silent = {"stop"}
     running.start(workspace(started(say("Hi"))), [pepper.described], master.address)
-    assert running.until("ended")["silent"] == ["Pepper"]
+    assert running.until(ProgramEnded).unresponsive_robots == ("Pepper",)
 
 
 def test_robot_event_starts_its_script(running, pepper, master):
@@ -226,15 +243,15 @@ def test_robot_event_starts_its_script(running, pepper, master):
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("alive")), LONG_S)
     pepper.tell("touched", {"place": "head", "down": True})
-    assert running.until("ended")["ok"] is True
-    assert {"is": "print", "text": "ouch"} in running.said
+    assert running.until(ProgramEnded).is_ok is True
+    assert LinePrinted(text="ouch") in running.said
 
 
 def test_printed_output_of_a_program_is_bounded_in_lines_and_line_length(running, master):
     flood = block("control_repeat", TIMES=number(5000), BODY=[write(text("x" * 3000))])
     running.start(workspace(started(flood)), master=master.address)
-    running.until("ended")
-    lines = [str(said["text"]) for said in running.said if said["is"] == "print"]
+    running.until(ProgramEnded)
+    lines = [said.text for said in running.said if isinstance(said, LinePrinted)]
     assert len(lines) < 3000
     assert any("were dropped: too many at once" in line for line in lines)
     assert max(map(len, lines)) <= child.MAX_LINE_LENGTH
@@ -252,8 +269,8 @@ def test_invalid_start_request_is_rejected_with_explanation(running, order):
     running.stdin.write("no json\n")
     running.order(do="pause")
     running.order(**order)
-    assert "can't be loaded" in str(running.until("error")["sentence"])
-    assert running.until("ended")["ok"] is False
+    assert "can't be loaded" in running.until(ProgramFailed).text
+    assert running.until(ProgramEnded).is_ok is False
     assert running.end() == 1
 
 
@@ -261,7 +278,7 @@ def test_missing_master_is_reported(running):
     running.start(
         workspace(started(block("messages_publish", VALUE=text("x"), TOPIC="/x"))), master="127.0.0.1:1"
     )
-    assert "The program can't start" in str(running.until("error")["sentence"])
+    assert "The program can't start" in running.until(ProgramFailed).text
     assert running.end() == 1
 
 
@@ -271,14 +288,14 @@ def set_score(value, id=None):
 
 def values_of(said):
     """Return the reported variable values as pairs of ID and text, in the order of the reports."""
-    lines = [line["values"] for line in said if line["is"] == "variables"]
-    return [(value["id"], value["text"]) for values in lines for value in values]
+    lines = [event.values for event in said if isinstance(event, VariablesChanged)]
+    return [(value.id, value.text) for values in lines for value in values]
 
 
 def test_final_variable_value_is_reported(running, master):
     saved = workspace(started(set_score(number(7)), set_score(number(8))), variables=("score",))
     running.start(saved, master=master.address)
-    running.until("ended")
+    running.until(ProgramEnded)
     assert values_of(running.said)[-1] == ("score", "8")
 
 
@@ -296,7 +313,7 @@ def test_user_can_set_variable_of_running_program(running, master):
     )
     running.start(saved, master=master.address)
     while ("score", "7") not in values_of(running.said):
-        running.until("variables")
+        running.until(VariablesChanged)
     running.order(do="variable", python="score", value="go")
-    running.until("ended", ok=True)
-    assert {"is": "print", "text": "gone on"} in running.said
+    running.until(ProgramEnded, is_ok=True)
+    assert LinePrinted(text="gone on") in running.said

@@ -12,7 +12,7 @@ import pytest
 
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
-from app.blocks.runtime.scheduler import StopProgram
+from app.blocks.runtime.scheduler import Scheduler, Script, ScriptGroup, StopProgram, acting_for
 from app.robots.description.description import Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 
@@ -28,10 +28,16 @@ class Bench:
         self.invoked: list[tuple[str, str, Mapping[str, object]]] = []
         self.going = Motions(
             lambda robot: self.stopped.append(robot.name),
-            lambda robot: self.stood.append(robot.name),
+            self.stand,
             self.invoke,
         )
+        self.is_busy = False
         self.count, self.answers = 0, False
+
+    def stand(self, robot: Robot) -> bool:
+        if not self.is_busy:
+            self.stood.append(robot.name)
+        return not self.is_busy
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> None:
         self.invoked.append((robot, action, input))
@@ -49,6 +55,17 @@ class Bench:
 @pytest.fixture
 def bench() -> Bench:
     return Bench()
+
+
+def scripts(*groups: ScriptGroup) -> tuple[Script, Script]:
+    """Return two scripts, of two groups or of one."""
+    first, second = groups or [Scheduler().main_group] * 2
+    return Script(1, "one", first, threading.Event()), Script(2, "two", second, threading.Event())
+
+
+def pages() -> tuple[ScriptGroup, ScriptGroup]:
+    scheduler = Scheduler()
+    return scheduler.new_group("goal"), scheduler.new_group("reaction")
 
 
 def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
@@ -97,11 +114,11 @@ def test_motion_is_suspended_during_slow_motion_delay_and_then_resumed(bench) ->
 
 
 def test_slow_motion_delay_of_another_script_does_not_suspend_motion(bench) -> None:
-    bench.do("drive", speed=0.2)
-    thread = threading.Thread(target=lambda: bench.going.suspend().__enter__())
-    thread.start()
-    thread.join()
-    assert bench.stood == []
+    one, another = scripts()
+    with acting_for(one):
+        bench.do("drive", speed=0.2)
+    with acting_for(another), bench.going.suspend():
+        assert bench.stood == []
 
 
 @pytest.mark.parametrize("state", ["succeeded", "canceled"])
@@ -146,3 +163,63 @@ def test_motion_is_not_resumed_after_stop(bench) -> None:
     with pytest.raises(StopProgram), bench.going.suspend():
         raise StopProgram
     assert bench.invoked == []
+
+
+def test_motion_of_held_group_is_stopped_and_resumed(bench) -> None:
+    goal, reaction = pages()
+    of_goal, of_reaction = scripts(goal, reaction)
+    with acting_for(of_goal):
+        bench.do("drive", speed=0.2)
+    bench.going.hold(reaction)
+    assert bench.stood == []
+    bench.going.hold(goal)
+    assert bench.stood == ["Turtle"]
+    with acting_for(of_reaction):
+        bench.do("move", distance=0.1)
+    bench.going.resume(goal)
+    assert [action for _, action, _ in bench.invoked] == ["drive"], "the reaction didn't replace it"
+    bench.going.resume(goal)
+    assert bench.stopped == []
+
+
+def test_motion_of_held_group_is_stopped_when_its_robot_ends_an_action(bench) -> None:
+    goal, reaction = pages()
+    of_goal, of_reaction = scripts(goal, reaction)
+    with acting_for(of_goal):
+        bench.do("drive", speed=0.2)
+    bench.is_busy = True
+    bench.going.hold(goal)
+    bench.is_busy = False
+    with acting_for(of_goal):
+        bench.do("light", "canceled")
+    assert bench.stood == ["Turtle"]
+    with acting_for(of_reaction):
+        bench.do("light")
+    assert bench.stood == ["Turtle"], "it is stopped once"
+
+
+def test_motion_of_ended_group_is_stopped_and_not_resumed(bench) -> None:
+    goal, _reaction = pages()
+    of_goal, _ = scripts(goal, goal)
+    with acting_for(of_goal):
+        bench.do("drive", speed=0.2)
+    bench.going.end(goal)
+    assert bench.stood == ["Turtle"]
+    bench.going.resume(goal)
+    assert bench.going.stop_all() == ()
+    assert bench.invoked == []
+
+
+def test_motion_of_held_group_stays_stopped_after_pause_and_slow_motion(bench) -> None:
+    goal, _reaction = pages()
+    of_goal, _ = scripts(goal, goal)
+    with acting_for(of_goal):
+        bench.do("drive", speed=0.2)
+    bench.going.hold(goal)
+    bench.going.stop_all()
+    bench.going.resume_all()
+    with acting_for(of_goal), bench.going.suspend():
+        pass
+    assert bench.invoked == []
+    bench.going.resume(goal)
+    assert len(bench.invoked) == 1

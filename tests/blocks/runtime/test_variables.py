@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 
+import msgspec
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
@@ -43,7 +44,7 @@ from tests.blocks.samples import block, get, number, started, workspace, write
 def test_values_are_formatted_as_short_summaries(value: object, kind: str, text: str) -> None:
     told = display_value("v", value)
     assert (told.kind, told.text) == (kind, text)
-    assert VariableValue.from_json(json.loads(json.dumps(told.to_json()))) == told
+    assert msgspec.json.decode(msgspec.json.encode(told), type=VariableValue) == told
 
 
 def test_summary_of_large_value_reads_only_the_displayed_part() -> None:
@@ -138,12 +139,22 @@ def test_user_can_set_only_program_variables() -> None:
     assert names["wait"] is wait
 
 
-def test_invalid_variable_data_is_rejected_or_truncated() -> None:
-    assert VariableValue.from_json([1]) is None
-    told = VariableValue.from_json(
-        {"id": 5, "kind": "dance", "items": "x", "length": "y", "text": "z" * 10**6}
-    )
-    assert told == VariableValue("5", "other", "z" * (MAX_TEXT_LENGTH + 1))
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"id": 5},
+        {"kind": "dance"},
+        {"items": "x"},
+        {"items": ["x"] * (MAX_ITEMS + 1)},
+        {"length": "y"},
+        {"text": "z" * (MAX_TEXT_LENGTH + 1)},
+    ],
+)
+def test_invalid_variable_data_is_rejected(wrong: dict[str, object]) -> None:
+    valid: dict[str, object] = {"id": "v", "kind": "text", "text": "z", "items": [], "length": 0}
+    assert msgspec.convert(valid, VariableValue) == VariableValue("v", "text", "z")
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(valid | wrong, VariableValue)
 
 
 def test_program_lists_all_behaviour_variables_including_unused() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
+from app.blocks.runtime.events import ProgramEnded, ProgramRunning
 from app.core.network.master import MasterStarter
 from app.core.reports.crash import Crash
 from app.core.robots.launcher import TAIL_CHARS, LaunchFailed
@@ -47,10 +48,10 @@ def test_crashed_program_process_is_reported_with_its_location(crashes, master) 
     runner = Runner(heard)
     try:
         runner.start(waits(), [], master.address)
-        heard.until("running")
+        heard.until(ProgramRunning)
         assert runner.pid is not None
         os.kill(runner.pid, signal.SIGSEGV)
-        told = heard.until("ended").text
+        told = heard.until(ProgramEnded).text
     finally:
         runner.close()
     assert told == "The program's process was killed (signal 11).", "nothing of the trace is for the person"
@@ -67,7 +68,7 @@ def test_program_exit_by_system_exit_or_sigterm_is_not_a_crash(crashes, code: st
     heard = Heard()
     runner = Runner(heard, command=(sys.executable, "-c", code))
     runner.start(waits(), [], None)
-    heard.until("ended")
+    heard.until(ProgramEnded)
     runner.close()
     assert crashes() == []
 
@@ -76,9 +77,9 @@ def test_program_stopped_by_studio_is_not_a_crash(crashes, master) -> None:
     heard = Heard()
     runner = Runner(heard)
     runner.start(waits(), [], master.address)
-    heard.until("running")
+    heard.until(ProgramRunning)
     runner.stop()
-    heard.until("ended")
+    heard.until(ProgramEnded)
     runner.close()
     assert crashes() == []
 

@@ -17,6 +17,7 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.events import ProgramEnded, ProgramPaused
 from app.core.run.runner import Runner
 from app.robots.client.discovery import find_robots
 from nep.messages.message import Message
@@ -97,15 +98,15 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
         runner.start(program, [robot.source], master.address)
         pose.until(lambda: pose.far() > 0.2, 30)
         runner.pause()
-        held = heard.until("paused")
-        assert held.blocks, "the block at which it is held"
+        held = heard.until(ProgramPaused)
+        assert held.block, "the block at which it is held"
         pose.until_still()
         before = pose.far()
         assert before < WAY_M - 0.05, "it stands still before it has arrived"
         threading.Event().wait(HELD_S)  # the robot must not move during this time
         assert pose.far() == pytest.approx(before, abs=0.002), "it stands still"
         runner.resume()
-        ended = heard.until("ended")
+        ended = heard.until(ProgramEnded)
         assert ended.is_ok, [event.text for event in heard.events]
         assert pose.far() == pytest.approx(WAY_M, abs=0.03), "no step more than asked for"
     finally:
@@ -123,11 +124,11 @@ def test_step_completes_a_paused_action(master, pepper, node) -> None:
         runner.start(program, [robot.source], master.address)
         pose.until(lambda: pose.far() > 0.1, 30)
         runner.pause()
-        heard.until("paused")
+        heard.until(ProgramPaused)
         heard.events.clear()
         runner.step()
         pose.until(lambda: pose.far() > 0.39, LONG_S)
-        heard.until("paused")
+        heard.until(ProgramPaused)
         pose.until_still()
         before = pose.far()
         threading.Event().wait(0.5)  # the second block must wait for its own step

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import nep
+from app.blocks.runtime.events import ProgramEnded
 from app.core.robots.health_facts import health_items
 from app.core.robots.robot_link import RobotLink
-from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.robots.kit import Call, Driver, Failed, Kind, Link, action, safe_stop
 from app.run import FAILED, run_file
@@ -341,7 +341,7 @@ def test_robot_that_did_not_reply_to_the_program_is_named_by_stop(
     session.runs.run()
     runner = session.runs._runner
     assert runner is not None
-    session.runs.on_runner_event(RunnerEvent("ended", runner.run, unresponsive_robots=("Pepper",)))
+    session.runs.on_runner_event(ProgramEnded(run=runner.run, unresponsive_robots=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     assert session.runs.view().title == "Pepper didn't reply"
     runner.close()

@@ -6,18 +6,32 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 import psutil
 import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.runtime.events import (
+    BlocksTraced,
+    LinePrinted,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramReady,
+    ProgramRunning,
+    QuestionChanged,
+    VariablesChanged,
+)
 from app.blocks.runtime.variables import VariableValue
 from app.core.run import runner as runner_module
 from app.core.run.runner import Runner, RunnerEvent, child_command
 from app.errors import RunnerError
 from tests.blocks.samples import block, get, list_of, number, say, started, text, workspace, write
 from tests.blocks.wire_robot import WireRobot
+
+Event = TypeVar("Event", bound=RunnerEvent)
 
 LONG_S = 30.0
 STOP_WITHIN_S = 15.0  # below the minute to which `stopping_s` raises every timeout
@@ -36,7 +50,7 @@ FAILS = (sys.executable, "-c", "raise SystemExit('no room left')")
 TALKS_TEXT = """
 import sys
 print('nonsense', '[1]', '{"is": "dance"}', 'x' * 3000000, sep='\\n', flush=True)
-print('{"is": "ended", "ok": true, "elapsed_s": 1.5}', flush=True)
+print('{"is": "ended", "is_ok": true, "elapsed_s": 1.5}', flush=True)
 sys.stdin.read()
 """
 TALKS = (sys.executable, "-c", TALKS_TEXT)
@@ -54,10 +68,10 @@ class Heard:
             self.events.append(event)
             self.changed.notify_all()
 
-    def until(self, kind: str, **content: object) -> RunnerEvent:
-        def found() -> RunnerEvent | None:
+    def until(self, kind: type[Event], **content: object) -> Event:
+        def found() -> Event | None:
             for event in self.events:
-                if event.kind == kind and all(
+                if isinstance(event, kind) and all(
                     getattr(event, name) == value for name, value in content.items()
                 ):
                     return event
@@ -134,9 +148,11 @@ def test_program_runs_and_ends(runner, heard, master):
     made = runner()
     made.start(program(write(text("Hi"))), [], master.address)
     assert made.wait(LONG_S)
-    assert [event.kind for event in heard.events if event.kind != "running"] == ["ready", "print", "ended"]
+    assert [
+        type(event) for event in heard.events if not isinstance(event, ProgramRunning | BlocksTraced)
+    ] == [ProgramReady, LinePrinted, ProgramEnded]
     assert heard.events[-1].is_ok
-    assert heard.until("print").text == "Hi"
+    assert heard.until(LinePrinted).text == "Hi"
     assert made.state == "ended"
     assert {event.run for event in heard.events} == {made.run}
 
@@ -145,49 +161,49 @@ def test_program_continues_with_the_answer(runner, heard, master):
     made = runner()
     asks = block("asking_ask", QUESTION=text("Name? 👍"))
     made.start(program(asks, write(block("asking_answer"))), [], master.address)
-    asked = heard.until("ask")
+    asked = heard.until(QuestionChanged)
     assert asked.text == "Name? 👍"
     made.answer(asked.question + 1, "nobody asked this")
     made.answer(asked.question, "Ada “x”")
-    assert heard.until("ask", question=0)
-    assert heard.until("print").text == "Ada “x”"
-    assert heard.until("ended").is_ok
+    assert heard.until(QuestionChanged, question=0)
+    assert heard.until(LinePrinted).text == "Ada “x”"
+    assert heard.until(ProgramEnded).is_ok
 
 
 def test_question_includes_its_choices(runner, heard, master):
     made = runner()
     asks = block("asking_choices", QUESTION=text("Play?"), CHOICES=list_of(text("yes"), number(2)))
     made.start(program(asks, write(block("asking_answer"))), [], master.address)
-    asked = heard.until("ask")
+    asked = heard.until(QuestionChanged)
     assert asked.choices == ("yes", "2")
     made.answer(asked.question, "2")
-    assert heard.until("ask", question=0).choices == ()
-    assert heard.until("print").text == "2"
+    assert heard.until(QuestionChanged, question=0).choices == ()
+    assert heard.until(LinePrinted).text == "2"
 
 
 def test_program_can_be_paused_stepped_and_resumed(runner, heard, master):
     made = runner()
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     made.start(program(first, second), [], master.address, paused=True)
-    assert heard.until("paused").description == "write “1” to the console"
+    assert heard.until(ProgramPaused).description == "write “1” to the console"
     assert made.state == "paused"
     made.step()
-    assert heard.until("paused", blocks=("b",))
+    assert heard.until(ProgramPaused, block="b")
     made.resume()
-    assert heard.until("ended").is_ok
+    assert heard.until(ProgramEnded).is_ok
 
 
 def test_running_program_can_be_paused(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
-    heard.until("running")
+    heard.until(ProgramRunning)
     made.pause()
-    assert heard.until("paused").blocks
+    assert heard.until(ProgramPaused).block
     assert made.state == "paused"
     made.resume()
     assert made.state == "running"
     made.stop()
-    assert heard.until("ended").is_ok
+    assert heard.until(ProgramEnded).is_ok
 
 
 def test_stop_ends_endless_program_at_once(runner, heard, master):
@@ -195,14 +211,14 @@ def test_stop_ends_endless_program_at_once(runner, heard, master):
 
     def begin() -> Runner:
         made.start(endless(), [], master.address)
-        heard.until("running", run=made.run)
+        heard.until(ProgramRunning, run=made.run)
         return made
 
     assert stopping_s(begin) < STOP_WITHIN_S
     assert made.wait(LONG_S)
-    kinds = [event.kind for event in heard.events if event.run == made.run]
-    assert kinds[-1] == "ended"
-    assert kinds.count("ended") == 1
+    kinds = [type(event) for event in heard.events if event.run == made.run]
+    assert kinds[-1] is ProgramEnded
+    assert kinds.count(ProgramEnded) == 1
 
 
 def test_stop_interrupts_a_block_in_an_infinite_computation(runner, heard, master):
@@ -221,7 +237,7 @@ def test_stop_interrupts_a_block_in_an_infinite_computation(runner, heard, maste
             return made
 
         assert stopping_s(begin) < STOP_WITHIN_S
-    assert heard.until("ended").is_ok  # a stop is not an error
+    assert heard.until(ProgramEnded).is_ok  # a stop is not an error
 
 
 @pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
@@ -235,14 +251,14 @@ def test_hanging_child_is_killed(runner, heard, command):
 
     assert stopping_s(begin) < STOP_WITHIN_S
     assert made.wait(LONG_S)
-    assert heard.events[-1].kind == "ended"
+    assert isinstance(heard.events[-1], ProgramEnded)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_crashed_child_is_reported(runner, heard):
     made = runner(CRASHES)
     made.start(program(), [], None)
-    ended = heard.until("ended")
+    ended = heard.until(ProgramEnded)
     assert not ended.is_ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
     assert stopping_s(lambda: made) < STOP_WITHIN_S  # no timeout is waited for
@@ -250,37 +266,39 @@ def test_crashed_child_is_reported(runner, heard):
 
 def test_failed_child_is_reported_with_reason(runner, heard):
     runner(FAILS).start(program(), [], None)
-    assert heard.until("ended").text == "The program's process ended with exit code 1: no room left."
+    assert heard.until(ProgramEnded).text == "The program's process ended with exit code 1: no room left."
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_child_killed_from_outside_is_reported(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
-    heard.until("running")
+    heard.until(ProgramRunning)
     os.kill(made.pid, signal.SIGKILL)
-    assert heard.until("ended").text == f"The program's process was killed (signal {signal.SIGKILL.value})."
+    assert (
+        heard.until(ProgramEnded).text == f"The program's process was killed (signal {signal.SIGKILL.value})."
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_child_ignores_ctrl_c_of_the_terminal(runner, heard, master):
     made = runner()
     made.start(endless(), [], master.address)
-    heard.until("running")
+    heard.until(ProgramRunning)
     os.kill(made.pid, signal.SIGINT)
     made.pause()
-    assert heard.until("paused").blocks  # the child still responds
+    assert heard.until(ProgramPaused).block  # the child still responds
     made.stop()
-    assert heard.until("ended").is_ok
+    assert heard.until(ProgramEnded).is_ok
 
 
 def test_invalid_events_of_the_program_are_skipped_and_their_size_is_reported(runner, heard):
     made = runner(TALKS)
     made.start(program(), [], None)
-    assert heard.until("ended").elapsed_s == 1.5
-    assert [(event.kind, event.text) for event in heard.events] == [
-        ("print", "3.0 MB of unexpected output were discarded"),
-        ("ended", ""),
+    assert heard.until(ProgramEnded).elapsed_s == 1.5
+    assert heard.events == [
+        LinePrinted(run=made.run, text="3.0 MB of unexpected output were discarded"),
+        ProgramEnded(run=made.run, elapsed_s=1.5),
     ]
 
 
@@ -295,7 +313,7 @@ def test_runner_can_be_started_only_once(runner, heard, master):
     made.start(program(), [], master.address)
     with pytest.raises(RunnerError, match="create a new one"):
         made.start(program(), [], master.address)
-    heard.until("ended")
+    heard.until(ProgramEnded)
 
 
 def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pepper):
@@ -304,9 +322,9 @@ def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pe
     made = runner()
     wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])
     made.start(wanted, [pepper.described.source], master.address)
-    heard.until("running", description="Pepper says “Hi”")
+    heard.until(ProgramRunning, description="Pepper says “Hi”")
     made._commands.put(None)  # as when the operating system closes the pipe of a dead parent
-    assert heard.until("ended").is_ok
+    assert heard.until(ProgramEnded).is_ok
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
 
@@ -315,9 +333,9 @@ def test_error_event_has_block_and_message(runner, heard, master):
     made = runner()
     half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
     made.start(program(write(half)), [], master.address)
-    error = heard.until("error")
-    assert (error.blocks, error.text, error.is_ok) == (("v",), "“÷” can't divide by 0.", False)
-    assert not heard.until("ended").is_ok
+    error = heard.until(ProgramFailed)
+    assert (error.block, error.text) == ("v", "“÷” can't divide by 0.")
+    assert not heard.until(ProgramEnded).is_ok
 
 
 def test_packaged_studio_runs_its_own_executable_as_child(monkeypatch):
@@ -336,7 +354,7 @@ def test_variable_values_are_received_and_can_be_set(runner, heard, master):
     )
     started_runner = runner()
     started_runner.start(compile_behaviour(saved, []), [], master.address)
-    heard.until("variables", values=(VariableValue("n", "number", "3"),))
+    heard.until(VariablesChanged, values=(VariableValue("n", "number", "3"),))
     started_runner.set_variable("n", 5)
-    assert heard.until("ended").is_ok
-    heard.until("variables", values=(VariableValue("n", "number", "5"),))
+    assert heard.until(ProgramEnded).is_ok
+    heard.until(VariablesChanged, values=(VariableValue("n", "number", "5"),))

@@ -10,6 +10,7 @@ import time
 import psutil
 import pytest
 
+from app.blocks.runtime.events import LinePrinted, ProgramEnded
 from app.core.run.child_process import MAX_MEMORY_BYTES
 from app.core.run.runner import MAX_EVENTS_PER_S, Runner
 from tests.core.run.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
@@ -55,7 +56,7 @@ def started(heard: Heard):
 
 
 def printed(heard: Heard) -> list[str]:
-    return [event.text for event in heard.events if event.kind == "print"]
+    return [event.text for event in heard.events if isinstance(event, LinePrinted)]
 
 
 # ---- memory ----------------------------------------------------------------------------------------
@@ -63,14 +64,14 @@ def printed(heard: Heard) -> list[str]:
 
 def test_program_over_memory_limit_is_killed_and_reported(started, heard) -> None:
     started(EATS, max_bytes=200_000_000)
-    ended = heard.until("ended")
+    ended = heard.until(ProgramEnded)
     assert not ended.is_ok
     assert ended.text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_memory_of_child_processes_counts_towards_limit(started, heard) -> None:
     started(LETS_EAT, max_bytes=200_000_000)
-    assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was stopped."
+    assert heard.until(ProgramEnded).text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_default_memory_limit_is_one_gigabyte() -> None:
@@ -97,7 +98,7 @@ def test_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) ->
     began = time.monotonic()
     assert stopping_s(begin) < STOP_WITHIN_S
     seconds = time.monotonic() - began
-    assert heard.until("ended").is_ok
+    assert heard.until(ProgramEnded).is_ok
     assert shares[0] < 0.5  # reading the flood takes less than half of a processor
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
@@ -108,7 +109,7 @@ def test_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) ->
 def test_line_flood_is_throttled_and_counted(started, heard) -> None:
     def begin() -> Runner:
         runner, pause = started(PRINTS), threading.Event()
-        heard.until("print", text="x", run=runner.run)
+        heard.until(LinePrinted, text="x", run=runner.run)
         flooded = time.monotonic()
         while time.monotonic() - flooded < 2.2:
             pause.wait(0.05)
@@ -116,7 +117,7 @@ def test_line_flood_is_throttled_and_counted(started, heard) -> None:
 
     began = time.monotonic()
     assert stopping_s(begin) < STOP_WITHIN_S
-    heard.until("ended")
+    heard.until(ProgramEnded)
     seconds = time.monotonic() - began
     assert printed(heard).count("x") <= MAX_EVENTS_PER_S * (seconds + 1)
     left_out = [text for text in printed(heard) if text.endswith("lines were dropped: too many at once")]
@@ -126,7 +127,7 @@ def test_line_flood_is_throttled_and_counted(started, heard) -> None:
 
 def test_endless_line_is_discarded_and_later_lines_are_read(started, heard) -> None:
     started(NO_END)
-    assert heard.until("ended").elapsed_s == 1.0
+    assert heard.until(ProgramEnded).elapsed_s == 1.0
     assert printed(heard) == ["10.0 MB of unexpected output were discarded"]
 
 
@@ -134,7 +135,7 @@ def test_last_line_of_a_large_error_output_is_reported(started, heard) -> None:
     started(
         "import os\nfor _ in range(50):\n    os.write(2, b'e' * 1_000_000)\nraise SystemExit('last words')"
     )
-    assert "last words" in heard.until("ended").text
+    assert "last words" in heard.until(ProgramEnded).text
 
 
 # ---- pipes and processes ---------------------------------------------------------------------------
@@ -142,7 +143,7 @@ def test_last_line_of_a_large_error_output_is_reported(started, heard) -> None:
 
 def test_program_that_closes_its_output_is_stopped(started, heard) -> None:
     started(CLOSES)
-    assert heard.until("ended").text == "The program lost its connection to Studio and was stopped."
+    assert heard.until(ProgramEnded).text == "The program lost its connection to Studio and was stopped."
 
 
 def child_of(heard: Heard, runner: Runner) -> psutil.Process:
@@ -181,11 +182,11 @@ def test_child_processes_end_with_stop(started, heard, new) -> None:
         return runner
 
     assert stopping_s(begin) < STOP_WITHIN_S
-    heard.until("ended")  # although the child process holds the pipe open
+    heard.until(ProgramEnded)  # although the child process holds the pipe open
     assert all(gone(each) for each in left)
 
 
 def test_orphaned_child_processes_end_with_the_program(started, heard) -> None:
     left = child_of(heard, started(FORKS.format(new=False, wait=0.3)))
-    heard.until("ended")
+    heard.until(ProgramEnded)
     assert gone(left)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
@@ -39,7 +40,7 @@ def them(person) -> Person:
 
 
 def values(**held: object) -> dict[str, dict[str, object]]:
-    return {id: display_value(id, value).to_json() for id, value in held.items()}
+    return {id: msgspec.to_builtins(display_value(id, value)) for id, value in held.items()}
 
 
 def test_watched_variable_shows_a_value_card_that_is_saved_in_the_file(qtbot, view, them) -> None:

@@ -8,8 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import IO
 
 from app.blocks import Program
+from app.blocks.runtime.events import (
+    BlocksTraced,
+    CommandReplaced,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramReady,
+    ProgramRunning,
+    RunnerEvent,
+)
+from app.blocks.runtime.trace import BlockBegan, BlockEnded
 from app.core.robots import launcher as processes_module
-from app.core.run.runner import EventKind, RunnerEvent
 from app.errors import RunnerError
 
 
@@ -75,31 +85,34 @@ class Runner:
         if self.state != "ready":
             raise RunnerError("this runner has already run its program; create a new one")
         self.state, self.pace_s, self.breakpoints = "running", pace_s, program.breakpoints
-        self._tell("ready")
+        self._on_event(ProgramReady(run=self.run))
         if paused:
             block, says = next(iter(program.readings.items()), ("", ""))
-            self._blocks, self._says = (block,), says
+            self.does(block, says=says)
             self.pause()
 
     def does(self, *blocks: str, says: str = "") -> None:
         """Report that the program executes these blocks."""
+        ended = [BlockEnded(0.0, script, block) for script, block in enumerate(self._blocks)]
         self._blocks, self._says = blocks, says
-        self._tell("running", blocks=blocks, description=says)
+        began = [BlockBegan(0.0, script, block) for script, block in enumerate(blocks)]
+        self._on_event(BlocksTraced(run=self.run, records=(*ended, *began)))
+        self._on_event(ProgramRunning(run=self.run, description=says))
 
     def warns(self, block: str, sentence: str, count: int = 1) -> None:
         """Report that a block lost its robot to another script `count` times."""
-        self._tell("warning", blocks=(block,), text=sentence, count=count)
+        self._on_event(CommandReplaced(run=self.run, block=block, text=sentence, count=count))
 
     def fails(self, block: str, sentence: str) -> None:
         """Report that a block failed, and end the program."""
-        self._tell("error", blocks=(block,), text=sentence, is_ok=False)
+        self._on_event(ProgramFailed(run=self.run, block=block, text=sentence))
         self.ends(ok=False)
 
     def ends(self, *, ok: bool = True, why: str = "") -> None:
         """Report the end of the program; ``why`` is the reason if it failed."""
         if self.state != "ended":
             self.state = "ended"
-            self._tell("ended", is_ok=ok, text=why)
+            self._on_event(ProgramEnded(run=self.run, is_ok=ok, text=why))
 
     def set_pace(self, seconds: float) -> None:
         self.pace_s = seconds
@@ -112,20 +125,18 @@ class Runner:
 
     def pause(self) -> None:
         self.state = "paused"
-        self._tell("paused", blocks=self._blocks, description=self._says)
+        block = next(iter(self._blocks), None)
+        self._on_event(ProgramPaused(run=self.run, block=block, description=self._says))
 
     def resume(self) -> None:
         self.state = "running"
-        self._tell("running", blocks=self._blocks, description=self._says)
+        self._on_event(ProgramRunning(run=self.run, description=self._says))
 
     def step(self) -> None:
         self.pause()
 
     def stop(self) -> None:
         self.ends()
-
-    def _tell(self, kind: EventKind, **more: object) -> None:
-        self._on_event(RunnerEvent(kind, self.run, **more))  # type: ignore[arg-type]
 
 
 class Launcher(processes_module.Launcher):

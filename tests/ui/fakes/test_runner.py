@@ -13,8 +13,17 @@ import pytest
 
 from app.blocks import compile_behaviour
 from app.blocks.compiler.stack import Stack
+from app.blocks.runtime.events import (
+    BlocksTraced,
+    ProgramEnded,
+    ProgramFailed,
+    ProgramPaused,
+    ProgramRunning,
+    RunnerEvent,
+)
+from app.blocks.runtime.trace import BlockBegan
 from app.blocks.runtime.variables import VariableValue
-from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.runner import Runner
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import RunnerError
@@ -357,29 +366,31 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
     told: list[RunnerEvent] = []
     runner = run.make_runner(told.append)
 
-    def come(kind: str) -> None:
+    def come(kind: type[RunnerEvent]) -> None:
         """Wait until the newest event is of this kind, check all events and clear them."""
-        until(lambda: bool(told) and told[-1].kind == kind)
+        until(lambda: bool(told) and isinstance(told[-1], kind))
         assert {event.run for event in told} == {runner.run}
-        assert all(event.is_ok for event in told)
+        assert not any(isinstance(event, ProgramFailed) for event in told)
         told.clear()
 
     program = compile_behaviour(endless(), [])
     assert runner.state == "ready"
     runner.start(program, [], run.session.address, paused=True)
-    come("paused")
+    come(ProgramPaused)
     for _ in range(2):
         runner.step()
-        come("paused")
+        come(ProgramPaused)
         assert runner.state == "paused"
     with pytest.raises(RunnerError, match="create a new one"):
         runner.start(program, [], run.session.address)
     runner.resume()
     assert runner.state == "running"
-    come("running")
+    come(ProgramRunning)
     runner.stop()
-    until(lambda: bool(told) and told[-1].kind == "ended")
-    assert (told[-1].is_ok, told[-1].text, runner.state) == (True, "", "ended")
+    until(lambda: bool(told) and isinstance(told[-1], ProgramEnded))
+    ended = told[-1]
+    assert isinstance(ended, ProgramEnded)
+    assert (ended.is_ok, ended.text, runner.state) == (True, "", "ended")
     seen = len(told)
     runner.stop()  # already ended
     assert len(told) == seen
@@ -449,7 +460,7 @@ def test_late_events_of_an_earlier_run_are_ignored(run: Run) -> None:
     run.works("c")
     assert runs._runner is not None
     assert runs._runner.run != earlier.run
-    runs.on_runner_event(RunnerEvent("running", earlier.run, ("other",)))
+    runs.on_runner_event(BlocksTraced(run=earlier.run, records=(BlockBegan(0.0, 9, "other"),)))
     assert runs.running_blocks != ("other",)
     runs.stop()
     tick_until(run.session, lambda: runs.view().state == "ready")

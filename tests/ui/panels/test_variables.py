@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.blocks.model.program import Variable
+from app.blocks.runtime.events import VariablesChanged
 from app.blocks.runtime.variables import VariableValue, display_value
-from app.core.run.runner import RunnerEvent
 from app.ui.panels.variables import PANEL, VariablesPanel, rows_of, value_cell
 from app.ui.widgets.table.model import Order
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
@@ -52,7 +52,7 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
     run = window.session.runs._runner
     assert run is not None
     told = tuple(display_value(id, value) for id, value in values.items())
-    window.session.runs.on_runner_event(RunnerEvent("variables", run.run, values=told))
+    window.session.runs.on_runner_event(VariablesChanged(run=run.run, values=told))
     ticks(window, panel, 1)
 
 

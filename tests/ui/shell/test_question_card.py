@@ -9,8 +9,9 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from app.blocks.runtime.events import QuestionChanged
 from app.core.run.asking import AskedQuestion, OpenQuestion
-from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.runner import Runner
 from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.dialogs.overlay import stop_buttons_in
 from app.ui.shell.main_window import MainWindow
@@ -114,13 +115,13 @@ class Answered:
 
 def test_only_the_current_question_can_be_answered_and_only_once() -> None:
     asking, runner = OpenQuestion(), Answered(4)
-    asking.on_event(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
+    asking.on_event(QuestionChanged(run=4, text="Nobody runs yet", question=9))
     assert asking.question is None
     asking.reset(cast("Runner", runner))
-    asking.on_event(RunnerEvent("ask", 4, text="Name?", question=1))
+    asking.on_event(QuestionChanged(run=4, text="Name?", question=1))
     shown = asking.question
     assert shown is not None
-    asking.on_event(RunnerEvent("ask", 4, text="Age?", question=2))
+    asking.on_event(QuestionChanged(run=4, text="Age?", question=2))
     asking.answer(shown, "late")
     assert runner.got == []
     newest = asking.question
@@ -128,9 +129,9 @@ def test_only_the_current_question_can_be_answered_and_only_once() -> None:
     asking.answer(newest, "7")
     asking.answer(newest, "8")
     assert (runner.got, asking.question) == ([(2, "7")], None)
-    asking.on_event(RunnerEvent("ask", 4, question=0))
+    asking.on_event(QuestionChanged(run=4, question=0))
     assert asking.question is None
-    asking.on_event(RunnerEvent("ask", 4, text="Name?", question=3))
+    asking.on_event(QuestionChanged(run=4, text="Name?", question=3))
     asking.clear()
     assert asking.question is None
 

@@ -9,6 +9,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, cast
 
+from msgspec import to_builtins
 from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -199,7 +200,7 @@ class BehaviourPanel(PanelWidget):
         if self._has_changed("values", (runs.values_revision, is_shown_run, self._watched_variable_ids)):
             values = runs.values if is_shown_run else {}
             editor.set_variable_values(
-                {id: values[id].to_json() for id in self._watched_variable_ids if id in values}
+                {id: to_builtins(values[id]) for id in self._watched_variable_ids if id in values}
             )
         if self._ticks % LIVE_UPDATE_TICKS == 0:
             self._show_live_values()

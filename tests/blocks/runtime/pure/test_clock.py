@@ -7,6 +7,7 @@ import pytest
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.pure import clock
 from app.blocks.runtime.scheduler import Scheduler
+from app.clock import VirtualClock
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, started, text, workspace, write
 
@@ -79,14 +80,14 @@ def test_timer_counts_and_resets():
 
 
 def test_script_clock_stops_while_paused():
-    time_s = [10.0]
-    scheduler = Scheduler(lambda: time_s[0])
+    clock = VirtualClock(advances_alone=False)
+    scheduler = Scheduler(clock)
     began = scheduler.running_time_s()
-    time_s[0] += 2
+    clock.advance(2)
     scheduler.pause()
     scheduler.pause()
-    time_s[0] += 100
+    clock.advance(100)
     assert scheduler.running_time_s() - began == 2
     scheduler.resume()
-    time_s[0] += 1
+    clock.advance(1)
     assert scheduler.running_time_s() - began == 3

@@ -10,12 +10,12 @@ from typing import Any, cast
 import orjson
 
 from app.blocks.model.program import Program
+from app.blocks.runtime.events import ProgramEnded, RunnerEvent
 from app.core.network.source import GraphReceived, MasterFound
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import SavedMessage
 from app.core.run.requests import RequestedRun
-from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.errors import AppError
@@ -105,7 +105,7 @@ class SimulatedRunner:
         if self.node is not None:
             self._alive.close()
             self.node.close()
-            self._post(RunnerEvent("ended", self.run))
+            self._post(ProgramEnded(run=self.run))
 
     def set_robots(self, *_given: object) -> None:
         pass
