@@ -37,6 +37,7 @@ from app.core.parts.programs import (
     CurrentRun,
     OpenBehaviourTabs,
     RepeatedStops,
+    SpareProgram,
     StartedPrograms,
     alert_launch_failure,
 )
@@ -58,8 +59,10 @@ from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, S
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.robots.voices import RobotVoices
 from app.core.run.acting.acting import SessionActing
+from app.core.run.child_process import ChildProcess, child_command, source_root
 from app.core.run.control import Runs
-from app.core.run.runner import RunnerEvent
+from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.spare_child import SpareChild
 from app.core.storage.settings import Settings
 from app.core.world.live import LOG_TOPICS, LiveWorld
 from app.core.world.part import Resource, SessionPart
@@ -145,9 +148,12 @@ class Session:
         warn = partial(self.console.add, "warn", "studio")
         self.tabs = SavedTabs(self.settings, self.documents, warn)
         self.files = ProjectFiles(self.documents, self.tabs, self.settings, warn)
+        source = source_root()
+        self._spare_child = SpareChild(lambda: ChildProcess(child_command(), source), source)
         self.runs = Runs(
             self.documents, self.fleet, self, alerts=self.alerts, console=self.console,
             post_event=self._mailbox.post_event, clock=self._clock,
+            create_runner=partial(Runner, spare=self._spare_child),
         )  # fmt: skip
 
     @cached_property
@@ -174,6 +180,7 @@ class Session:
             OpenBehaviourTabs(live, fleet, documents, self.tabs),
             self.alarms,
             self.acting,
+            SpareProgram(self._spare_child, documents, self._clock, is_enabled=self._start_processes),
             CurrentRun(self.runs, self.recordings.events.update_run),
             RepeatedStops(self.runs, fleet),
             HealthChecks(

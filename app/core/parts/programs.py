@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from app.core.alerts.alerts import Alerts
@@ -14,11 +15,15 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import Launcher, LaunchFailed
 from app.core.run.control import Runs
+from app.core.run.spare_child import SpareChild
 from app.core.run.view import RunState
 from app.core.world.console import Console
 from app.core.world.live import LiveWorld
 from app.core.world.part import SessionPart
 from nep.i18n import _, lazy
+
+SPARE_CHILD_DELAY_S = 3.0
+"""Time in seconds from the start of Studio to that of the spare process."""
 
 
 class OpenBehaviourTabs(SessionPart):
@@ -49,6 +54,31 @@ class OpenBehaviourTabs(SessionPart):
         with log_errors("save the tabs"):
             self._tabs.save(has_ended_normally=True)
         self._documents.close_all()
+
+
+class SpareProgram(SessionPart):
+    """Spare process for the next run, while the current behaviour has blocks."""
+
+    task = lazy("prepare a run")
+
+    def __init__(
+        self, spare: SpareChild, projects: OpenProjects, clock: Callable[[], float], *, is_enabled: bool
+    ) -> None:
+        self._spare, self._projects, self._clock, self._is_enabled = spare, projects, clock, is_enabled
+        self._start_s = math.inf
+
+    def start(self) -> None:
+        """Delay the process, because it would slow down the start of Studio."""
+        self._start_s = self._clock() + SPARE_CHILD_DELAY_S
+
+    def check(self) -> None:
+        """Start a process if there is none."""
+        if self._is_enabled and self._clock() >= self._start_s and self._projects.current.has_blocks:
+            self._spare.prepare_in_background()
+
+    def close(self) -> None:
+        """End the process."""
+        self._spare.close()
 
 
 class CurrentRun(SessionPart):

@@ -34,6 +34,7 @@ from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
 from app.core.run.child_output import OutputReader, RateLimiter
 from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, source_root
 from app.core.run.child_process import child_command as child_command
+from app.core.run.spare_child import SpareChild
 from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
@@ -78,8 +79,9 @@ class Runner:
         command: Sequence[str] | None = None,
         max_bytes: int = MAX_MEMORY_BYTES,
         clock: Callable[[], float] = time.monotonic,
+        spare: SpareChild | None = None,
     ) -> None:
-        # `command` starts the child; the default is this Python or this frozen Studio.
+        # `command` starts the child; the default is this Python or this frozen Studio. A spare is used first.
         self.run = next(_run_numbers)
         self.program_key = uuid.uuid4().hex
         """Key of the program. A Stop that contains the key invalidates the program's commands; until then it
@@ -90,7 +92,7 @@ class Runner:
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
-        self._clock, self._max_bytes = clock, max_bytes
+        self._clock, self._max_bytes, self._spare = clock, max_bytes, spare
         self._child: ChildProcess | None = None
         self._threads: list[threading.Thread] = []
         self._error_lines: deque[str] = deque(maxlen=MAX_ERROR_LINES)
@@ -132,7 +134,10 @@ class Runner:
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
-        self._child = child = ChildProcess(self._command, source_root(), max_bytes=self._max_bytes)
+        child = self._spare.take() if self._spare is not None else None
+        if child is None:
+            child = ChildProcess(self._command, source_root(), max_bytes=self._max_bytes)
+        self._child = child
         self._start_s = self._clock()
         self.state = "paused" if paused else "running"
         encoded_program = program.to_json() | ({} if name is None else {"name": name})
