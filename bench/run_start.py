@@ -50,7 +50,7 @@ def main() -> None:
             cold_ms.append(start_ms(master.address, None))
             spare = SpareChild(lambda: ChildProcess(child_command(), source), source)
             spare.prepare()
-            time.sleep(IMPORT_S)
+            threading.Event().wait(IMPORT_S)
             warm_ms.append(start_ms(master.address, spare))
             spare.close()
     cold, warm = statistics.median(cold_ms), statistics.median(warm_ms)
