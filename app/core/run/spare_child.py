@@ -7,16 +7,9 @@ import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from app.core.run.child_process import ChildProcess
 from app.errors import RunnerError
-from nep.system.lazy_import import lazy_module
-
-if TYPE_CHECKING:
-    import psutil
-else:
-    psutil = lazy_module("psutil")
 
 EXIT_TIMEOUT_S = 2.0
 _CODE_FOLDERS = ("app/blocks", "app/robots", "nep")
@@ -32,17 +25,10 @@ class SpareChild:
     Args:
         create: Starts a child process; raises RunnerError if that fails.
         source: Folder that contains the packages, or None in a frozen build.
-        is_allowed: Returns True if a spare may be started now.
     """
 
-    def __init__(
-        self,
-        create: Callable[[], ChildProcess],
-        source: Path | None,
-        is_allowed: Callable[[], bool] | None = None,
-    ) -> None:
+    def __init__(self, create: Callable[[], ChildProcess], source: Path | None) -> None:
         self._create, self._source = create, source
-        self._is_allowed = is_allowed if is_allowed is not None else _is_on_mains
         self._lock = threading.Lock()
         self._child: ChildProcess | None = None
         self._version: _Version | None = None
@@ -55,9 +41,7 @@ class SpareChild:
         return None if child is None else child.popen.pid
 
     def prepare(self) -> None:
-        """Start a spare unless one waits already, the computer runs on battery, or `close` was called."""
-        if not self._is_allowed():
-            return
+        """Start a spare unless one waits already or `close` was called."""
         with self._lock:
             if self._is_closed or self._child is not None:
                 return
@@ -113,8 +97,3 @@ def _discard(child: ChildProcess) -> None:
     for stream in (child.popen.stdin, child.popen.stdout, child.popen.stderr):
         if stream is not None:
             stream.close()
-
-
-def _is_on_mains() -> bool:
-    battery = psutil.sensors_battery() if hasattr(psutil, "sensors_battery") else None
-    return battery is None or battery.power_plugged is not False

@@ -27,10 +27,8 @@ Make = Callable[..., SpareChild]
 def spare() -> Iterator[Make]:
     made: list[SpareChild] = []
 
-    def make(
-        command: tuple[str, ...] = IDLE, source: Path | None = None, *, allowed: bool = True
-    ) -> SpareChild:
-        made.append(SpareChild(lambda: ChildProcess(command, source_root()), source, lambda: allowed))
+    def make(command: tuple[str, ...] = IDLE, source: Path | None = None) -> SpareChild:
+        made.append(SpareChild(lambda: ChildProcess(command, source_root()), source))
         return made[-1]
 
     yield make
@@ -90,10 +88,7 @@ def test_spare_with_older_code_or_environment_is_killed(
         assert not psutil.pid_exists(pid)
 
 
-def test_no_spare_on_battery_or_after_close(spare: Make) -> None:
-    unplugged = spare(allowed=False)
-    unplugged.prepare()
-    assert unplugged.pid is None
+def test_no_spare_after_close(spare: Make) -> None:
     closed = spare()
     closed.prepare()
     pid = closed.pid
