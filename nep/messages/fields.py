@@ -1,4 +1,7 @@
-"""Field paths: `pose.x`, `joints[3]`, `["a key"].b`; `.` is the whole message."""
+"""Field paths: `pose.x`, `joints[3]`, `["a key"].b`; `.` is the whole message.
+
+`FieldPathError` is the error of every conversion that checks values: typed messages, ROS messages, and files.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.text import quotable
+from nep.text import escaped, quotable, shortened
 
 Path = tuple[str | int, ...]
 MISSING = object()
@@ -16,6 +19,62 @@ MISSING = object()
 _STEP_PATTERN = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _MAX_DEPTH = 40
 _PLAIN_NAME = re.compile(r"[^.\[\]\"\s]+")
+_MAX_NAME_LENGTH = 100
+"""Maximum length in characters of a name in an error message."""
+
+
+class FieldPathError(Exception):
+    """The value at a field path doesn't fit its type or its rules.
+
+    Whoever detects the error knows only the end of the path; enclosing values add their steps with `within`.
+
+    Args:
+        reason: Continuation of a sentence that begins with the path, such as "is missing".
+        path: Known end of the path: names and indexes, outermost first.
+
+    Attributes:
+        reason: Continuation of a sentence that begins with the path.
+    """
+
+    def __init__(self, reason: str, *path: str | int) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self._steps = list(reversed(path))
+
+    def within(self, step: str | int) -> FieldPathError:
+        """Add the name or index of the value that contains the path so far; return self."""
+        self._steps.append(step)
+        return self
+
+    @property
+    def steps(self) -> Path:
+        """Steps of the path, outermost first; empty for the whole value."""
+        return tuple(reversed(self._steps))
+
+    @property
+    def path(self) -> str:
+        """Path for messages, such as "pose.position.x" or "joints[3]"; "" for the whole value."""
+        return "".join(
+            f"[{step}]" if isinstance(step, int) else f".{escaped(shortened(step, _MAX_NAME_LENGTH))}"
+            for step in reversed(self._steps)
+        ).removeprefix(".")
+
+    @property
+    def message(self) -> str:
+        """Path and reason as a sentence."""
+        return f"{self.path or _('the value')} {self.reason}"
+
+
+def wrong_type_error(value: object, expected: str) -> FieldPathError:
+    """Return the error for a value of a wrong type.
+
+    Args:
+        value: Value that was found.
+        expected: Description of a right value, such as "a 'float'".
+    """
+    return FieldPathError(
+        _("is a '{kind}'; expected {wanted}").format(kind=type(value).__name__, wanted=expected)
+    )
 
 
 def parse_path(text: str) -> Path:

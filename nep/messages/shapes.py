@@ -12,6 +12,7 @@ from enum import Enum, Flag
 from typing import Any
 
 from nep.i18n import _, format_list
+from nep.messages.fields import FieldPathError, wrong_type_error
 from nep.text import escaped, shortened
 
 _MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
@@ -20,44 +21,14 @@ _MAX_TEXT_LENGTH = 100
 """Maximum length in characters of a key or value in an error message."""
 
 
-class ShapeMismatch(Exception):  # noqa: N818 - internal
-    """A value doesn't match its shape.
-
-    Attributes:
-        reason: Reason for the mismatch.
-        steps: Steps of the path to the value, innermost first.
-    """
-
-    def __init__(self, reason: str) -> None:
-        self.reason = reason
-        self.steps: list[str] = []
-        super().__init__(reason)
-
-    def prepend_field(self, name: object) -> ShapeMismatch:
-        """Add the field `name` of the enclosing value to the path; return self."""
-        self.steps.append(f".{escaped(shortened(str(name), _MAX_TEXT_LENGTH))}")
-        return self
-
-    @property
-    def path(self) -> str:
-        """Path of the value, such as "pose.position.x" or "joints[3]"; "" for the whole payload."""
-        return "".join(reversed(self.steps)).removeprefix(".")
-
-    @property
-    def message(self) -> str:
-        """Path and reason as a sentence."""
-        location = self.path or _("the value")
-        return f"{location} {self.reason}"
-
-
 class ValueShape:
     """Converter for the values of one type.
 
     Attributes:
         name: Name of the type in error messages.
-        read: Converts a JSON value to a Python value. Raises `ShapeMismatch`. Assigned after creation,
+        read: Converts a JSON value to a Python value. Raises `FieldPathError`. Assigned after creation,
             because a dataclass may have fields of its own type.
-        write: Converts a Python value to a JSON value. Raises `ShapeMismatch`. Assigned after creation.
+        write: Converts a Python value to a JSON value. Raises `FieldPathError`. Assigned after creation.
     """
 
     __slots__ = ("_describe", "json_types", "name", "read", "unchanged_type", "write")
@@ -85,16 +56,9 @@ class ValueShape:
         return _("a '{name}'").format(name=self.name) if self._describe is None else self._describe()
 
 
-def wrong_type_error(value: object, expected: str) -> ShapeMismatch:
-    """Return the error for a value of a wrong type; `expected` describes the right one."""
-    return ShapeMismatch(
-        _("is a '{kind}'; expected {wanted}").format(kind=type(value).__name__, wanted=expected)
-    )
-
-
-def missing_value_error(shape: ValueShape) -> ShapeMismatch:
+def missing_value_error(shape: ValueShape) -> FieldPathError:
     """Return the error for a missing value."""
-    return ShapeMismatch(_("is missing; expected {wanted}").format(wanted=shape.expected))
+    return FieldPathError(_("is missing; expected {wanted}").format(wanted=shape.expected))
 
 
 def short_repr(value: object) -> str:
@@ -129,7 +93,7 @@ def _float_shape() -> ValueShape:
             try:
                 return float(converted)
             except OverflowError:
-                raise ShapeMismatch(
+                raise FieldPathError(
                     _("is too large; expected {wanted}").format(wanted=shape.expected)
                 ) from None
         raise wrong_type_error(value, shape.expected)
@@ -151,7 +115,7 @@ def _int_shape() -> ValueShape:
         if not isinstance(converted, int) or isinstance(converted, bool):
             raise wrong_type_error(value, shape.expected)
         if not _MIN_INT <= converted <= _MAX_INT:
-            raise ShapeMismatch(
+            raise FieldPathError(
                 _("doesn't fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
             )
         return int(converted)
@@ -183,7 +147,7 @@ def _check_surrogates(value: str) -> None:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
-        raise ShapeMismatch(_("contains an unpaired surrogate; use valid Unicode text")) from None
+        raise FieldPathError(_("contains an unpaired surrogate; use valid Unicode text")) from None
 
 
 def _bool_shape() -> ValueShape:
@@ -237,7 +201,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
         try:
             return kind.fromisoformat(iso_text)
         except ValueError:
-            raise ShapeMismatch(
+            raise FieldPathError(
                 _("is {value}; expected a string such as {example}").format(
                     value=short_repr(value), example=_DATETIME_EXAMPLES[kind]
                 )
@@ -297,7 +261,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
         for literal in values:
             if _matches_literal(value, literal):
                 return literal
-        raise ShapeMismatch(
+        raise FieldPathError(
             _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=shape.expected)
         )
 
@@ -325,7 +289,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
         expected = (
             shape.expected if is_flag else format_list([repr(member.value) for member in members], "or")
         )
-        raise ShapeMismatch(
+        raise FieldPathError(
             _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=expected)
         )
 
@@ -363,7 +327,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
         for converter in converters:
             try:
                 return converter(value)
-            except ShapeMismatch as error:
+            except FieldPathError as error:
                 mismatch = error
         if mismatch is not None and mismatch.steps and len(others) == 1:
             raise mismatch  # has the path inside the member
@@ -383,9 +347,8 @@ def _convert_items(converter: Callable[[Any], Any], values: Iterable[Any], first
     try:
         for item in values:
             converted.append(converter(item))  # noqa: PERF401 - the length gives the index for the error
-    except ShapeMismatch as mismatch:
-        mismatch.steps.append(f"[{first + len(converted)}]")
-        raise
+    except FieldPathError as mismatch:
+        raise mismatch.within(first + len(converted)) from mismatch.__cause__
     return converted
 
 
@@ -430,7 +393,7 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
     def convert(value: object, converters: Sequence[Callable[[Any], Any]]) -> list[Any]:
         values = _as_items(value, shape.expected)
         if len(values) != len(converters):
-            raise ShapeMismatch(
+            raise FieldPathError(
                 _("has {count} values; expected {wanted}").format(count=len(values), wanted=shape.expected)
             )
         converted: list[Any] = []
@@ -455,8 +418,8 @@ def map_shape(item: ValueShape) -> ValueShape:
         for key, part in value.items():
             try:
                 converted[key_shape.write(key)] = converter(part)
-            except ShapeMismatch as mismatch:
-                raise mismatch.prepend_field(key) from mismatch.__cause__
+            except FieldPathError as mismatch:
+                raise mismatch.within(str(key)) from mismatch.__cause__
         return converted
 
     shape.read = lambda value: convert(value, item.read)

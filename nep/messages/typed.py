@@ -30,11 +30,11 @@ from typing import Any, NamedTuple
 from nep.errors import DecodeError, EncodeError, WrongTypeError, did_you_mean
 from nep.i18n import _
 from nep.messages.codecs import JSON, Codec, codec_for
+from nep.messages.fields import FieldPathError, wrong_type_error
 from nep.messages.message import UNDECODED, Message, MessageKind, new_message
 from nep.messages.shapes import (
     ANY_SHAPE,
     SCALAR_SHAPES,
-    ShapeMismatch,
     ValueShape,
     enum_shape,
     list_shape,
@@ -43,7 +43,6 @@ from nep.messages.shapes import (
     missing_value_error,
     tuple_shape,
     union_shape,
-    wrong_type_error,
 )
 from nep.system.arguments import check_type_name
 from nep.text import escaped, shortened
@@ -140,7 +139,7 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
         check(payload)
         try:
             return base.encode(write(payload))
-        except ShapeMismatch as mismatch:
+        except FieldPathError as mismatch:
             path, reason = mismatch.path, mismatch.message
         except RecursionError:
             path, reason = "", _("the value contains itself, or has too many levels")
@@ -185,7 +184,7 @@ class TypedReader:
             decoded = decode(data, extension)
             try:
                 return shape.read(decoded)
-            except ShapeMismatch as mismatch:
+            except FieldPathError as mismatch:
                 reason = mismatch.message
             except RecursionError:
                 reason = _("the value has too many levels")
@@ -324,7 +323,7 @@ class _FieldEntry(NamedTuple):
 
 
 def _read_fields(value: object, entries: Sequence[_FieldEntry], record_shape: ValueShape) -> dict[str, Any]:
-    # Raises `ShapeMismatch` for a missing required field.
+    # Raises `FieldPathError` for a missing required field.
     if not isinstance(value, Mapping):
         raise wrong_type_error(value, _("a map of the fields of '{name}'").format(name=record_shape.name))
     values: dict[str, Any] = {}
@@ -337,8 +336,8 @@ def _read_fields(value: object, entries: Sequence[_FieldEntry], record_shape: Va
                 values[name] = shape.read(value[other_name])
             elif is_required:
                 raise missing_value_error(shape)
-    except ShapeMismatch as mismatch:
-        raise mismatch.prepend_field(name) from mismatch.__cause__
+    except FieldPathError as mismatch:
+        raise mismatch.within(str(name)) from mismatch.__cause__
     return values
 
 
@@ -371,8 +370,8 @@ def _fill_dataclass(shape: ValueShape, declared: type, known_shapes: dict[object
         for name, field_shape in sent_fields:
             try:
                 values[name] = field_shape.write(getattr(value, name))
-            except ShapeMismatch as mismatch:
-                raise mismatch.prepend_field(name) from mismatch.__cause__
+            except FieldPathError as mismatch:
+                raise mismatch.within(str(name)) from mismatch.__cause__
         return values
 
     shape.read, shape.write = read, write
@@ -398,7 +397,7 @@ def _create_instance(declared: type, arguments: Mapping[str, object]) -> object:
     try:
         return declared(**arguments)
     except Exception as error:
-        raise ShapeMismatch(  # `__post_init__` may raise anything
+        raise FieldPathError(  # `__post_init__` may raise anything
             _("was rejected by '{name}': {error}").format(
                 name=declared.__name__, error=escaped(shortened(str(error), 2 * _MAX_NAME_LENGTH))
             )
@@ -424,7 +423,7 @@ def _fill_map(shape: ValueShape, declared: type, known_shapes: dict[object, Valu
         try:
             for name, part in value.items():
                 if name not in shapes:
-                    raise ShapeMismatch(
+                    raise FieldPathError(
                         _("isn't a field of '{name}'; {did_you_mean}").format(
                             name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
                         )
@@ -433,8 +432,8 @@ def _fill_map(shape: ValueShape, declared: type, known_shapes: dict[object, Valu
             for name, (field_shape, is_required) in shapes.items():
                 if is_required and name not in values:
                     raise missing_value_error(field_shape)
-        except ShapeMismatch as mismatch:
-            raise mismatch.prepend_field(name) from mismatch.__cause__
+        except FieldPathError as mismatch:
+            raise mismatch.within(str(name)) from mismatch.__cause__
         return values
 
     shape.read = lambda value: _read_fields(value, entries, shape)

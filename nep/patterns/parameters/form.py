@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from nep.i18n import _
 from nep.messages.codecs import find_nan
+from nep.messages.fields import FieldPathError
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from nep.messages import shapes, typed
 else:
-    shapes, typed = lazy_module("nep.messages.shapes"), lazy_module("nep.messages.typed")
+    typed = lazy_module("nep.messages.typed")
 
 
 class ParameterForm:
@@ -42,7 +43,7 @@ class ParameterForm:
             if not issubclass(self._kind, dict) and isinstance(value, self._kind):
                 value = self._shape.write(value)
             plain_value = self._shape.write(self._shape.read(value))
-        except shapes.ShapeMismatch as mismatch:
+        except FieldPathError as mismatch:
             raise ValueError(mismatch.message) from mismatch
         except RecursionError:
             raise ValueError(_("the value has too many levels")) from None

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 from nep.errors import DecodeError, WrongTypeError
 from nep.i18n import _
 from nep.messages.codecs import Codec
+from nep.messages.fields import FieldPathError
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
-    from nep.messages import shapes, typed
+    from nep.messages import typed
 else:
-    shapes, typed = lazy_module("nep.messages.shapes"), lazy_module("nep.messages.typed")
+    typed = lazy_module("nep.messages.typed")
 
 
 _MAX_SHOWN_LENGTH = 60
@@ -59,7 +60,7 @@ class PayloadType:
             return payload
         try:
             return self._declared.shape.read(payload)
-        except shapes.ShapeMismatch as mismatch:
+        except FieldPathError as mismatch:
             reason = mismatch.message
         except RecursionError:
             reason = _("the value has too many levels")
