@@ -70,7 +70,7 @@ def test_example_file_is_valid() -> None:
             {"when": {"topic": "/t", "is": "bellow", "than": 1}},
             "unknown condition 'bellow'; did you mean 'below'",
         ),
-        ({"when": {"topic": "/t"}}, "'when': the condition is missing"),
+        ({"when": {"topic": "/t"}}, "alarms[2].when: the condition is missing"),
         ({"when": {"is": "silent"}}, "the topic name is missing"),
         ({"when": {"node": "n", "is": "silent"}}, "'silent' needs a topic"),
         ({"when": {"topic": "/t", "is": "below", "value": "x"}}, 'write "than"'),
@@ -80,7 +80,7 @@ def test_example_file_is_valid() -> None:
             "'x[' isn't a valid field path; use a path such as 'pose.x' or 'joints[3]'",
         ),
         ({"when": {"topic": "/t", "is": "above", "value": "", "than": 1}}, "needs a name"),
-        ({"when": {"topic": "/a b", "is": "silent"}}, "'topic'"),
+        ({"when": {"topic": "/a b", "is": "silent"}}, "alarms[2].when.topic: "),
         ({"when": {"topic": "/*/b", "is": "silent"}}, "wildcards"),
         ({"when": {"topic": "/t", "is": "silent", "for_s": 0}}, "0.1 to 86400"),
         ({"when": {"topic": "/t", "is": "silent", "for_s": -1}}, "0.1 to 86400"),
@@ -89,10 +89,15 @@ def test_example_file_is_valid() -> None:
         ({"when": {"topic": "/t", "is": "rate_below", "than": 0}}, "0.001 to 1e+06"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["baner"]}, "did you mean 'banner'"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": [{"cal": "x"}]}, "an action must be"),
-        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "the name is missing"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"call": ""}]}, "do[1].call: the name is missing"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop", {"run": 1}]}, "do[2].run: must be"),
+        ({"when": {"topic": "/t", "is": "silent"}, "do": [{"keep_s": 1, "run": "x"}]}, "do[1].run: unknown"),
+        ({"when": {"topic": "/t", "is": "silent", "margin": "1"}}, "when.margin: must be a number"),
+        ({"when": {"topic": "/t", "is": "silent"}, "on": 1}, "alarms[2].on: must be true or false"),
+        ({"when": {"topic": "/t", "is": "silent"}, "id": "x" * 65}, "id: must be a string of at most 64"),
         ({"when": {"topic": "/t", "is": "silent"}, "do": ["stop"] * 11}, "at most 10 actions"),
         ({"when": {"topic": "/t", "is": "silent"}, "calm_s": 0}, "0.5 to 3600"),
-        ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "unknown key 'onn'; did you mean 'on'"),
+        ({"when": {"topic": "/t", "is": "silent"}, "onn": True}, "[2].onn: unknown key; did you mean 'on'"),
         ([], ": not an alarm;"),
     ],
 )  # fmt: skip
@@ -117,9 +122,9 @@ def test_invalid_alarm_is_rejected_with_its_line(alarm: object, said: str) -> No
         ('{"alarms": [\n{"when": }]}', "'f.json' isn't valid JSON: line 2, column 9"),
         ("[]", ": not an alarm file;"),
         ('{"format": 2, "alarms": []}', "newer version"),
-        ('{"format": true, "alarms": []}', "'format': must be 1"),
-        ('{"alarm": []}', "unknown key 'alarm'; did you mean 'alarms'"),
-        ('{"format": 1}', "'alarms': the list of alarms is missing"),
+        ('{"format": true, "alarms": []}', "line 1 of 'f.json', format: must be 1"),
+        ('{"alarm": []}', "alarm: unknown key; did you mean 'alarms'"),
+        ('{"format": 1}', "alarms: the list of alarms is missing"),
         ('{"alarms": [' + "1" * 5000 + "]}", ""),
         ("[" * 100_000, ""),
         (json.dumps({"alarms": [{}] * 201}), "more than 200"),
@@ -145,7 +150,7 @@ def test_non_utf_8_missing_and_oversized_files_are_rejected(tmp_path) -> None:
 
 def test_duplicate_alarm_id_is_rejected() -> None:
     alarm = {"id": "a", "when": {"topic": "/t", "is": "silent"}}
-    with pytest.raises(NepError, match="'id': another alarm"):
+    with pytest.raises(NepError, match=r"line 12 of .*, alarms\[2\]\.id: another alarm"):
         read(of(alarm, alarm))
 
 

@@ -95,7 +95,7 @@ def test_example_file_is_valid(monkeypatch):
         ('[a]\nbackend = "zeromk"\n', "line 2 of 'lab.toml', a.backend: unknown back end 'zeromk'; did you"),
         ("a = 7\n", "line 1 of 'lab.toml', a: the side 'a' is missing"),
         ('[a]\nbackend = "zeromq"\nmaster = "a b"\n', "line 3 of 'lab.toml', a.master: 'a b:7780' isn't"),
-        ('a.backend = "zeromq"\na.master = "²:²"\n', "line 1 of 'lab.toml', a.master: '²:²' isn't a val"),
+        ('a.backend = "zeromq"\na.master = "²:²"\n', "line 2 of 'lab.toml', a.master: '²:²' isn't a val"),
         ('[a]\nbackend = "zeromq"\n[b]\nbackend = "zmq"\n' + ONE, "line 3 of 'lab.toml', b: both sides are"),
         (SIDES, "'lab.toml', topics: no topics are listed; write [[topics]] and a = \"/a/topic\" below it"),
         (SIDES + "[topics]\na = 1\n", "line 5 of 'lab.toml', topics: no topics are listed; write [["),
