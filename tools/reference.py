@@ -93,8 +93,8 @@ All other classes are instantiated by nep, except for the message types.
 INTERNAL = frozenset({
     "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.store_messages", "Client.join",
     "Master.epoch", "Master.submit", "Message.decoded", "Message.kind", "Message.raw",
-    "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
-    "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
+    "Message.payload_or_extension", "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map",
+    "NodeParameter.form", "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
     "Server.run_one", "Server.spin_queue", "Subscriber.decoded", "Subscriber.is_typed",
     "Subscriber.decoded_unshared", "Subscriber.take", "Subscriber.typed",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.claim_tick",

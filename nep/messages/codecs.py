@@ -14,6 +14,9 @@ value must not stop its robot's program or its readers. The original NEP raised 
 and dataclasses as JSON does; readers in other languages may require text or number keys. Lists and maps have
 at most 64 levels in both (`nep.messages.nesting`). Any other message type ("robot/description",
 "sensor_msgs/Image") is encoded as json.
+
+A module adds a codec with `register`. What other parts of nep need to know about a codec are attributes of
+`Codec`: how ROS messages carry it, how it is recorded, and what its payloads are.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from datetime import date, datetime, time, timezone
 from enum import Enum
 from time import monotonic
-from typing import Any
+from typing import Any, Literal
 from uuid import UUID
 
 import msgpack  # type: ignore[import-untyped]
@@ -45,14 +48,26 @@ __all__ = [
     "CODECS",
     "NULL",
     "Codec",
+    "Content",
     "Encoded",
     "JsonEncoder",
+    "RecordedForm",
+    "RosCarrier",
     "codec",
     "codec_by_number",
     "codec_for",
+    "content_of",
     "find_nan",
     "numpy_option",
+    "register",
 ]
+
+Content = Literal["values", "text", "bytes", "image"]
+"""Kind of a codec's payloads: values such as maps and numbers, text, bytes, or images (`image_codec`)."""
+RosCarrier = Literal["text", "bytes", "image"]
+"""ROS message that contains the data of a codec, see `nep.backends.ros_types.carriers`."""
+RecordedForm = Literal["json", "msgpack", "text", "image", "wrapped"]
+"""Form of a codec's data in recordings, see `nep.recordings.formats.channels`."""
 
 _BYTES_TYPES = (bytes, bytearray, memoryview)
 _NUMPY_OPTION = orjson.OPT_SERIALIZE_NUMPY
@@ -85,6 +100,11 @@ class Codec:
         is_small: True if messages are usually small, such as commands, replies and states.
         queue_length: Maximum number of messages in the queue of a connection, for codecs of large messages;
             None for the back end's default.
+        content: Kind of the payloads. An image has the data and extension of `image_codec`.
+        ros_carrier: ROS message that contains the data. `"text"` requires UTF-8 without zero bytes, and
+            `"image"` a JPEG or PNG file. None for codecs of back ends, whose data is a ROS message.
+        recorded_as: Form of the data in recordings: as is (JSON, msgpack), or in a message of Protocol
+            Buffers that viewers show as text, as an image, or only as bytes ("wrapped").
     """
 
     name: str
@@ -95,6 +115,9 @@ class Codec:
     check: Callable[[object], object]
     is_small: bool = False
     queue_length: int | None = None
+    content: Content = "values"
+    ros_carrier: RosCarrier | None = "bytes"
+    recorded_as: RecordedForm = "wrapped"
 
 
 def _plain_value(value: object) -> object:
@@ -257,27 +280,46 @@ def _empty_image() -> object:
     return None
 
 
-JSON = Codec("json", 1, _encode_json, _decode_json, dict, _accept_any, is_small=True)
+_codecs: dict[str, Codec] = {}
+_codecs_by_number: dict[int, Codec] = {}
+_aliases: dict[str, Codec] = {}
+CODECS: Mapping[str, Codec] = _codecs
+"""Registered codecs by name."""
 
 
-STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string, is_small=True)
+def register(codec: Codec, *aliases: str) -> Codec:
+    """Add a codec for the message types with its name or an alias; return it.
+
+    Raises `ValueError` if a name or the number is taken. All programs of a network must register the codec.
+    """
+    names = (codec.name, *aliases)
+    if codec.number in _codecs_by_number or any(name in _codecs or name in _aliases for name in names):
+        raise ValueError(f"the codec '{codec.name}' ({codec.number}) has the name or number of another one")
+    _codecs[codec.name] = _codecs_by_number[codec.number] = codec
+    _aliases.update(dict.fromkeys(aliases, codec))
+    return codec
 
 
-BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes, queue_length=1000)
-
-
-MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any, is_small=True)
-
-
-IMAGE = Codec(
-    "image", 5, image_codec.encode, _decode_image, _empty_image, image_codec.check_image, queue_length=64
+# The aliases are names of the original NEP.
+JSON = register(
+    Codec("json", 1, _encode_json, _decode_json, dict, _accept_any, is_small=True, ros_carrier="text",
+          recorded_as="json"), "dictionary", "dict"
+)  # fmt: skip
+STRING = register(
+    Codec("string", 2, _encode_string, _decode_string, str, _check_string, is_small=True, content="text",
+          ros_carrier="text", recorded_as="text")
+)  # fmt: skip
+BYTES = register(
+    Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes, queue_length=1000, content="bytes")
 )
-
-
-CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
-
-
-_CODECS_BY_NUMBER = {each.number: each for each in CODECS.values()}
+MSGPACK = register(
+    Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any, is_small=True,
+          recorded_as="msgpack")
+)  # fmt: skip
+IMAGE = register(
+    Codec("image", 5, image_codec.encode, _decode_image, _empty_image, image_codec.check_image,
+          queue_length=64, content="image", ros_carrier="image", recorded_as="image"), "images"
+)  # fmt: skip
 
 
 _FAST_ENCODERS: Mapping[Callable[[object], Encoded], Callable[[Any], bytes]] = {
@@ -285,10 +327,6 @@ _FAST_ENCODERS: Mapping[Callable[[object], Encoded], Callable[[Any], bytes]] = {
     _encode_string: str.encode,
     _encode_bytes: _encode_bytes_fast,
 }
-
-
-# names of the original NEP
-_ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
 
 
 def codec(name: str) -> Codec:
@@ -303,7 +341,7 @@ def codec(name: str) -> Codec:
 
 def codec_by_number(number: int) -> Codec | None:
     """Return the codec with the number `number` on the wire, or None if this version of nep has none."""
-    return _CODECS_BY_NUMBER.get(number)
+    return _codecs_by_number.get(number)
 
 
 def fast_encoder(codec: Codec) -> Callable[[Any], bytes] | None:
@@ -317,7 +355,13 @@ def fast_encoder(codec: Codec) -> Callable[[Any], bytes] | None:
 
 def codec_for(msg_type: str) -> Codec:
     """Return the codec of a message type: the codec with this name or alias, else json."""
-    return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)
+    return _codecs.get(msg_type) or _aliases.get(msg_type, JSON)
+
+
+def content_of(name: str) -> Content:
+    """Return the kind of payloads of the codec called `name`; "values" for the codecs of back ends."""
+    codec = _codecs.get(name)
+    return "values" if codec is None else codec.content
 
 
 # ---- NaN and infinity, which JSON lacks

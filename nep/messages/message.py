@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from nep.messages.clocks import UNKNOWN_CLOCK, PublisherClock
-from nep.messages.codecs import CODECS
+from nep.messages.codecs import CODECS, content_of
 from nep.messages.codecs import codec as codec_named
 
 NO_EXTENSION: Mapping[str, object] = MappingProxyType({})
@@ -137,6 +137,14 @@ class Message:
         if payload is UNDECODED:
             payload = self.decoded = self.kind.decode(self.raw, self.extension)
         return payload
+
+    @property
+    def payload_or_extension(self) -> object:
+        """Payload for filters and tables; of an image the extension, because pixels have no fields.
+
+        Raises `DecodeError` if the message is malformed.
+        """
+        return dict(self.extension) if content_of(self.kind.codec) == "image" else self.payload
 
     @property
     def latency_s(self) -> float | None:

@@ -18,6 +18,7 @@ from typing import Any
 
 from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
+from nep.messages.codecs import CODECS, content_of
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
 from nep.recordings.film import Container, VideoFile, available_container, decode_frame
@@ -146,9 +147,10 @@ def can_export(kind: str, codec: str) -> bool:
         kind: One of `FORMATS`.
         codec: Name of the codec.
     """
+    content = content_of(codec) if codec in CODECS else ""
     if kind in {"pictures", "mp4"}:
-        return codec == "image"
-    return kind == "mcap" or codec in {"json", "msgpack", "string"}
+        return content == "image"
+    return kind == "mcap" or content in {"values", "text"}
 
 
 def _exportable_topics(

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from nep.errors import NepError
+from nep.messages.codecs import CODECS
 from nep.messages.message import Message
 
-CHECKED_CODECS = frozenset({"json", "string", "msgpack"})
 LARGE_BYTES = 300_000
 MAX_CPU_SHARE = 0.07
 MAX_BUDGET_S = 1.0
@@ -66,7 +66,8 @@ class DecodeChecker:
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
         """Check messages of one topic, oldest first. Images and bytes are skipped."""
-        if not messages or messages[-1].codec not in CHECKED_CODECS:
+        codec = CODECS.get(messages[-1].codec) if messages else None
+        if codec is None or codec.content not in {"values", "text"}:
             return
         result = CheckResult()
         self._refill_budget()

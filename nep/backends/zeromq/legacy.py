@@ -27,7 +27,7 @@ from nep.backends.zeromq.sockets import Socket, bind, connect, receive_high_wate
 from nep.backends.zeromq.subscriber import SocketSubscriber, UnbatchedReader
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
-from nep.messages.codecs import codec_for
+from nep.messages.codecs import codec_for, content_of
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.waits import wait_until
@@ -67,7 +67,7 @@ def to_frame(topic: str, generation: str, msg_type: str, codec: str, data: bytes
         codec: Name of the codec of `data`.
         data: Encoded payload.
     """
-    body = base64.b64encode(data) if codec == "image" else bytes(data)
+    body = base64.b64encode(data) if content_of(codec) == "image" else bytes(data)
     return topic.encode() + b" " + body if has_prefix(generation, msg_type) else body
 
 
@@ -78,15 +78,16 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
     that is not valid base64.
     """
     prefix = topic.encode() + b" "
-    if msg_type in _UNPREFIXED_TYPES and codec != "image":
+    is_image = content_of(codec) == "image"
+    if msg_type in _UNPREFIXED_TYPES and not is_image:
         return frame
     if frame.startswith(prefix):
         frame = frame[len(prefix) :]
     elif (codec == "json" and frame[:1] and frame[0] not in _JSON_FIRST_BYTES) or (
-        codec == "image" and b" " in frame[:300]
+        is_image and b" " in frame[:300]
     ):
         return None
-    if codec != "image":
+    if not is_image:
         return frame
     try:
         return base64.b64decode(frame, validate=True)

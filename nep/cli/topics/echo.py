@@ -227,7 +227,7 @@ def _receive_all(
 
 def _matches(condition: MessageFilter, message: Message) -> bool:
     try:
-        return condition.matches(dict(message.extension) if message.codec == "image" else message.payload)
+        return condition.matches(message.payload_or_extension)
     except DecodeError:
         return False
 
@@ -255,11 +255,9 @@ def show_record(message: Message, fields: FieldExtractor | None = None) -> None:
         if values is None:
             return
         record["fields"] = fields.as_dict(values)
-    elif message.codec == "image":
-        record["payload"] = dict(message.extension)
     else:
         try:
-            record["payload"] = message.payload
+            record["payload"] = message.payload_or_extension
         except DecodeError as error:
             record["error"] = str(error)
             record["bytes"] = bytes(message.data).hex()

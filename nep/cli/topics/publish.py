@@ -23,7 +23,7 @@ from nep.cli.options import MasterOption
 from nep.cli.screen import format_size, print_status
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
-from nep.messages.codecs import CODECS, codec_for
+from nep.messages.codecs import CODECS, JSON, codec_for
 from nep.messages.encoded import Encoded
 from nep.nodes.arguments import check_type_name
 from nep.nodes.publisher import Publisher
@@ -34,8 +34,6 @@ _MAX_FILE_BYTES = 10**9
 """Size limit of input files, far above any message; reading a device such as /dev/zero would never end."""
 _MAX_CATCH_UP_S = 0.01
 _WAIT_SLICE_S = 0.02
-_TEXT_TYPES = frozenset({"string"})
-_BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
 
 _PayloadArgument = Annotated[
@@ -163,11 +161,7 @@ def _warn_about_type(topic: str, kind: str, topic_info: TopicInfo | None) -> Non
                 topic=topic, msg_type=topic_info.msg_type, kind=kind
             )
         )
-    elif (
-        codec_for(kind).name == "json"
-        and (matches := get_close_matches(kind, CODECS, n=1))
-        and matches[0] != kind
-    ):
+    elif codec_for(kind) is JSON and (matches := get_close_matches(kind, CODECS, n=1)) and matches[0] != kind:
         print_status(
             _("the type '{kind}' is sent as JSON; did you mean '{near}'?").format(kind=kind, near=matches[0])
         )
@@ -199,19 +193,20 @@ def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
         NepError: The text can't be parsed, or the file can't be read.
     """
     file: str | None = None
+    codec = codec_for(msg_type)
+    content = codec.content
     if text.startswith("@"):
         data = read_file(Path(text[1:]), msg_type)
-        if msg_type in _BYTE_TYPES:
+        if content in {"bytes", "image"}:
             return data
         file, text = text[1:], decode_text(data, text[1:])
-    if msg_type in _TEXT_TYPES:
+    if content == "text":
         return text
-    if msg_type == "bytes":
+    if content == "bytes":
         return _encode_argument(text)
-    if msg_type in _BYTE_TYPES:
+    if content == "image":
         raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @image.jpg"))
-    allow_nan = codec_for(msg_type).name == "msgpack"
-    return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, suggest_types=True)
+    return parse_json(text, file=file, first_line=first_line, allow_nan=codec is not JSON, suggest_types=True)
 
 
 def _encode_argument(text: str) -> bytes:
@@ -260,7 +255,7 @@ def read_file(file: Path, msg_type: str) -> bytes:
 def _publish_lines(publisher: Publisher, msg_type: str) -> None:
     for number, line in enumerate(_stdin_lines(), 1):
         data = line.rstrip(b"\r\n")
-        if msg_type == "bytes":
+        if codec_for(msg_type).content == "bytes":
             publisher.publish(data)
             continue
         try:

@@ -46,7 +46,7 @@ class FieldExtractor:
         Returns None if the message can't be decoded.
         """
         try:
-            payload = dict(message.extension) if message.codec == "image" else message.payload
+            payload = message.payload_or_extension
         except DecodeError:
             self.undecodable_count += 1
             return None

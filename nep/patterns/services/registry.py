@@ -253,7 +253,7 @@ class ServiceRegistry:
 
 def check_call_codec(codec: Codec) -> Codec:
     """Return `codec` if services support it; raise `NepError` otherwise."""
-    if codec.name == "image":
+    if codec.content == "image":
         raise NepError(_("a call can't contain an image; publish it on a topic"))
     if codec_by_number(codec.number) is not codec:  # a back end's codec without a number
         raise NepError(

@@ -377,7 +377,7 @@ def _decode_payloads(messages: Sequence[Message]) -> tuple[list[object], bool, i
             skipped_count += 1
             continue
         try:
-            payloads.append(dict(message.extension) if message.codec == "image" else message.payload)
+            payloads.append(message.payload_or_extension)
             is_undecodable = False
         except DecodeError:
             is_undecodable = True

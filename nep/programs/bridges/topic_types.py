@@ -6,14 +6,12 @@ from collections.abc import Callable, Collection
 
 from nep.backends.base import Backend
 from nep.errors import NepError
-from nep.messages.codecs import CODECS, Codec, JsonEncoder, codec_for
+from nep.messages.codecs import CODECS, JSON, Codec, JsonEncoder, codec_for, content_of
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, TopicInfo
 
 _DEFAULT_TYPE = "json"
-_CODECS_WITHOUT_FIELDS = frozenset({"string", "bytes", "image"})
-"""Codecs whose payloads have no fields, so that a back end's own types can't represent them."""
 _UNKNOWN_TYPES = frozenset({"", "*"})
 
 
@@ -24,7 +22,7 @@ class TopicFormat:
         self.msg_type = msg_type
         self.codec = codec
         self.encode: Callable[[object], Encoded] = codec.encode
-        if codec is CODECS["json"]:
+        if codec is JSON:
             self.encode = JsonEncoder(topic).encode
 
     def matches(self, message: Message) -> bool:
@@ -89,8 +87,8 @@ def type_for(
     codec = _codec_name(backend, topic_info.msg_type)
     if node_ids <= set(own_nodes) or not codec:
         return own_type
-    if codec not in CODECS:
-        return own_type if message.codec in _CODECS_WITHOUT_FIELDS else topic_info.msg_type
+    if codec not in CODECS:  # a type of the back end has fields
+        return topic_info.msg_type if content_of(message.codec) == "values" else own_type
     is_published = any(each.node_id not in own_nodes for each in topic_info.publishers)
     has_same_codec = is_published and codec == _codec_name(backend, own_type)
     return topic_info.msg_type if has_same_codec else own_type

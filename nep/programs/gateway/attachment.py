@@ -14,6 +14,7 @@ from nep.errors import BadTopicError, ClosedError, DecodeError, EncodeError, Nep
 from nep.i18n import _, ngettext
 from nep.masters.master import Master
 from nep.messages import image_codec
+from nep.messages.codecs import content_of
 from nep.messages.image_files import parse_header
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -147,7 +148,7 @@ class NativeNetwork:
                 return
             self._publishers[topic, codec] = publisher
             self._own_publisher_ids |= {publisher.id}
-        publisher.publish_bytes(data, image_codec.image_info(data) if codec == "image" else None)
+        publisher.publish_bytes(data, image_codec.image_info(data) if content_of(codec) == "image" else None)
 
     def stop_publishing(self, topic: str, codec: str) -> None:
         """Close the publisher of a topic."""
@@ -177,7 +178,7 @@ class NativeNetwork:
         Images are encoded as JPEG or PNG. Returns None for an image for which that is impossible, and
         reports an alert.
         """
-        if message.codec != "image":
+        if content_of(message.codec) != "image":
             return message.data
         try:
             if image_codec.raw_layout(message.extension.get("encoding")) is None:

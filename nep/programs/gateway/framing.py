@@ -17,6 +17,7 @@ from typing import Literal
 
 from nep.backends.zeromq.legacy import has_prefix
 from nep.i18n import _
+from nep.messages.codecs import content_of
 
 Framing = Literal["prefixed", "bare"]
 
@@ -25,22 +26,8 @@ PORT_A = 7000
 PORT_B = 50000
 """Port to which programs since 0.5.4.6 send requests."""
 
-_CODECS = {
-    "json": "json",
-    "dictionary": "json",
-    "string": "string",
-    "bytes": "bytes",
-    "msgpack": "msgpack",
-    "image": "image",
-    "images": "image",
-}
 _NON_FINITE = re.compile(rb"\b(?:NaN|Infinity)\b")
 _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
-
-
-def codec_of(msg_type: str) -> str:
-    """Return the native codec for a message type of the original NEP; "json" for unknown types."""
-    return _CODECS.get(msg_type, "json")
 
 
 def framing_of(port: int, msg_type: str) -> Framing:
@@ -91,7 +78,7 @@ class FrameFormat:
         Raises `FrameError` if the frame is invalid or of another version's format.
         """
         data = self._strip_prefix(frame)
-        if self.codec == "image":
+        if content_of(self.codec) == "image":
             return _decode_base64(data)
         if self.codec == "json" and _NON_FINITE.search(data):
             return _replace_nan(data)
@@ -99,7 +86,7 @@ class FrameFormat:
 
     def encode_frame(self, data: bytes | memoryview) -> bytes:
         """Convert data of the native codec to a frame."""
-        body = base64.b64encode(data) if self.codec == "image" else data
+        body = base64.b64encode(data) if content_of(self.codec) == "image" else data
         return b"".join((self.prefix, body))
 
     def matches_filter(self, subscription: bytes) -> bool:

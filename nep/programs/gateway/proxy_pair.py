@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
+from nep.messages.codecs import content_of
 from nep.programs.gateway.framing import FrameFormat, escape_for_csharp, escape_for_javascript
 from nep.programs.gateway.portmap import TopicLine
 from nep.programs.gateway.requests import LOOPBACK, Role
@@ -111,7 +112,7 @@ class ProxyPair:
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
         self._high_water_mark = self._queue_length = (
-            _IMAGE_QUEUE_LENGTH if line.codec == "image" else _QUEUE_LENGTH
+            _IMAGE_QUEUE_LENGTH if content_of(line.codec) == "image" else _QUEUE_LENGTH
         )
         with contextlib.ExitStack() as exit_stack:
             self.incoming = self._open(context, zmq.XSUB, self.ends[0], exit_stack, _MAX_FRAME_BYTES)

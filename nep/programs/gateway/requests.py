@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from nep.programs.gateway.framing import PORT_B, Framing, codec_of, framing_of
+from nep.messages.codecs import codec_for
+from nep.programs.gateway.framing import PORT_B, Framing, framing_of
 
 Mode = Literal["many2many", "one2many", "many2one"]
 Role = Literal["publisher", "subscriber"]
@@ -71,7 +72,7 @@ class Request:
     @property
     def codec(self) -> str:
         """Native codec that corresponds to the requested message type."""
-        return codec_of(self.msg_type)
+        return codec_for(self.msg_type).name
 
     @property
     def is_service(self) -> bool:

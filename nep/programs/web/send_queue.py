@@ -50,7 +50,7 @@ class Feed:
 
     def __init__(self, topic: str, msg_type: str = "", clock: Callable[[], float] = time.monotonic) -> None:
         self.topic = topic
-        is_image = bool(msg_type) and codec_for(msg_type).name == "image"
+        is_image = bool(msg_type) and codec_for(msg_type).content == "image"
         self._default_capacity = _MAX_QUEUED_IMAGES if is_image else MAX_QUEUED_MESSAGES
         self.send_rate = RateMeter(clock)
         self.options = EncodingOptions()

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import orjson
 
 from nep.errors import DecodeError
-from nep.messages.codecs import codec_for
+from nep.messages.codecs import CODECS, RecordedForm, codec_for
 from nep.messages.image_codec import image_info, raw_layout
 from nep.messages.message import NO_EXTENSION, Message, MessageKind, message_kind, received_message
 from nep.messages.packing import pack, unpack
@@ -156,21 +156,18 @@ def _pack_extra(extra: Mapping[str, Any]) -> bytes:
 
 def _determine_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     # (form, whether it can be decoded, fields before its data)
-    codec = message.kind.codec
-    if codec == "json":
+    codec = CODECS.get(message.kind.codec)
+    form: RecordedForm = "wrapped" if codec is None else codec.recorded_as
+    if form == "json":
         try:
             orjson.loads(message.raw)
         except orjson.JSONDecodeError:
             return "wrapped", _is_decodable(message), b""
         return "json", True, b""
-    if codec == "image":
+    if form == "image":
         return _determine_image_form(message, stamp_ns)
-    is_decodable = codec == "bytes" or _is_decodable(message)
-    if codec == "string" and is_decodable:
-        return "text", True, b""
-    if codec == "msgpack" and is_decodable:
-        return "msgpack", True, b""
-    return "wrapped", is_decodable, b""
+    is_decodable = (codec is not None and codec.content == "bytes") or _is_decodable(message)
+    return form if is_decodable else "wrapped", is_decodable, b""
 
 
 def _is_decodable(message: Message) -> bool:
@@ -246,15 +243,11 @@ def recorder_channel(role: Role) -> ChannelDefinition:
 class LiveChannels:
     """Encoder of live messages as in a recording, for clients of `nep web --foxglove`."""
 
-    _FORMS: ClassVar[Mapping[str, str]] = {
-        "json": "json", "msgpack": "msgpack", "string": "text", "image": "picture",
-    }  # fmt: skip
-
     def expected_channel(self, topic: str, msg_type: str) -> ChannelDefinition:
         """Return the most likely channel for a topic on which no message was received yet."""
-        codec = codec_for(msg_type).name
-        message = received_message(message_kind(topic, codec, msg_type), b"", None, 0, 0)
-        form = self._FORMS.get(codec, "wrapped")
+        codec = codec_for(msg_type)
+        message = received_message(message_kind(topic, codec.name, msg_type), b"", None, 0, 0)
+        form = "picture" if codec.recorded_as == "image" else codec.recorded_as
         return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
 
     def encode(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nep.messages.codecs import codec_for
 from nep.programs.gateway.framing import (
     FrameError,
     FrameFormat,
-    codec_of,
     escape_for_csharp,
     escape_for_javascript,
     framing_of,
@@ -46,7 +46,7 @@ def test_framing_is_determined_by_port_and_type(port, msg_type, framing):
 
 
 def test_message_types_of_the_originals_map_to_json_string_and_image():
-    assert [codec_of(name) for name in ("json", "dictionary", "dict", "string", "image", "images")] == [
+    assert [codec_for(name).name for name in ("json", "dictionary", "dict", "string", "image", "images")] == [
         "json",
         "json",
         "json",

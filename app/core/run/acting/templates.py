@@ -13,20 +13,18 @@ from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.recordings.formats.schemas import schema_of
 
-TEXT_CODECS = frozenset({"json", "msgpack", "string"})
-"""Codecs whose messages can be written as text."""
 _SCALARS: Mapping[str, object] = {"string": "", "boolean": False, "integer": 0, "number": 0.0, "array": []}
 _MAX_DEPTH = 10
 
 
 def is_editable(msg_type: str) -> bool:
     """Return True if messages of this type can be written as text, unlike images and bytes."""
-    return codec_for(msg_type).name in TEXT_CODECS
+    return codec_for(msg_type).content in {"values", "text"}
 
 
 def is_plain_text(msg_type: str) -> bool:
     """Return True if messages of this type are plain text instead of JSON."""
-    return codec_for(msg_type).name == "string"
+    return codec_for(msg_type).content == "text"
 
 
 def format_message(message: Message) -> str:

@@ -26,6 +26,7 @@ from app.ui.widgets.inputs.fields import SearchField
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
 from app.ui.widgets.lists.fuzzy import Entry, Finder, Match, match
 from nep.i18n import _, lazy, ngettext
+from nep.messages.codecs import content_of
 
 if TYPE_CHECKING:
     from app.core.network.topics import Topic
@@ -67,7 +68,8 @@ class FieldCatalog:
         candidates = [
             topic
             for topic in topics
-            if topic.codec not in {"image", "bytes"} and (topic.bandwidth_Bps or 0.0) <= MAX_BYTES_PER_S
+            if content_of(topic.codec) in {"values", "text"}
+            and (topic.bandwidth_Bps or 0.0) <= MAX_BYTES_PER_S
         ]
         return candidates[:MAX_TOPICS]
 

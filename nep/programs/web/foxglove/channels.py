@@ -11,7 +11,7 @@ from typing import Protocol
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.messages.codecs import codec_for
+from nep.messages.codecs import CODECS, codec_for
 from nep.messages.message import Message
 from nep.nodes.loop_wait import yield_to_loop
 from nep.nodes.subscriber import Subscriber
@@ -238,11 +238,12 @@ class Channels:
 
 def _readable_type(msg_type: str) -> str:
     """Return the message type for a topic's channel, with msgpack replaced by JSON for the clients."""
-    return "json" if codec_for(msg_type).name == "msgpack" else msg_type
+    return "json" if codec_for(msg_type).recorded_as == "msgpack" else msg_type
 
 
 def _readable_message(message: Message) -> Message:
-    if message.codec != "msgpack":
+    codec = CODECS.get(message.codec)
+    if codec is None or codec.recorded_as != "msgpack":
         return message
     data = encode_json(message.payload)
     return Message(message.topic, data, "json", "json", seq=message.seq, stamp_ns=message.stamp_ns)
