@@ -64,7 +64,7 @@ GROUPS = (
         sources=(
             "nep/backends/ros2/",
             "nep/backends/base.py",
-            "nep/backends/typed_services.py",
+            "nep/backends/ros_types/typed_services.py",
             "nep/programs/bridges/",
             "tests/nep/backends/cyclone_service_peer.py",
             "tests/nep/backends/dust_",

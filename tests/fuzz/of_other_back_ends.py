@@ -18,7 +18,7 @@ from nep.backends.nanomsg.endpoints import (
     split_message,
     subscriber_topic_part,
 )
-from nep.backends.ros import definition, type_mapping
+from nep.backends.ros import type_mapping
 from nep.backends.ros.address import ros_master_address
 from nep.backends.ros2.names import (
     dds_topic,
@@ -29,6 +29,7 @@ from nep.backends.ros2.names import (
     split_node_name,
     type_name,
 )
+from nep.backends.ros_types import definition
 from nep.backends.zenoh.keys import data_key, node_key, parse_token, publisher_key, subscriber_key, topic_of
 from nep.errors import DecodeError, EncodeError, NepError, WireError
 from nep.protocol import wire

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from msgspec.structs import replace
 
 from nep.backends.ros.master import RosSystemState
+from nep.backends.ros_types.carriers import FOREIGN_CODECS
 from nep.masters.graph import Graph
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
@@ -26,12 +27,6 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-_CODECS = {
-    "std_msgs/String": "json",
-    "std_msgs/UInt8MultiArray": "bytes",
-    "sensor_msgs/CompressedImage": "image",
-    "sensor_msgs/Image": "image",
-}
 _GENERATION = "ros"
 
 
@@ -70,7 +65,7 @@ def graph_view(state: RosSystemState, local_nodes: list[LocalRosNode]) -> GraphV
     for topic, name in _remote_entries(state.publishers, local_nodes, lambda each: each.publishers):
         kind = state.types.get(topic, "*")
         uri = state.uris.get(name, "")
-        codec = _CODECS.get(kind, "ros")
+        codec = FOREIGN_CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
         _apply_request(graph, AddPublisher(_node_record(name, uri), record))
     for topic, name in _remote_entries(state.subscribers, local_nodes, lambda each: each.subscribers):
@@ -110,7 +105,7 @@ def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "
 def _add_local_node(graph: Graph, local_node: LocalRosNode, uri: str) -> None:
     node = replace(local_node.node, generation=_GENERATION)
     for topic, kind, is_latched, count in local_node.publishers:
-        codec = _CODECS.get(kind, "ros")
+        codec = FOREIGN_CODECS.get(kind, "ros")
         record = PublisherRecord(count.id, topic, kind, codec, (uri,) if uri else (), is_latched)
         _apply_request(graph, AddPublisher(node, record))
     for topic, kind, subscriber_count in local_node.subscribers:

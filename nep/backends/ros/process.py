@@ -19,11 +19,11 @@ from collections.abc import Callable
 from typing import Any
 
 from nep.backends.ros.address import is_loopback_address, ros_master_address
-from nep.backends.ros.definition import Definition
 from nep.backends.ros.library import get_rospy
 from nep.backends.ros.master import NodeRegistrations, RosMaster, RosMasterUnreachable, connections_of
 from nep.backends.ros.queue_room import QueueLimit
 from nep.backends.ros.service_connection import HandshakeLimiter
+from nep.backends.ros_types.definition import Definition
 from nep.errors import BadTopicError, ClosedError, NepError
 from nep.i18n import _
 from nep.system.exits import call_after_nodes

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-from nep.backends.ros.definition import parse
 from nep.backends.ros.library import service_definition
 from nep.backends.ros.type_mapping import is_ros_type, not_installed_error
-from nep.backends.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
+from nep.backends.ros_types.carriers import is_call_type
+from nep.backends.ros_types.definition import parse
+from nep.backends.ros_types.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
 from nep.errors import NepError
 from nep.i18n import _
 
@@ -59,7 +60,7 @@ def service_type_for(msg_type: str) -> ServiceType:
     """
     if is_ros_type(msg_type):
         return installed_service(msg_type)
-    if msg_type not in {"json", "msgpack"}:
+    if not is_call_type(msg_type):
         raise NepError(
             _("a ROS service can't have the type '{name}'; use a type such as 'std_srvs/SetBool'").format(
                 name=msg_type

@@ -104,7 +104,7 @@ class RospyPublisher(BasePublisher):
 
         Raises `ClosedError`, and the same errors as `to_ros_body`.
         """
-        body = to_ros_body(self._definition.name, self.spec.codec.name, encoded)
+        body = to_ros_body(self._definition.name, self.spec.codec.ros_carrier, encoded)
         with self._stats_lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")

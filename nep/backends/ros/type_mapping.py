@@ -7,7 +7,7 @@
 | bytes, msgpack                | std_msgs/UInt8MultiArray    | the bytes in `data`                      |
 | image                         | sensor_msgs/CompressedImage | JPEG or PNG in `data`                    |
 | sensor_msgs/Image             | itself                      | raw pixels, an array                     |
-| package/Type                  | itself                      | see `nep.backends.ros.definition`        |
+| package/Type                  | itself                      | see `nep.backends.ros_types.definition`  |
 
 The ROS type announced by the publisher's connection decides how a message is decoded: a subscriber of `image`
 accepts both image messages, and one of `json` decodes any message to a map.
@@ -21,12 +21,22 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from nep.backends.ros.definition import Definition, parse
 from nep.backends.ros.library import message_definition
+from nep.backends.ros_types.carriers import (
+    BYTES_TYPE,
+    CARRIER_TYPES,
+    COMPRESSED_IMAGE_TYPE,
+    RAW_IMAGE_TYPE,
+    STRING_TYPE,
+    carrier_of,
+    file_encoding,
+    message_codec,
+)
+from nep.backends.ros_types.definition import Definition, parse
 from nep.errors import EncodeError, NepError, WireError
 from nep.i18n import _
 from nep.messages import image_codec
-from nep.messages.codecs import CODECS, IMAGE, Codec, codec_for
+from nep.messages.codecs import IMAGE, JSON, Codec, RosCarrier, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.image_codec import image_info, raw_array, raw_image, raw_layout
 from nep.text import escaped, shortened
@@ -35,25 +45,14 @@ STAMP = struct.Struct("<III")
 """Binary layout of the start of a message with a header: seq, secs and nsecs."""
 _LENGTH = struct.Struct("<I")
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
-_STRING_TYPE = "std_msgs/String"
-_BYTES_TYPE = "std_msgs/UInt8MultiArray"
-_COMPRESSED_IMAGE_TYPE = "sensor_msgs/CompressedImage"
-_RAW_IMAGE_TYPE = "sensor_msgs/Image"
-_IMAGE_TYPES = (_RAW_IMAGE_TYPE, _COMPRESSED_IMAGE_TYPE)
+_IMAGE_TYPES = (RAW_IMAGE_TYPE, COMPRESSED_IMAGE_TYPE)
 _MD5SUMS = {
-    _STRING_TYPE: "992ce8a1687cec8c8bd883ec73ca41d1",
-    _BYTES_TYPE: "82373f1612381bb6ee473b5cd6f5d89c",
-    _COMPRESSED_IMAGE_TYPE: "8f7a12909da2c9d3332d540a0977563f",
-    _RAW_IMAGE_TYPE: "060021388200f6f0f447d0fcd9c64743",
+    STRING_TYPE: "992ce8a1687cec8c8bd883ec73ca41d1",
+    BYTES_TYPE: "82373f1612381bb6ee473b5cd6f5d89c",
+    COMPRESSED_IMAGE_TYPE: "8f7a12909da2c9d3332d540a0977563f",
+    RAW_IMAGE_TYPE: "060021388200f6f0f447d0fcd9c64743",
 }
 """MD5 sums of the built-in message definitions, by type."""
-_CARRIER_TYPES = {
-    "string": _STRING_TYPE,
-    "json": _STRING_TYPE,
-    "bytes": _BYTES_TYPE,
-    "msgpack": _BYTES_TYPE,
-    "image": _COMPRESSED_IMAGE_TYPE,
-}
 _EMPTY_LAYOUT = bytes(8)
 _DEPTH_HEADER_BYTES = 12
 """Size in bytes of the header that compressed_depth_image_transport writes before the PNG.
@@ -75,7 +74,7 @@ def is_ros_type(msg_type: str) -> bool:
 
 def ros_type_of(msg_type: str) -> str:
     """Return the ROS message type in which messages of a nep message type are transferred."""
-    return msg_type if is_ros_type(msg_type) else _CARRIER_TYPES[codec_for(msg_type).name]
+    return msg_type if is_ros_type(msg_type) else CARRIER_TYPES[carrier_of(msg_type)]
 
 
 def installed_definition(name: str) -> Definition:
@@ -125,13 +124,10 @@ def codec_of(msg_type: str) -> Codec:
 def ros_codec(definition: Definition) -> Codec:
     """Return a codec that converts between maps and messages of a ROS type."""
 
-    def encode(payload: object) -> Encoded:
-        return Encoded(definition.encode(_with_stamp(payload) if definition.has_header else payload))
+    def encode(payload: object) -> bytes:
+        return definition.encode(_with_stamp(payload) if definition.has_header else payload)
 
-    def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
-        return definition.decode(data)
-
-    return Codec("ros", _CODEC_NUMBER, encode, decode, dict, definition.check, queue_length=1000)
+    return message_codec("ros", _CODEC_NUMBER, encode, definition.decode, definition.check)
 
 
 def _with_stamp(payload: object) -> object:
@@ -157,7 +153,7 @@ def _image_codec(definition: Definition) -> Codec:
     def encode(payload: object) -> Encoded:
         if isinstance(payload, Mapping):
             return map_codec.encode(payload)
-        return raw_image(payload) if definition.name == _RAW_IMAGE_TYPE else _encode_file(payload)
+        return raw_image(payload) if definition.name == RAW_IMAGE_TYPE else _encode_file(payload)
 
     def check(payload: object) -> None:
         if not isinstance(payload, Mapping):
@@ -173,22 +169,22 @@ def _encode_file(payload: object) -> Encoded:
 
 
 def _check_file(encoded: Encoded, kind: str) -> str:
-    encoding = (encoded.extension or {}).get("encoding")
-    if encoding not in {"jpeg", "png"}:
+    encoding = file_encoding(encoded)
+    if not encoding:
         raise EncodeError(
             "image", kind, _("'{name}' supports only JPEG and PNG; use the type '{raw}'").format(
-                name=_COMPRESSED_IMAGE_TYPE, raw=_RAW_IMAGE_TYPE
+                name=COMPRESSED_IMAGE_TYPE, raw=RAW_IMAGE_TYPE
             )
         )  # fmt: skip
-    return str(encoding)
+    return encoding
 
 
-def to_ros_body(ros_type: str, codec: str, encoded: Encoded) -> bytes:
+def to_ros_body(ros_type: str, carrier: RosCarrier | None, encoded: Encoded) -> bytes:
     """Convert encoded data to the body of a ROS message.
 
     Args:
         ros_type: Type of the ROS message.
-        codec: Name of the codec of `encoded`.
+        carrier: Carrier of the codec of `encoded`; None if its data is a ROS message already.
         encoded: Data and extension.
 
     Raises:
@@ -198,23 +194,23 @@ def to_ros_body(ros_type: str, codec: str, encoded: Encoded) -> bytes:
             the extension.
     """
     data, extension = encoded.data, encoded.extension
-    if codec == "image" and extension:
+    if carrier == "image" and extension:
         header = bytes(4) + _current_stamp() + bytes(4)
-        if ros_type == _RAW_IMAGE_TYPE:
+        if ros_type == RAW_IMAGE_TYPE:
             return header + _raw_image_body(data, extension)
         kind = _check_file(encoded, type(data).__name__).encode()
         return b"".join((header, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
     if extension:
         raise WireError(_("a '{name}' can't carry an extension").format(name=ros_type), len(data))
-    if codec == "image" and ros_type == _COMPRESSED_IMAGE_TYPE and _has_image_magic(data):
+    if carrier == "image" and ros_type == COMPRESSED_IMAGE_TYPE and _has_image_magic(data):
         info = image_info(data)
         if info is None:
             raise EncodeError("image", type(data).__name__, _("not a readable image"))
-        return to_ros_body(ros_type, codec, Encoded(data, info))
-    if codec in {"ros", "image"}:
+        return to_ros_body(ros_type, carrier, Encoded(data, info))
+    if carrier is None or carrier == "image":
         return bytes(data)
     size = _LENGTH.pack(len(data))
-    return b"".join((size, data)) if ros_type == _STRING_TYPE else b"".join((_EMPTY_LAYOUT, size, data))
+    return b"".join((size, data)) if ros_type == STRING_TYPE else b"".join((_EMPTY_LAYOUT, size, data))
 
 
 def _has_image_magic(data: bytes | memoryview) -> bool:
@@ -230,7 +226,7 @@ def _raw_image_body(data: bytes | memoryview, extension: Mapping[str, object]) -
     if layout is None or not isinstance(shape, list | tuple):
         raise WireError(
             _("'{name}' supports only raw pixels; publish an array, or use the type 'image'").format(
-                name=_RAW_IMAGE_TYPE
+                name=RAW_IMAGE_TYPE
             )
         )
     frame = raw_array(memoryview(data), layout, shape)
@@ -282,17 +278,18 @@ def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> 
         raise version_error(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _type_mismatch_error(msg_type, ros_type)
-    if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or codec is IMAGE):
+    is_image = codec.ros_carrier == "image"
+    if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or is_image):
         return Unpacker(
-            IMAGE,
-            IMAGE.name,
-            _unpack_raw_image if ros_type == _RAW_IMAGE_TYPE else _unpack_compressed_image,
+            codec if is_image else IMAGE,
+            codec.name if is_image else IMAGE.name,
+            _unpack_raw_image if ros_type == RAW_IMAGE_TYPE else _unpack_compressed_image,
             True,
         )
-    if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[codec.name]:
-        unpack = _unpack_string if ros_type == _STRING_TYPE else _unpack_array
+    if not is_ros_type(msg_type) and ros_type == CARRIER_TYPES[carrier_of(msg_type)]:
+        unpack = _unpack_string if ros_type == STRING_TYPE else _unpack_array
         return Unpacker(codec, msg_type, unpack, has_header=False)
-    if not is_ros_type(msg_type) and codec is not CODECS["json"]:
+    if not is_ros_type(msg_type) and codec is not JSON:
         raise _type_mismatch_error(msg_type, ros_type)
     definition = parse(ros_type, text) if text else _matching_definition(ros_type, md5sum)
     return Unpacker(ros_codec(definition), ros_type, lambda body: (body, None), definition.has_header)

@@ -13,18 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from nep.backends.ros2.environment import distribution
-from nep.backends.ros2.fields import (
+from nep.backends.ros2.library import load_typesys
+from nep.backends.ros2.names import type_name
+from nep.backends.ros_types.rosbags_fields import (
     PLACEHOLDER_FIELD,
     RosField,
-    RosFieldError,
     convert_definition,
     from_message,
     to_message,
 )
-from nep.backends.ros2.library import load_typesys
-from nep.backends.ros2.names import type_name
 from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
+from nep.messages.fields import FieldPathError
 
 FOLDERS_VARIABLE = "NEP_ROS_MSG_PATH"
 """Name of the environment variable that lists folders of .msg files."""
@@ -103,8 +103,9 @@ class MessageTypes:
             message = to_message(self, name, payload)
             with self._lock:
                 return bytes(self._store.serialize_cdr(message, name))
-        except RosFieldError as error:
-            raise EncodeError(name, kind, error.reason, place=error.path or ".") from error
+        except FieldPathError as error:
+            reason = f"'{error.path}' {error.reason}" if error.path else error.reason
+            raise EncodeError(name, kind, reason, place=error.path or ".") from error
         except Exception as error:  # rosbags has no codec for some types, such as those with wide strings
             raise EncodeError(name, kind, str(error) or type(error).__name__) from error
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from nep.backends.ros2.fields import RosField
 from nep.backends.ros2.library import Dds
 from nep.backends.ros2.message_types import MessageTypes
 from nep.backends.ros2.names import dds_type, encode_user_data
+from nep.backends.ros_types.rosbags_fields import RosField
 
 _MAX_BLOCKING_NS = 100_000_000
 _IDL_NAMES = {"byte": "uint8"}

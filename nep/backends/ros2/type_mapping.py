@@ -21,10 +21,19 @@ from functools import partial
 
 from nep.backends.ros2.message_types import message_types
 from nep.backends.ros2.names import is_type_name
+from nep.backends.ros_types.carriers import (
+    BYTES_TYPE,
+    CARRIER_TYPES,
+    COMPRESSED_IMAGE_TYPE,
+    carrier_of,
+    file_encoding,
+    message_codec,
+    ros2_name,
+)
 from nep.errors import DecodeError, EncodeError, WireError
 from nep.i18n import _
-from nep.messages import codecs, image_codec
-from nep.messages.codecs import Codec
+from nep.messages import codecs
+from nep.messages.codecs import Codec, RosCarrier
 from nep.messages.encoded import Encoded
 from nep.messages.image_files import parse_header
 from nep.messages.message import MessageKind
@@ -32,12 +41,10 @@ from nep.protocol.wire import extension_part
 
 CDR = "cdr"
 """Name of the codec of ROS types, whose data is the CDR of the message."""
-_STRING_TYPE = "std_msgs/msg/String"
-_BYTES_TYPE = "std_msgs/msg/UInt8MultiArray"
-_IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
+_BYTES_TYPE = ros2_name(BYTES_TYPE)
+_IMAGE_TYPE = ros2_name(COMPRESSED_IMAGE_TYPE)
 _CDR_HEADER = b"\0\1\0\0"
 """Encapsulation header of little-endian CDR."""
-_FILE_ENCODINGS = ("jpeg", "png")
 _MAX_CDR_BYTES = 2**32 - 64
 
 
@@ -71,14 +78,11 @@ def mapping_for(msg_type: str) -> TypeMapping:
     """Return the mapping for a message type. Raises `NepError` for an unknown ROS type."""
     if is_type_name(msg_type):
         return _ros_mapping(message_types().validate(msg_type))
-    codec = codecs.codec_for(msg_type)
-    if codec.name == "image":
-        return TypeMapping(_IMAGE_TYPE, replace(codec, encode=_encode_image), _pack_image, _unpack_image)
-    if codec.name in ("bytes", "msgpack"):
-        return TypeMapping(_BYTES_TYPE, codec, _pack_bytes, _unpack_bytes)
-    if codec.name == "string":
-        codec = replace(codec, encode=_encode_text)
-    return TypeMapping(_STRING_TYPE, codec, _pack_text, _unpack_text)
+    codec, carrier = codecs.codec_for(msg_type), carrier_of(msg_type)
+    encode, pack, unpack = _CONVERSIONS[carrier]
+    if encode is not None and codec.content == carrier:
+        codec = replace(codec, encode=partial(encode, codec))
+    return TypeMapping(ros2_name(CARRIER_TYPES[carrier]), codec, pack, unpack)
 
 
 # ---- ROS message types by name
@@ -86,19 +90,10 @@ def mapping_for(msg_type: str) -> TypeMapping:
 
 def _ros_mapping(name: str) -> TypeMapping:
     types = message_types()
-
-    def encode(payload: object) -> Encoded:
-        return Encoded(types.encode(name, payload))
-
-    def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
-        return types.decode(name, data)
-
-    return TypeMapping(
-        name,
-        Codec(CDR, 0, encode, decode, dict, partial(_check_map, name), queue_length=1000),
-        _pack_cdr,
-        bytes,
+    codec = message_codec(
+        CDR, 0, partial(types.encode, name), partial(types.decode, name), partial(_check_map, name)
     )
+    return TypeMapping(name, codec, _pack_cdr, bytes)
 
 
 def _check_map(name: str, payload: object) -> None:
@@ -128,11 +123,11 @@ def _data_without_extension(encoded: Encoded) -> bytes:
     return data
 
 
-def _encode_text(payload: object) -> Encoded:
+def _encode_text(codec: Codec, payload: object) -> Encoded:
     # Rejects zero bytes, which end a string in ROS. Raises `EncodeError`.
-    encoded = codecs.STRING.encode(payload)
+    encoded = codec.encode(payload)
     if 0 in encoded.data:
-        raise EncodeError("string", "str", _null_character_reason())
+        raise EncodeError(codec.name, "str", _null_character_reason())
     return encoded
 
 
@@ -185,11 +180,11 @@ def _read_data_field(name: str, cdr: bytes) -> bytes:
     return data if isinstance(data, bytes) else b""
 
 
-def _encode_image(payload: object) -> Encoded:
+def _encode_image(codec: Codec, payload: object) -> Encoded:
     # Rejects raw images. Raises `EncodeError`.
-    encoded = image_codec.encode(payload)
-    if (encoded.extension or {}).get("encoding") not in _FILE_ENCODINGS:
-        raise EncodeError("image", type(payload).__name__, _raw_image_reason())
+    encoded = codec.encode(payload)
+    if not file_encoding(encoded):
+        raise EncodeError(codec.name, type(payload).__name__, _raw_image_reason())
     return encoded
 
 
@@ -216,3 +211,15 @@ def _pack_image(encoded: Encoded) -> bytes:
 
 def _unpack_image(cdr: bytes) -> bytes:
     return _read_data_field(_IMAGE_TYPE, cdr)
+
+
+_RejectingEncoder = Callable[[Codec, object], Encoded]
+_CONVERSIONS: Mapping[
+    RosCarrier,
+    tuple[_RejectingEncoder | None, Callable[[Encoded], bytes], Callable[[bytes], bytes | memoryview]],
+] = {
+    "text": (_encode_text, _pack_text, _unpack_text),
+    "bytes": (None, _pack_bytes, _unpack_bytes),
+    "image": (_encode_image, _pack_image, _unpack_image),
+}
+"""Encoder that rejects what a carrier can't contain, and conversions to and from the ROS message."""

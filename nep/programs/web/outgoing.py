@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import orjson
 
-from nep.backends.ros.definition import Definition, FieldKind
+from nep.backends.ros_types.definition import Definition, FieldKind
 from nep.errors import EncodeError
 from nep.messages.message import Message
 from nep.messages.nesting import is_json_too_deep

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.ros.definition import parse
 from nep.backends.ros.library import message_definition
 from nep.backends.ros.type_mapping import codec_of, is_ros_type, ros_type_of, to_ros_body, unpacker_for
+from nep.backends.ros_types.definition import parse
 from nep.errors import WireError
 from nep.messages.encoded import Encoded
 from tests.nep.backends.ros_programs import skip_without_ros
@@ -199,7 +199,7 @@ def test_message_types_map_to_ros_types(msg_type: str, ros_type: str) -> None:
 
 def test_invalid_message_bodies_are_rejected() -> None:
     read = unpacker_for("json", "std_msgs/String", "").unpack
-    assert read(memoryview(to_ros_body("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
+    assert read(memoryview(to_ros_body("std_msgs/String", "text", Encoded(b"{}"))))[0] == b"{}"
     for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
         with pytest.raises((WireError, struct.error)):
             read(memoryview(wrong))
@@ -219,7 +219,7 @@ def test_undecodable_image_is_rejected() -> None:
 
 def test_extension_is_rejected_for_ros_types() -> None:
     with pytest.raises(WireError, match="a 'std_msgs/String' can't carry an extension"):
-        to_ros_body("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
+        to_ros_body("std_msgs/String", "text", Encoded(b"{}", {"a": 1}))
 
 
 def test_only_message_packages_are_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.backends.ros.definition import parse
 from nep.backends.ros.service_types import NEP_CALL, ServiceType
+from nep.backends.ros_types.definition import parse
 from nep.errors import WireError
 from nep.messages.codecs import CODECS
 from nep.protocol.service_wire import CallKind, Reply, error_reply

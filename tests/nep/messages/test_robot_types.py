@@ -67,8 +67,8 @@ def test_robot_types_round_trip_as_ros2_types(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(set(_ROS) - {"builtin_interfaces/Time", "std_msgs/Header"}))
 def test_robot_types_round_trip_as_ros1_types(name: str) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
-    from nep.backends.ros.definition import parse
     from nep.backends.ros.type_mapping import ros_codec
+    from nep.backends.ros_types.definition import parse
 
     store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
     codec = ros_codec(parse(name, store.generate_msgdef(name.replace("/", "/msg/"), ros_version=1)[0]))

@@ -20,8 +20,8 @@ from nep.backends.ros2.names import dds_service, dds_type, encode_user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant, policy_classes
 from nep.backends.ros2.services.definitions import request_type_of, response_type_of
 from nep.backends.ros2.topics import create_sample
+from nep.backends.ros_types.typed_services import TypedService
 from nep.backends.services import MAX_CALLS
-from nep.backends.typed_services import TypedService
 from nep.errors import DecodeError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import CallKind, Reply

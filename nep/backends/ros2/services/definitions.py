@@ -1,6 +1,6 @@
 """ROS 2 service types: common types, and types of .srv files.
 
-`nep_msgs/srv/Call` is the type for calls between nep nodes, see `nep.backends.typed_services`.
+`nep_msgs/srv/Call` is the type for calls between nep nodes, see `nep.backends.ros_types.typed_services`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Any
 
 from nep.backends.ros2.message_types import FOLDERS_VARIABLE, MessageTypes
 from nep.backends.ros2.names import service_type_name
-from nep.backends.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
+from nep.backends.ros_types.carriers import is_call_type
+from nep.backends.ros_types.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
 from nep.errors import NepError, WireError, did_you_mean
 from nep.i18n import _
 from nep.messages import codecs
@@ -128,7 +129,7 @@ def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
     name = service_type_name(msg_type)
     if name is not None:
         return find_service_type(types, name)
-    if msg_type not in {"json", "msgpack"}:
+    if not is_call_type(msg_type):
         raise NepError(
             _(
                 "a ROS 2 service can't have the type '{name}'; use a type such as 'std_srvs/srv/SetBool'"

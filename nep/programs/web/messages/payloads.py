@@ -22,10 +22,16 @@ from collections.abc import Mapping, Sequence
 from typing import cast
 
 from nep.backends.ros import type_mapping
+from nep.backends.ros_types.carriers import (
+    CARRIER_TYPES,
+    COMPRESSED_IMAGE_TYPE,
+    RAW_IMAGE_TYPE,
+    STRING_TYPE,
+)
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.i18n import _
 from nep.messages import image_codec
-from nep.messages.codecs import codec_for
+from nep.messages.codecs import CODECS, JSON, Codec, Content, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.image_files import parse_header
 from nep.messages.message import Message
@@ -38,18 +44,6 @@ from nep.programs.web.messages.ros_definitions import (
 )
 from nep.text import bounded_str, escaped
 
-_STRING_TYPE = "std_msgs/String"
-_BYTES_TYPE = "std_msgs/UInt8MultiArray"
-_COMPRESSED_IMAGE_TYPE = "sensor_msgs/CompressedImage"
-_RAW_IMAGE_TYPE = "sensor_msgs/Image"
-_ROS_TYPES = {
-    "string": _STRING_TYPE,
-    "bytes": _BYTES_TYPE,
-    "image": _COMPRESSED_IMAGE_TYPE,
-    "json": JSON_TYPE,
-    "msgpack": MSGPACK_TYPE,
-}
-_CODECS = {**{ros_type: codec for codec, ros_type in _ROS_TYPES.items()}, _RAW_IMAGE_TYPE: "image"}
 _UNKNOWN_TYPES = frozenset({"", "*"})
 _STAMP = struct.Struct("<II")
 _NS_PER_S = 1_000_000_000
@@ -65,15 +59,27 @@ def nep_type_of(ros_type: str) -> str:
     Names without a counterpart are returned unchanged.
     """
     bare_name = bare_type(ros_type)
-    return _CODECS.get(bare_name, bare_name)
+    if bare_name == RAW_IMAGE_TYPE:
+        return "image"
+    return next((each.name for each in CODECS.values() if _ros_type_of(each) == bare_name), bare_name)
 
 
 def ros_type_of(msg_type: str) -> str:
     """Return the ROS type under which pages see a NEP message type."""
     if msg_type in _UNKNOWN_TYPES:
         return JSON_TYPE
-    codec = codec_for(msg_type).name
-    return msg_type if codec == "json" and "/" in msg_type else _ROS_TYPES[codec]
+    codec = codec_for(msg_type)
+    return msg_type if codec is JSON and "/" in msg_type else _ros_type_of(codec)
+
+
+def _ros_type_of(codec: Codec) -> str:
+    shape = _shape_of(codec)
+    return f"nep/{codec.name.capitalize()}" if shape == "values" else CARRIER_TYPES[shape]
+
+
+def _shape_of(codec: Codec) -> Content:
+    """Return the kind of ROS message that has the payloads of a codec; "values" if they are unchanged."""
+    return codec.content if codec.content == codec.ros_carrier else "values"
 
 
 def is_compatible(ros_type: str, msg_type: str) -> bool:
@@ -113,17 +119,18 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
         DecodeError: The message can't be decoded.
         EncodeError: The payload has no ROS shape.
     """
-    if message.codec == "string":
+    shape = _shape_of(codec_for(message.codec))
+    if shape == "text":
         return {"data": message.payload}
-    if message.codec == "bytes":
+    if shape == "bytes":
         return {"layout": {"dim": [], "data_offset": 0}, "data": message.payload}
-    if message.codec == "image":
-        ros_type = _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE
+    if shape == "image":
+        ros_type = RAW_IMAGE_TYPE if as_pixels else COMPRESSED_IMAGE_TYPE
         definition = definition_of(ros_type)
-        shape = definition.decode(_image_bytes(message, ros_type)) if definition is not None else {}
-        header = cast("dict[str, object]", shape["header"])
-        shape["header"] = {**header, "seq": (message.seq or 0) & 0xFFFFFFFF}
-        return shape
+        fields = definition.decode(_image_bytes(message, ros_type)) if definition is not None else {}
+        header = cast("dict[str, object]", fields["header"])
+        fields["header"] = {**header, "seq": (message.seq or 0) & 0xFFFFFFFF}
+        return fields
     return message.payload
 
 
@@ -133,27 +140,25 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     A message whose type has no ROS definition becomes a ``std_msgs/String`` that contains JSON. The
     arguments and exceptions are those of `to_ros`.
     """
-    if message.codec == "image":
-        return _image_bytes(message, _RAW_IMAGE_TYPE if as_pixels else _COMPRESSED_IMAGE_TYPE)
-    if message.codec in {"string", "bytes"}:
-        ros_type = _ROS_TYPES[message.codec]
-        return type_mapping.to_ros_body(ros_type, message.codec, Encoded(bytes(message.data)))
+    shape = _shape_of(codec_for(message.codec))
+    if shape == "image":
+        return _image_bytes(message, RAW_IMAGE_TYPE if as_pixels else COMPRESSED_IMAGE_TYPE)
+    if shape != "values":
+        return type_mapping.to_ros_body(CARRIER_TYPES[shape], shape, Encoded(bytes(message.data)))
     definition = definition_of(bare_type(ros_type_of(message.msg_type)))
     if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
         return definition.encode(_with_ros1_times(message.payload))
-    json_data = (
-        bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
-    )
-    return type_mapping.to_ros_body(_STRING_TYPE, "json", Encoded(bytes(json_data)))
+    json_data = bytes(message.data) if message.codec == JSON.name else JSON.encode(message.payload).data
+    return type_mapping.to_ros_body(STRING_TYPE, "text", Encoded(bytes(json_data)))
 
 
 def _image_bytes(message: Message, ros_type: str) -> bytes:
     """Return an image in ROS serialization; the header has the time of publication."""
     encoded = Encoded(message.data, dict(message.extension) or parse_header(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
-    if ros_type == _COMPRESSED_IMAGE_TYPE and layout is not None:
+    if ros_type == COMPRESSED_IMAGE_TYPE and layout is not None:
         encoded = image_codec.encode(message.payload)
-    elif ros_type == _RAW_IMAGE_TYPE and layout is None:
+    elif ros_type == RAW_IMAGE_TYPE and layout is None:
         encoded = image_codec.raw_image(message.payload)
     body = type_mapping.to_ros_body(ros_type, "image", encoded)
     stamp_ns = message.stamp_ns
@@ -187,17 +192,17 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
     Raises:
         PayloadError: The message isn't a map, or a field doesn't match; the error names the field.
     """
-    codec = codec_or_type(msg_type)
-    if codec == "string":
+    shape = _shape_of(codec_for(msg_type))
+    if shape == "text":
         text = _as_map(msg, ros_type).get("data", "")
         if not isinstance(text, str):
             raise _field_error("data", text, _("a string"))
         return text
-    if codec == "bytes":
+    if shape == "bytes":
         return _to_bytes(_as_map(msg, ros_type).get("data", ""), "data")
-    if codec == "image":
+    if shape == "image":
         return _image(_as_map(msg, ros_type), bare_type(ros_type))
-    return _as_map(msg, ros_type) if "/" in codec else msg
+    return _as_map(msg, ros_type) if "/" in codec_or_type(msg_type) else msg
 
 
 def _as_map(msg: object, ros_type: str) -> Mapping[str, object]:
@@ -227,11 +232,11 @@ def _to_bytes(value: object, field: str) -> bytes:
 
 def _image(fields: Mapping[str, object], ros_type: str) -> object:
     data = _to_bytes(fields.get("data", ""), "data")
-    if ros_type != _RAW_IMAGE_TYPE:
+    if ros_type != RAW_IMAGE_TYPE:
         return data  # the codec reads whether it is a JPEG or a PNG
-    definition = definition_of(_RAW_IMAGE_TYPE)
+    definition = definition_of(RAW_IMAGE_TYPE)
     unpack = type_mapping.unpacker_for(
-        "image", _RAW_IMAGE_TYPE, full_definition_text(_RAW_IMAGE_TYPE) or ""
+        "image", RAW_IMAGE_TYPE, full_definition_text(RAW_IMAGE_TYPE) or ""
     ).unpack
     try:
         members = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 
-from nep.backends.ros.definition import Definition, FieldKind, parse
+from nep.backends.ros_types.definition import Definition, FieldKind, parse
 
 JSON_TYPE = "nep/Json"
 """ROS type of topics with arbitrary JSON messages.

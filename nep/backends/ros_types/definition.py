@@ -14,10 +14,10 @@ import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
+from nep.messages.fields import FieldPathError
 from nep.text import escaped, shortened
 
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
@@ -39,12 +39,6 @@ _MAX_FIELDS = 2_000
 """Maximum number of fields including nested ones, because a publisher's definition is untrusted."""
 _MAX_EMPTY_MESSAGES = 10_000
 """Maximum number of nested messages without content in a decoded message; they occupy no bytes."""
-
-
-class _FieldError(Exception):
-    def __init__(self, path: str, reason: str) -> None:
-        self.path = path
-        self.reason = reason
 
 
 class _Reader:
@@ -75,8 +69,8 @@ class FieldKind:
 
     Attributes:
         name: Name of the type.
-        write: Encodes a value; called with the value, the field path and the output.
-        read: Decodes a value; called with the reader and the field path.
+        write: Encodes a value; called with the value and the output. Raises `FieldPathError`.
+        read: Decodes a value. Raises `FieldPathError`, or `struct.error` at the end of the data.
         min_bytes: Minimum size of an encoded value in bytes.
         fields: Fields of a message.
         element: Type of an array's items, or None.
@@ -84,8 +78,8 @@ class FieldKind:
     """
 
     name: str
-    write: Callable[[object, str, bytearray], None]
-    read: Callable[[_Reader, str], object]
+    write: Callable[[object, bytearray], None]
+    read: Callable[[_Reader], object]
     min_bytes: int
     fields: tuple[DefinitionField, ...] = ()
     element: FieldKind | None = None
@@ -116,19 +110,15 @@ class Definition:
     has_header: bool
     """True if the first field is a header; the data then starts with seq, secs and nsecs."""
 
-    @cached_property
-    def _names(self) -> tuple[str, ...]:
-        return tuple(each.name for each in self.fields)
-
     def encode(self, payload: object) -> bytes:
         """Encode a map. Raises `EncodeError` with the path of the invalid field."""
+        if not isinstance(payload, Mapping):
+            raise self._not_a_map_error(payload)
         out = bytearray()
         try:
-            _write_fields(self.name, self.fields, payload, "", out)
-        except _FieldError as error:
-            reason = error.reason
-            if error.path:
-                reason = _("field '{path}' {reason}").format(path=error.path, reason=reason)
+            _write_fields(self.fields, payload, out)
+        except FieldPathError as error:
+            reason = _("field '{path}' {reason}").format(path=error.path, reason=error.reason)
             raise EncodeError(self.name, type(payload).__name__, reason, error.path) from None
         return bytes(out)
 
@@ -140,8 +130,8 @@ class Definition:
         """
         reader = _Reader(data)
         try:
-            values = _read_fields(self.fields, reader, "")
-        except _FieldError as error:
+            values = _read_fields(self.fields, reader)
+        except FieldPathError as error:
             reason = _("field '{path}' {reason}").format(path=error.path, reason=error.reason)
             raise DecodeError(self.name, len(reader.data), reason) from None
         if reader.bytes_left:
@@ -155,7 +145,12 @@ class Definition:
     def check(self, payload: object) -> None:
         """Raise `EncodeError` if `payload` isn't a map."""
         if not isinstance(payload, Mapping):
-            raise EncodeError(self.name, type(payload).__name__, _not_a_map_reason(self.fields))
+            raise self._not_a_map_error(payload)
+
+    def _not_a_map_error(self, payload: object) -> EncodeError:
+        names = ", ".join(f"'{each.name}'" for each in self.fields[:6])
+        reason = _("publish a 'dict' with the fields {names}").format(names=names or "{}")
+        return EncodeError(self.name, type(payload).__name__, reason)
 
 
 # ---- parsing definitions
@@ -245,7 +240,7 @@ def _basic_kind(name: str) -> FieldKind | None:
     if name in _TIME_FORMATS:
         return _time_kind(name)
     if name == "bool":
-        return FieldKind(name, _write_bool, lambda reader, _path: reader.read(1)[0] != 0, 1)
+        return FieldKind(name, _write_bool, lambda reader: reader.read(1)[0] != 0, 1)
     if name == "string":
         return FieldKind(name, _write_string, _read_string, 4)
     return None
@@ -257,96 +252,87 @@ def _integer_kind(name: str) -> FieldKind:
     is_signed = _INTEGER_FORMATS[name].islower()
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed else (0, (1 << bits) - 1)
 
-    def write(value: object, path: str, out: bytearray) -> None:
+    def write(value: object, out: bytearray) -> None:
         number = _to_integer(value)
         if number is None:
-            raise _type_error(path, value, name)
+            raise _type_error(value, name)
         if not low <= number <= high:
-            raise _FieldError(
-                path,
+            raise FieldPathError(
                 _("is {value}; '{name}' must be from {low} to {high}").format(
                     value=shortened(str(number), 40), name=name, low=low, high=high
-                ),
+                )
             )
         out += packing.pack(number)
 
-    return FieldKind(
-        name, write, lambda reader, _path: packing.unpack(reader.read(packing.size))[0], packing.size
-    )
+    return FieldKind(name, write, lambda reader: packing.unpack(reader.read(packing.size))[0], packing.size)
 
 
 def _float_kind(name: str) -> FieldKind:
     packing = struct.Struct(f"<{_FLOAT_FORMATS[name]}")
 
-    def write(value: object, path: str, out: bytearray) -> None:
+    def write(value: object, out: bytearray) -> None:
         as_float = getattr(type(value), "__float__", None)
         if as_float is None or isinstance(value, bool):
-            raise _type_error(path, value, name)
+            raise _type_error(value, name)
         try:
             out += packing.pack(as_float(value))
         except (OverflowError, TypeError, ValueError, struct.error):
-            raise _FieldError(
-                path, _("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name)
-            ) from None
+            raise _range_error(value, name) from None
 
-    return FieldKind(
-        name, write, lambda reader, _path: packing.unpack(reader.read(packing.size))[0], packing.size
-    )
+    return FieldKind(name, write, lambda reader: packing.unpack(reader.read(packing.size))[0], packing.size)
 
 
 def _time_kind(name: str) -> FieldKind:
     packing = _TIME_FORMATS[name]
 
-    def write(value: object, path: str, out: bytearray) -> None:
+    def write(value: object, out: bytearray) -> None:
         try:
-            out += packing.pack(*_to_secs_and_nsecs(value, path, name))
+            out += packing.pack(*_to_secs_and_nsecs(value, name))
         except struct.error:
-            raise _FieldError(
-                path, _("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name)
-            ) from None
+            raise _range_error(value, name) from None
 
-    def read(reader: _Reader, _path: str) -> object:
+    def read(reader: _Reader) -> object:
         secs, nsecs = packing.unpack(reader.read(8))
         return {"secs": secs, "nsecs": nsecs}
 
     return FieldKind(name, write, read, 8)
 
 
-def _to_secs_and_nsecs(value: object, path: str, name: str) -> tuple[int, int]:
+def _to_secs_and_nsecs(value: object, name: str) -> tuple[int, int]:
     if isinstance(value, Mapping):
         for key in value:
             if key not in {"secs", "nsecs"}:
-                raise _unknown_field_error(path, key, ("secs", "nsecs"))
+                raise _unknown_field_error(key, ("secs", "nsecs"))
         secs, nsecs = _to_integer(value.get("secs", 0)), _to_integer(value.get("nsecs", 0))
         if secs is not None and nsecs is not None:
             return secs, nsecs
     elif isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1 << 33:
         total_ns = round(value * 1_000_000_000) if isinstance(value, float) else value * 1_000_000_000
         return divmod(total_ns, 1_000_000_000)
-    raise _type_error(path, value, name)
+    raise _type_error(value, name)
 
 
-def _write_bool(value: object, path: str, out: bytearray) -> None:
+def _write_bool(value: object, out: bytearray) -> None:
     is_bool = isinstance(value, bool) or type(value).__name__ in {"bool", "bool_"}  # also numpy's
     number = int(bool(value)) if is_bool else _to_integer(value)
     if number not in {0, 1}:
-        raise _type_error(path, value, "bool")
+        raise _type_error(value, "bool")
     out.append(number)
 
 
-def _write_string(value: object, path: str, out: bytearray) -> None:
+def _write_string(value: object, out: bytearray) -> None:
     if isinstance(value, str):
         try:
             value = value.encode("utf-8")
         except UnicodeEncodeError:
-            raise _FieldError(path, _("contains an unpaired surrogate")) from None
+            raise FieldPathError(_("contains an unpaired surrogate")) from None
     if not isinstance(value, bytes):
-        raise _type_error(path, value, "string")
+        raise _type_error(value, "string")
     out += _LENGTH.pack(len(value))
     out += value
 
 
-def _read_string(reader: _Reader, _path: str) -> object:
+def _read_string(reader: _Reader) -> object:
     return str(reader.read(reader.read_length()), "utf-8", "replace")
 
 
@@ -354,32 +340,32 @@ def _array_kind(kind: FieldKind, length: int | None) -> FieldKind:
     name = f"{kind.name}[{'' if length is None else length}]"
     if kind.name in _BYTE_TYPES:
         write = _bytes_writer(name, length)
-        read: Callable[[_Reader, str, int], object] = _read_bytes
+        read: Callable[[_Reader, int], object] = _read_bytes
     else:
         write, read = _list_writer(name, kind, length), _list_reader(kind)
     if length is None:
 
-        def read_all(reader: _Reader, path: str) -> object:
-            return read(reader, path, reader.read_length())
+        def read_all(reader: _Reader) -> object:
+            return read(reader, reader.read_length())
 
         return FieldKind(name, write, read_all, 4, element=kind)
 
-    def read_fixed(reader: _Reader, path: str) -> object:
-        return read(reader, path, length)
+    def read_fixed(reader: _Reader) -> object:
+        return read(reader, length)
 
     return FieldKind(name, write, read_fixed, length * kind.min_bytes, element=kind, length=length)
 
 
-def _bytes_writer(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
-    def write(value: object, path: str, out: bytearray) -> None:
-        data = _to_bytes(value, path, name)
-        _write_length(len(data), length, path, out)
+def _bytes_writer(name: str, length: int | None) -> Callable[[object, bytearray], None]:
+    def write(value: object, out: bytearray) -> None:
+        data = _to_bytes(value, name)
+        _write_length(len(data), length, out)
         out += data
 
     return write
 
 
-def _to_bytes(value: object, path: str, name: str) -> bytes | bytearray | memoryview:
+def _to_bytes(value: object, name: str) -> bytes | bytearray | memoryview:
     if isinstance(value, bytes | bytearray):
         return value
     if isinstance(value, memoryview):
@@ -391,26 +377,26 @@ def _to_bytes(value: object, path: str, name: str) -> bytes | bytearray | memory
             return bytes(as_bytes())
         value = to_list()
     if not isinstance(value, Sequence) or isinstance(value, str):
-        raise _type_error(path, value, name)
+        raise _type_error(value, name)
     try:
         return bytes(value)
     except (TypeError, ValueError):
-        raise _FieldError(path, _("contains a value that isn't an integer from 0 to 255")) from None
+        raise FieldPathError(_("contains a value that isn't an integer from 0 to 255")) from None
 
 
-def _read_bytes(reader: _Reader, _path: str, count: int) -> object:
+def _read_bytes(reader: _Reader, count: int) -> object:
     return bytes(reader.read(count))
 
 
-def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
+def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[object, bytearray], None]:
     format_char = _FORMATS.get(kind.name, "") if kind.name != "bool" else ""
 
-    def write(value: object, path: str, out: bytearray) -> None:
+    def write(value: object, out: bytearray) -> None:
         to_list = getattr(value, "tolist", None)
         values = to_list() if callable(to_list) else value
         if not isinstance(values, Sequence) or isinstance(values, str | bytes | bytearray):
-            raise _type_error(path, value, name)
-        _write_length(len(values), length, path, out)
+            raise _type_error(value, name)
+        _write_length(len(values), length, out)
         if format_char and not any(type(item) is bool for item in values):
             try:
                 out += struct.pack(f"<{len(values)}{format_char}", *values)
@@ -418,76 +404,77 @@ def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
             except (struct.error, OverflowError, TypeError, ValueError):
                 pass  # encode one by one to find the invalid item
         for index, item in enumerate(values):
-            kind.write(item, f"{path}[{index}]", out)
+            try:
+                kind.write(item, out)
+            except FieldPathError as error:
+                raise error.within(index) from None
 
     return write
 
 
-def _list_reader(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
+def _list_reader(kind: FieldKind) -> Callable[[_Reader, int], object]:
     format_char = _FORMATS.get(kind.name, "")
     size = struct.calcsize(f"<{format_char}")
 
-    def read(reader: _Reader, path: str, count: int) -> object:
+    def read(reader: _Reader, count: int) -> object:
         if count * kind.min_bytes > reader.bytes_left:
-            raise _FieldError(
-                path, _("has {count} elements, more than the data can hold").format(count=count)
-            )
+            raise FieldPathError(_("has {count} elements, more than the data can hold").format(count=count))
         if format_char:
             return list(struct.unpack(f"<{count}{format_char}", reader.read(count * size)))
-        return [kind.read(reader, path) for _number in range(count)]
+        return [kind.read(reader) for _number in range(count)]
 
     return read
 
 
-def _write_length(count: int, length: int | None, path: str, out: bytearray) -> None:
+def _write_length(count: int, length: int | None, out: bytearray) -> None:
     if length is None:
         if count > 0xFFFFFFFF:
-            raise _FieldError(path, _("is too long"))
+            raise FieldPathError(_("is too long"))
         out += _LENGTH.pack(count)
     elif count != length:
-        raise _FieldError(
-            path, _("has {count} elements; expected {length}").format(count=count, length=length)
-        )
+        raise FieldPathError(_("has {count} elements; expected {length}").format(count=count, length=length))
 
 
 def _nested_kind(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
-    def write(value: object, path: str, out: bytearray) -> None:
-        _write_fields(name, fields, value, path, out)
+    def write(value: object, out: bytearray) -> None:
+        if not isinstance(value, Mapping):
+            raise _type_error(value, name)
+        _write_fields(fields, value, out)
 
-    def read(reader: _Reader, path: str) -> object:
-        return _read_fields(fields, reader, path)
+    def read(reader: _Reader) -> object:
+        return _read_fields(fields, reader)
 
     return FieldKind(name, write, read, sum(each.kind.min_bytes for each in fields), fields)
 
 
 def _write_fields(
-    name: str, fields: tuple[DefinitionField, ...], payload: object, path: str, out: bytearray
+    fields: tuple[DefinitionField, ...], payload: Mapping[object, object], out: bytearray
 ) -> None:
-    if not isinstance(payload, Mapping):
-        if not path:
-            raise _FieldError("", _not_a_map_reason(fields))
-        raise _type_error(path, payload, name)
     for field in fields:
-        if field.name in payload:
-            field.kind.write(payload[field.name], f"{path}.{field.name}" if path else field.name, out)
-        else:
+        if field.name not in payload:
             out += bytes(field.kind.min_bytes)  # zero and empty values are zero bytes in every type
+            continue
+        try:
+            field.kind.write(payload[field.name], out)
+        except FieldPathError as error:
+            raise error.within(field.name) from None
     if len(payload) > len(fields) or not payload.keys() <= {field.name for field in fields}:
         names = tuple(field.name for field in fields)
-        raise _unknown_field_error(path, next(key for key in payload if key not in names), names)
+        raise _unknown_field_error(next(key for key in payload if key not in names), names)
 
 
-def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str) -> dict[str, object]:
+def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader) -> dict[str, object]:
     values: dict[str, object] = {}
     reader.messages_left -= 1
     if reader.messages_left < 0:
-        raise _FieldError(path, _("contains more nested messages than the data can hold"))
+        raise FieldPathError(_("contains more nested messages than the data can hold"))
     for field in fields:
-        field_path = f"{path}.{field.name}" if path else field.name
         try:
-            values[field.name] = field.kind.read(reader, field_path)
+            values[field.name] = field.kind.read(reader)
+        except FieldPathError as error:
+            raise error.within(field.name) from None
         except struct.error:
-            raise _FieldError(field_path, _("is truncated")) from None
+            raise FieldPathError(_("is truncated"), field.name) from None
     return values
 
 
@@ -504,20 +491,17 @@ def _to_integer(value: object) -> int | None:
     return None if index is None else int(index(value))
 
 
-def _not_a_map_reason(fields: tuple[DefinitionField, ...]) -> str:
-    names = ", ".join(f"'{each.name}'" for each in fields[:6])
-    return _("publish a 'dict' with the fields {names}").format(names=names or "{}")
+def _type_error(value: object, name: str) -> FieldPathError:
+    return FieldPathError(_("is {value}; expected a '{name}'").format(value=_describe(value), name=name))
 
 
-def _type_error(path: str, value: object, name: str) -> _FieldError:
-    return _FieldError(path, _("is {value}; expected a '{name}'").format(value=_describe(value), name=name))
+def _range_error(value: object, name: str) -> FieldPathError:
+    return FieldPathError(_("is {value}, which isn't a '{name}'").format(value=_describe(value), name=name))
 
 
-def _unknown_field_error(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
-    field_path = f"{path}.{key}" if path else str(key)
-    return _FieldError(
-        escaped(shortened(field_path, 200)),
-        _("doesn't exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)),
+def _unknown_field_error(key: object, names: tuple[str, ...]) -> FieldPathError:
+    return FieldPathError(
+        _("doesn't exist; {did_you_mean}").format(did_you_mean=did_you_mean(str(key), names)), str(key)
     )
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from nep.i18n import _
-from nep.text import escaped
+from nep.messages.fields import FieldPathError, wrong_type_error
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
 PLACEHOLDER_FIELD = "structure_needs_at_least_one_member"
@@ -48,15 +48,6 @@ class RosField:
     length: int | None = None
     size: int = 0
     max_text_bytes: int = 0
-
-
-class RosFieldError(Exception):
-    """The value at `path` is invalid."""
-
-    def __init__(self, path: str, reason: str) -> None:
-        self.path = path
-        self.reason = f"'{path}' {reason}" if path else reason
-        super().__init__(self.reason)
 
 
 class TypeRegistry(Protocol):
@@ -105,49 +96,38 @@ def _field(name: str, description: Any) -> RosField:  # noqa: ANN401 - nested pa
 # ---- maps to messages
 
 
-def to_message(types: TypeRegistry, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - not typed
+def to_message(types: TypeRegistry, name: str, payload: object) -> Any:  # noqa: ANN401 - not typed
     """Convert a map to a message object of rosbags; missing fields are zero, empty or False.
 
     Args:
         types: Registry of message types.
         name: Name of the type.
         payload: Map to convert.
-        path: Field path of `payload`, for error messages.
 
     Raises:
-        RosFieldError: A value is invalid.
+        FieldPathError: A value is invalid.
     """
     if not isinstance(payload, Mapping):
-        raise (
-            RosFieldError(
-                path, _("is a '{kind}'; expected a map of the fields").format(kind=type(payload).__name__)
-            )
-            if path
-            else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
-        )
+        raise FieldPathError(_("publish a map of the fields of '{name}'").format(name=name))
     fields = {field.name: field for field in types.fields(name) if field.name != PLACEHOLDER_FIELD}
     for key in payload:
         if key not in fields:
-            raise RosFieldError(
-                _join_path(path, escaped(str(key)[:100])),
+            raise FieldPathError(
                 _("isn't a field of '{name}'; its fields: {fields}").format(
                     name=name, fields=", ".join(f"'{field}'" for field in fields) or _("none")
                 ),
+                str(key),
             )
     values = {}
     for field in types.fields(name):
-        field_path = _join_path(path, field.name)
-        is_given = field.name in payload
-        values[field.name] = (
-            _convert_value(types, field, payload[field.name], field_path)
-            if is_given
-            else _default_value(types, field)
-        )
+        if field.name not in payload:
+            values[field.name] = _default_value(types, field)
+            continue
+        try:
+            values[field.name] = _convert_value(types, field, payload[field.name])
+        except FieldPathError as error:
+            raise error.within(field.name) from None
     return types.message_class(name)(**values)
-
-
-def _join_path(path: str, name: str) -> str:
-    return f"{path}.{name}" if path else name
 
 
 def _default_value(types: TypeRegistry, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
@@ -164,42 +144,41 @@ def _default_value(types: TypeRegistry, field: RosField) -> Any:  # noqa: ANN401
 _NUMERIC_DEFAULTS: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
 
 
-def _convert_value(types: TypeRegistry, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - depends on the field
+def _convert_value(types: TypeRegistry, field: RosField, value: object) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is not None:
-        return _convert_items(types, field, value, path)
-    if field.is_message:
-        return to_message(types, field.kind, value, path)
-    return _convert_scalar(field, value, path)
+        return _convert_items(types, field, value)
+    if not field.is_message:
+        return _convert_scalar(field, value)
+    if not isinstance(value, Mapping):
+        raise wrong_type_error(value, _("a map of the fields"))
+    return to_message(types, field.kind, value)
 
 
-def _convert_scalar(field: RosField, value: object, path: str) -> str | bool | int | float:
+def _convert_scalar(field: RosField, value: object) -> str | bool | int | float:
     if field.kind == "string":
-        return _convert_text(field, value, path)
+        return _convert_text(field, value)
     value = _unwrap_scalar(value)
     if field.kind == "bool":
         if not isinstance(value, bool):
-            raise RosFieldError(
-                path, _("is a '{kind}'; expected True or False").format(kind=_type_name(value))
-            )
+            raise wrong_type_error(value, _("True or False"))
         return value
     if field.kind in _FLOAT_TYPES:
-        return _convert_float(field, value, path)
+        return _convert_float(field, value)
     low, high = _INTEGER_RANGES[field.kind]
     if not isinstance(value, int) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; expected a whole number").format(kind=_type_name(value)))
+        raise wrong_type_error(value, _("a whole number"))
     if not low <= value <= high:
-        raise RosFieldError(
-            path,
+        raise FieldPathError(
             _("must be from {least} to {most}, the range of '{kind}'").format(
                 least=low, most=high, kind=field.kind
-            ),
+            )
         )
     return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags stores bytes as signed
 
 
-def _convert_float(field: RosField, value: object, path: str) -> float:
+def _convert_float(field: RosField, value: object) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; expected a number").format(kind=_type_name(value)))
+        raise wrong_type_error(value, _("a number"))
     try:
         number = float(value)
     except OverflowError:
@@ -208,66 +187,71 @@ def _convert_float(field: RosField, value: object, path: str) -> float:
     else:
         is_in_range = field.kind != "float32" or math.isinf(number) or not abs(number) >= _FLOAT32_OVERFLOW
     if not is_in_range:
-        raise RosFieldError(path, _("is too large for '{kind}'").format(kind=field.kind))
+        raise FieldPathError(_("is too large for '{kind}'").format(kind=field.kind))
     return number
 
 
-def _convert_text(field: RosField, value: object, path: str) -> str:
+def _convert_text(field: RosField, value: object) -> str:
     if not isinstance(value, str):
-        raise RosFieldError(path, _("is a '{kind}'; expected a 'str'").format(kind=_type_name(value)))
+        raise wrong_type_error(value, _("a '{name}'").format(name="str"))
     if "\0" in value:
-        raise RosFieldError(path, _("contains a null character, which isn't allowed in ROS strings"))
+        raise FieldPathError(_("contains a null character, which isn't allowed in ROS strings"))
     try:
         size = len(value.encode())
     except UnicodeEncodeError:
-        raise RosFieldError(path, _("contains an unpaired surrogate")) from None
+        raise FieldPathError(_("contains an unpaired surrogate")) from None
     if field.max_text_bytes and size > field.max_text_bytes:
-        raise RosFieldError(
-            path,
-            _("is {size} bytes; at most {most} are allowed").format(size=size, most=field.max_text_bytes),
+        raise FieldPathError(
+            _("is {size} bytes; at most {most} are allowed").format(size=size, most=field.max_text_bytes)
         )
     return value
 
 
-def _convert_items(types: TypeRegistry, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - a list or an array
+def _convert_items(types: TypeRegistry, field: RosField, value: object) -> Any:  # noqa: ANN401 - a list or an array
     if isinstance(value, str) or not (
         isinstance(value, Sequence | bytes | bytearray | memoryview) or hasattr(value, "__array__")
     ):
-        raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
+        raise wrong_type_error(value, _("a list"))
     dimensions = getattr(value, "ndim", 1)
     if dimensions != 1:
-        raise RosFieldError(
-            path,
+        raise FieldPathError(
             _("has {count} dimensions; use one dimension, for example with 'ravel()'").format(
                 count=dimensions
-            ),
+            )
         )
     if field.is_message or field.kind == "string":
         item_field = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
-        items: Any = [
-            _convert_value(types, item_field, each, f"{path}[{index}]")
-            for index, each in enumerate(list(value))  # type: ignore[call-overload]
-        ]
+        items: Any = _convert_each(list(value), lambda item: _convert_value(types, item_field, item))  # type: ignore[call-overload]
     else:
-        items = _convert_array(field, value, path)
+        items = _convert_array(field, value)
     if field.length is not None and field.length >= 0 and len(items) != field.length:
-        raise RosFieldError(
-            path, _("has {count} items; expected {length}").format(count=len(items), length=field.length)
+        raise FieldPathError(
+            _("has {count} items; expected {length}").format(count=len(items), length=field.length)
         )
     if field.size and len(items) > field.size:
-        raise RosFieldError(
-            path, _("has {count} items; at most {most} are allowed").format(count=len(items), most=field.size)
+        raise FieldPathError(
+            _("has {count} items; at most {most} are allowed").format(count=len(items), most=field.size)
         )
     return items
 
 
-def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
+def _convert_each(values: list[Any], convert: Callable[[object], Any]) -> list[Any]:
+    items = []
+    for index, value in enumerate(values):
+        try:
+            items.append(convert(value))
+        except FieldPathError as error:
+            raise error.within(index) from None
+    return items
+
+
+def _convert_array(field: RosField, value: Any) -> Any:  # noqa: ANN401 - an array of numpy
     # Validates the whole array at once; item by item only to find the path of an invalid one.
     np = _import_numpy()
     dtype = np.dtype(_NUMPY_DTYPES[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
         if field.kind not in _OCTET_TYPES:
-            raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
+            raise wrong_type_error(value, _("a list"))
         return np.frombuffer(bytes(value), np.uint8)
     try:
         array = np.asarray(value)
@@ -276,8 +260,7 @@ def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN4
     if array.ndim == 1 and (not array.size or _is_convertible(array, field, dtype)):
         return np.ascontiguousarray(array.astype(dtype))
     item_field = RosField(field.name, "uint8" if field.kind in _OCTET_TYPES else field.kind, is_message=False)
-    items = [_convert_scalar(item_field, each, f"{path}[{index}]") for index, each in enumerate(list(value))]
-    return np.array(items, dtype)
+    return np.array(_convert_each(list(value), lambda item: _convert_scalar(item_field, item)), dtype)
 
 
 def _is_convertible(array: Any, field: RosField, dtype: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
@@ -301,10 +284,6 @@ def _unwrap_scalar(value: object) -> object:
     if isinstance(value, bool | int | float | str) or getattr(value, "shape", None) != ():
         return value
     return value.item() if hasattr(value, "item") else value
-
-
-def _type_name(value: object) -> str:
-    return type(value).__name__
 
 
 # ---- messages to maps
