@@ -77,6 +77,7 @@ NAN_WARNING_INTERVAL_S = 10.0
 """Minimum interval in seconds between two warnings about NaN on the same topic."""
 _logger = logging.getLogger("nep")
 _MAX_DEPTH = 100
+_MAX_NUMBER = 255
 NULL = b"null"
 """JSON text of None.
 
@@ -290,9 +291,15 @@ CODECS: Mapping[str, Codec] = _codecs
 def register(codec: Codec, *aliases: str) -> Codec:
     """Add a codec for the message types with its name or an alias; return it.
 
-    Raises `ValueError` if a name or the number is taken. All programs of a network must register the codec.
+    Register the codec before nodes use it. A program that hasn't registered it rejects its messages and
+    counts them.
+
+    Raises:
+        ValueError: A name or the number is taken, or the number isn't 1 to 255.
     """
     names = (codec.name, *aliases)
+    if not 1 <= codec.number <= _MAX_NUMBER:
+        raise ValueError(f"the number of the codec '{codec.name}' is {codec.number}; use 1 to {_MAX_NUMBER}")
     if codec.number in _codecs_by_number or any(name in _codecs or name in _aliases for name in names):
         raise ValueError(f"the codec '{codec.name}' ({codec.number}) has the name or number of another one")
     _codecs[codec.name] = _codecs_by_number[codec.number] = codec

@@ -157,6 +157,6 @@ def _split_batch(message: ParsedMessage) -> list[ParsedMessage]:
 def unknown_codec_error(number: int) -> WireError:
     """Return the error for a message with an unknown codec number."""
     return WireError(
-        _("unknown codec {codec}; update nep").format(codec=number),
+        _("unknown codec {codec}; update nep, or register the codec in this program").format(codec=number),
         code="codec",
     )
