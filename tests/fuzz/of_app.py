@@ -22,7 +22,7 @@ if IS_THERE:  # optional: not dependencies of the library
     from app.blocks.model.workspace import parse_workspace
     from app.blocks.runtime.variables import VariableValue
     from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject
-    from app.core.projects.file_format import parse_file, write_file
+    from app.core.projects.file_format import encode_file, parse_file, write_file
     from app.core.robots.voices import RobotSound
     from app.core.storage.settings import Settings
     from app.errors import DescriptionError, DocumentError
@@ -35,6 +35,9 @@ if IS_THERE:  # optional: not dependencies of the library
             yield path.read_bytes()
         workspace = {"blocks": {"blocks": []}}
         yield orjson.dumps({"format": "nep-behaviour", "version": 1, "name": "x", "workspace": workspace})
+        greet = {"id": "greet", "name": "Greet", "kind": "goal", "workspace": workspace}
+        pages = {"workspace": workspace, "pages": [greet]}
+        yield orjson.dumps({"format": "nep-behaviour", "version": 2, "name": "x"} | pages)
 
     @TARGETS.add(
         DocumentError,
@@ -44,6 +47,8 @@ if IS_THERE:  # optional: not dependencies of the library
             b'"version":1',
             b'"workspace":',
             b'"blocks":',
+            b'"pages":',
+            b'"kind":"module"',
             b'"name":',
             b'"robots":',
             b"[[[[",
@@ -53,11 +58,12 @@ if IS_THERE:  # optional: not dependencies of the library
     def files_of_behaviours(data: bytes) -> None:
         made = parse_file(data, Path("a.nepb"))
         assert isinstance(made, Project)
-        parse_workspace(made.workspace)
+        for page in made.pages:
+            parse_workspace(page.workspace.blocks)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "a.nepb"
             write_file(path, made)
-            assert repr(parse_file(path.read_bytes(), path)) == repr(made)
+            assert encode_file(parse_file(path.read_bytes(), path)) == path.read_bytes()
 
     def descriptions() -> Iterator[bytes]:
         for path in sorted((ROOT / "resources" / "robots").glob("*.tm.jsonld")):
