@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -119,6 +120,15 @@ class Studio(Person):
                 except psutil.Error:
                     continue
                 if ours:
+                    found.append(process)
+        return found
+
+    def programs(self) -> list[psutil.Process]:
+        """Return the processes of running behaviours: the spare process has no connections."""
+        found = []
+        for process in self.children("app.blocks.runtime.child"):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                if process.net_connections():
                     found.append(process)
         return found
 

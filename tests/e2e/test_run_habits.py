@@ -14,12 +14,11 @@ from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(240)
 LATER = "Your changes take effect at the next run"
-CHILD = "app.blocks.runtime.child"
 
 
 def programs(studio: Studio) -> list[int]:
     """Return the process ids of the running programs."""
-    return [each.pid for each in studio.children(CHILD)]
+    return [each.pid for each in studio.programs()]
 
 
 def only_another(studio: Studio, *before: int) -> list[int]:

@@ -48,7 +48,7 @@ def stands_still(studio: Studio) -> None:
         heard = [states.receive(30.0).payload for _ in range(4)]
     assert not any(state["moving"] for state in heard)
     assert len({state["theta_deg"] for state in heard}) == 1
-    until(lambda: not studio.children("app.blocks.runtime.child"), "the program's process has ended")
+    until(lambda: not studio.programs(), "the program's process has ended")
     assert not studio.outlined("running")
 
 
@@ -227,7 +227,7 @@ def stops_of(messages: list[nep.Message]) -> list[str]:
 
 
 def test_stop_ends_a_hung_program(turning: Studio) -> None:
-    (program,) = turning.children("app.blocks.runtime.child")
+    (program,) = turning.programs()
     program.suspend()
     turning.screen.click(*middle(turning.find(kind="StopButton")["rect"]))
     stands_still(turning)
@@ -235,7 +235,7 @@ def test_stop_ends_a_hung_program(turning: Studio) -> None:
 
 
 def test_robot_stops_when_its_program_is_killed(turning: Studio) -> None:
-    (program,) = turning.children("app.blocks.runtime.child")
+    (program,) = turning.programs()
     program.kill()
     stands_still(turning)
     turning.says("The behaviour stopped unexpectedly.")

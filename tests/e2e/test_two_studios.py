@@ -41,7 +41,7 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     second.choose("View", "Developer layout")
     second.find("Topics")
     second.screen.key("F12")
-    until(lambda: not first.children("app.blocks.runtime.child"), "the first Studio's program has ended", 10)
+    until(lambda: not first.programs(), "the first Studio's program has ended", 10)
     with nep.node("listener", master=first.master) as node:
         states = node.new_sub("/Pepper/state", "json")
         heard = [states.receive(30.0).payload for _ in range(3)]
