@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from app.core.projects.file_format import VERSION
 from app.core.reports import studio_versions
 from app.core.reports.crash import Crash
 from app.core.reports.crash_reports import ALERT_ID, CrashReports
@@ -56,7 +57,7 @@ def test_clean_exit_offers_no_crash_report(session: Session, home: Path) -> None
 
 def test_work_and_settings_of_a_newer_studio_are_reported(pseudo: None, home: Path) -> None:
     (home / "journal").mkdir(parents=True)
-    entry = {"format": 2, "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine"}
+    entry = {"format": VERSION + 1, "pid": 2**22 + 7, "born_s": 1.0, "name": "Mine"}
     (home / "journal" / "a.json").write_text(json.dumps(entry))
     (home / "settings.json").write_text(json.dumps({"format": 7}))
     session = Session(Settings(home), journal_folder=home / "journal", start_processes=False)

@@ -15,6 +15,7 @@ from PySide6.QtGui import QFont, QFontInfo
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from app.blocks.model.project import Project
 from app.core.projects.journal import Journal
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -144,7 +145,7 @@ def test_widgets_of_the_first_paint_use_the_bundled_fonts(
     application.setStyleSheet("")
     application.setFont(QFont("DejaVu Serif"))  # as set by the system, before our style is applied
     journal = Journal(tmp_path / "journal")
-    journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
+    journal.write(Project.of_blocks("Walk", {"blocks": {"blocks": [{"type": "x", "id": "a"}]}}), None)
     monkeypatch.setattr("app.core.projects.journal._is_running", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
     window = make_window(Session(Settings(tmp_path), start_processes=False), Options())
