@@ -152,7 +152,8 @@ class LiveWorld(World):
         self.networks.update_ages(now, now_ns)
 
     def close(self) -> None:
-        """Leave all networks."""
+        """Leave all networks, and release the messages of the last tick, which may be in shared memory."""
+        self._all_batches, self.batches = {}, {}
         for close in (self.images.close, self.source.close, self.networks.close):
             with log_errors("leave the network"):
                 close()
