@@ -302,7 +302,7 @@ class Network:
         target = StopTarget(robot, None if owner is None else Identity(owner))
         with self._stops_changed:
             request = self._stops.start(target, self._view, time.monotonic())
-            request.is_over = not self._is_ending  # nobody waits for the replies to a pause
+            request.is_over = not self._is_ending  # a pause doesn't wait for replies
         self._send(robot, dialect_of(robot).stop(robot, request.id, self._program))
         return request
 

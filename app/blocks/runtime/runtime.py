@@ -245,7 +245,7 @@ class Runtime:
         Args:
             group: Group of scripts.
             restarts_blocks: True to run an interrupted wait or action from its beginning after
-                `resume_group`, False to run what is left of it.
+                `resume_group`, False to continue it.
         """
         group.hold(restarts_blocks=restarts_blocks)
         self._require_link().hold_motions(group)

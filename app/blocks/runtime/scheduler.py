@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 from app.blocks.runtime.trace import (
@@ -72,7 +73,7 @@ class ScriptGroup:
         name: Name of the group.
         ends_program: True if an error in the group ends the program, False if it ends only the group.
         restarts_blocks: True if a resumed script runs its interrupted wait or action from the beginning,
-            False if it runs what is left.
+            False if it continues.
         error: Error that ended the group, or None.
     """
 
@@ -108,7 +109,7 @@ class ScriptGroup:
 
         Args:
             restarts_blocks: True to run an interrupted wait or action from its beginning after `resume`,
-                False to run what is left of it.
+                False to continue it.
         """
         self._scheduler.hold_group(self, restarts_blocks=restarts_blocks)
 
@@ -403,21 +404,25 @@ class Scheduler:
         """
         script = self._current_script()
         with self._lock:
-            if script.block is not None:
-                record = BlockInterrupted(self.trace.time_s(), script.number, script.block, cause)
-                self.trace.add(record, len(script.block))
+            self._record_locked(script, partial(BlockInterrupted, cause=cause))
 
     def record_skip(self, cause: SkipCause) -> None:
-        """Record that the current block of the calling script, or what was left of it, was skipped.
+        """Record that the current block of the calling script, or its remainder, was skipped.
 
         Args:
             cause: Why it was skipped.
         """
         script = self._current_script()
         with self._lock:
-            if script.block is not None:
-                record = BlockSkipped(self.trace.time_s(), script.number, script.block, cause)
-                self.trace.add(record, len(script.block))
+            self._record_locked(script, partial(BlockSkipped, cause=cause))
+
+    def _record_locked(
+        self, script: Script, create: Callable[[float, int, str], AnyRecord], text_length: int = 0
+    ) -> None:
+        # `create` gets the time, the number of the script and the id of its current block.
+        if script.block is not None:
+            record = create(self.trace.time_s(), script.number, script.block)
+            self.trace.add(record, len(script.block) + text_length)
 
     def _record_end_locked(self, script: Script, cause: EndCause | None = None, message: str = "") -> None:
         if script.block is None:
@@ -426,27 +431,24 @@ class Scheduler:
             is_canceled = script.is_ending or script.group.has_ended
             cause = "canceled" if is_canceled else "stopped" if self._is_stopping else ""
         message = message[:MAX_TEXT_LENGTH]
-        record = BlockEnded(self.trace.time_s(), script.number, script.block, cause, message)
-        self.trace.add(record, len(script.block) + len(message))
+        self._record_locked(script, partial(BlockEnded, cause=cause, text=message), len(message))
         script.block, script.is_interrupted, script.must_restart = None, False, False
 
     def _record_wait_locked(self, script: Script, cause: WaitCause) -> None:
         if script.block is not None and script.wait_cause != cause:
             script.wait_cause = cause
-            record = BlockWaiting(self.trace.time_s(), script.number, script.block, cause)
-            self.trace.add(record, len(script.block))
+            self._record_locked(script, partial(BlockWaiting, cause=cause))
 
     def _record_suspension_locked(self, script: Script) -> None:
         if script.block is not None and not script.is_interrupted:
             script.is_interrupted = True
             cause: InterruptionCause = "hold" if script.group.is_held else "pause"
-            record = BlockInterrupted(self.trace.time_s(), script.number, script.block, cause)
-            self.trace.add(record, len(script.block))
+            self._record_locked(script, partial(BlockInterrupted, cause=cause))
 
     def _record_resumption_locked(self, script: Script) -> None:
         if script.block is not None and script.is_interrupted:
             script.is_interrupted = False
-            self.trace.add(BlockResumed(self.trace.time_s(), script.number, script.block), len(script.block))
+            self._record_locked(script, BlockResumed)
 
     # ---- waiting: other scripts run meanwhile
 
@@ -534,7 +536,7 @@ class Scheduler:
     def must_restart_block(self) -> bool:
         """Return True if the suspended block of the calling script must run again from its beginning.
 
-        False means that only what is left of it must run; see `ScriptGroup.hold`.
+        False means that it continues where it was suspended; see `ScriptGroup.hold`.
         """
         return self._current_script().must_restart
 

@@ -28,7 +28,7 @@ that of another script, or the robot canceled the action."""
 EndCause = Literal["", "failed", "stopped", "canceled"]
 """Why a script ended: "" at its end, an error, Stop, or another script or event that ended it."""
 SkipCause = Literal["unknown_remainder"]
-"""Why a block, or what is left of it, was skipped: the robot doesn't report what is left after a pause."""
+"""Why a block or its remainder was skipped: after a pause, the robot doesn't report how much remains."""
 
 
 class TraceRecord(Struct, frozen=True, array_like=True, tag=True, gc=False):
@@ -112,7 +112,7 @@ class BlockResumed(TraceRecord, frozen=True, array_like=True, tag="resumed", gc=
 
 
 class BlockSkipped(TraceRecord, frozen=True, array_like=True, tag="skipped", gc=False):
-    """Block, or what was left of it, that was not executed.
+    """Block that was not executed, or not executed to its end.
 
     Attributes:
         script: Number of the script.

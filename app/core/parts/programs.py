@@ -104,7 +104,7 @@ class CurrentRun(SessionPart):
 class RepeatedStops(SessionPart):
     """Second Stop of robots that have finished an action after the first.
 
-    This is a part of its own, so that no failure of the run prevents it.
+    A failing run doesn't prevent it, because it is a separate part.
     """
 
     task = lazy("stop robots again")
