@@ -7,11 +7,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
 
 from app.blocks.runtime.events import ProgramEnded, ProgramRunning
+from app.core.parts.programs import SPARE_CHILD_DELAY_S, SpareProgram
 from app.core.run.child_process import ChildProcess, child_command, source_root
 from app.core.run.runner import Runner
 from app.core.run.spare_child import SpareChild
@@ -136,3 +138,40 @@ def test_stop_ends_a_run_whose_spare_is_still_importing(spare: Make) -> None:
     runner.stop()
     assert heard.until(ProgramEnded).is_ok
     runner.close()
+
+
+class CountedSpare:
+    """Spare child that counts the requests to start one."""
+
+    requests = 0
+
+    def prepare_in_background(self) -> None:
+        self.requests += 1
+
+
+class OneProject:
+    """Open projects whose current one has blocks, or none."""
+
+    def __init__(self, *, has_blocks: bool) -> None:
+        self.current = SimpleNamespace(has_blocks=has_blocks)
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "has_blocks", "is_enabled", "requests"),
+    [
+        (SPARE_CHILD_DELAY_S, True, True, 1),
+        (SPARE_CHILD_DELAY_S - 0.1, True, True, 0),
+        (SPARE_CHILD_DELAY_S, False, True, 0),
+        (SPARE_CHILD_DELAY_S, True, False, 0),
+    ],
+)
+def test_session_requests_a_spare_after_a_delay_if_the_behaviour_has_blocks(
+    elapsed_s: float, has_blocks: bool, is_enabled: bool, requests: int
+) -> None:
+    spare, now_s = CountedSpare(), [100.0]
+    part = SpareProgram(spare, OneProject(has_blocks=has_blocks), lambda: now_s[0], is_enabled=is_enabled)
+    part.check()  # before the start of the session
+    part.start()
+    now_s[0] += elapsed_s
+    part.check()
+    assert spare.requests == requests
