@@ -23,6 +23,7 @@ AdapterStarter = Callable[[str], AdapterStreams]
 """Function that starts an adapter, given the address of the master."""
 _POLL_MS = 2
 _REPLY_TIMEOUT_S = 15.0
+_BYE_INTERVAL_S = 0.05
 
 
 class Bench:
@@ -319,6 +320,27 @@ class Bench:
     def register_publisher(self, publisher: ScriptedPublisher) -> None:
         """Register a publisher of the tester at the master."""
         self.master.submit(AddPublisher(publisher.node, publisher.record))
+
+    def send_byes(self, publisher: ScriptedPublisher) -> None:
+        """Send byes until the adapter has disconnected, as a closing publisher does.
+
+        The master still lists the publisher, so a renewal may make the adapter connect again; the next bye
+        then ends that connection too.
+
+        Raises:
+            BrokenRuleError: The adapter is still connected after 5 s.
+        """
+        next_byes = 0.0
+
+        def has_disconnected() -> bool:
+            nonlocal next_byes
+            now = time.monotonic()
+            if publisher.hellos and now >= next_byes:
+                next_byes = now + _BYE_INTERVAL_S
+                publisher.send_byes()
+            return not publisher.hellos
+
+        self.require(has_disconnected, "disconnect")
 
     def create_subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None

@@ -54,8 +54,7 @@ def _several_publishers(bench: Bench) -> None:
         lambda: {each["publisher"] for each in bench.events(sub)} == {str(first.id), str(second.id)},
         "message",
     )
-    first.send_byes()
-    bench.require(lambda: not first.hellos, "disconnect")
+    bench.send_byes(first)
     _expect_next(bench, second, sub)
 
 
