@@ -24,7 +24,7 @@ from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
 from app.core.network.source import GraphReceived
-from app.ui.panels.graph.panel import GraphPanel
+from app.ui.panels.watch.graph.panel import GraphPanel
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 SHARE, LATE_MS = 0.05, 100.0

@@ -21,7 +21,7 @@ from contextlib import ExitStack
 import numpy as np
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
-from app.ui.panels.plot.panel import PlotPanel
+from app.ui.panels.watch.plot.panel import PlotPanel
 
 SHARE, SETTLE_S = 0.25, 1.5
 CURVES, HZ, BEFORE_S = 10, 1000, 60

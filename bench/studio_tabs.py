@@ -27,7 +27,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.ui.blockly.scheme import register_scheme
 from app.ui.blockly.view import BlocklyView
-from app.ui.panels.behaviour.tab import BehaviourTab
+from app.ui.panels.build.behaviour.tab import BehaviourTab
 from bench.blocks import TRUSTED
 from bench.blocks_editor import program
 from bench.studio_window import Studio, network, run_for, studio, until

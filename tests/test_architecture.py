@@ -164,7 +164,7 @@ def test_imports_inside_functions_are_of_heavy_packages_only() -> None:
     heavy_of_ours = {
         "app.ui.blockly.view",
         "app.ui.blockly.view.BlocklyView",
-        "app.ui.panels.plot.panel.PlotPanel",
+        "app.ui.panels.watch.plot.panel.PlotPanel",
         "nep.backends.ros.transport.RospyTransport",
     }
     only_on_some_systems = {"fcntl", "msvcrt", "resource", "winreg"}

@@ -15,7 +15,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui.panels.robots.controls.colour import ColourSwatches
+from app.ui.panels.robots.robots.controls.colour import ColourSwatches
 from app.ui.shell.bars.banner import Banner
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme

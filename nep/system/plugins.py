@@ -78,15 +78,28 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
         PluginsMissingError: The package has no plug-ins (left out of a frozen program).
         TypeError: A module binds an object of another type.
     """
-    plugins = dict(discover_own(package, attribute, kind))
-    for point in metadata.entry_points(group=package):
+    own = discover_own(package, attribute, kind)
+    return {**installed_plugins(package, kind), **own}
+
+
+def installed_plugins(group: str, kind: type[T]) -> Mapping[str, T]:
+    """Return the plug-ins of other distributions by name: objects of an entry point group.
+
+    Entry points that fail to load are logged and ignored.
+
+    Args:
+        group: Name of the entry point group.
+        kind: Required class of the objects.
+    """
+    plugins: dict[str, T] = {}
+    for point in metadata.entry_points(group=group):
         try:
             plugin = point.load()
         except (Exception, SystemExit):
-            _logger.exception("can't load the plug-in '%s' of '%s'", point.name, package)
+            _logger.exception("can't load the plug-in '%s' of '%s'", point.name, group)
             continue
         if isinstance(plugin, kind):
             plugins.setdefault(plugin.name, plugin)
         else:
-            _logger.error("the plug-in '%s' of '%s' is not a '%s'", point.name, package, kind.__name__)
+            _logger.error("the plug-in '%s' of '%s' is not a '%s'", point.name, group, kind.__name__)
     return plugins

@@ -102,8 +102,8 @@ opened = []
 sys.addaudithook(lambda event, given: opened.append(given[0]) if event == "open" else None)
 from PySide6.QtWidgets import QApplication
 application = QApplication([])
-import app.ui.panels.plot.panel
-from app.ui.panels.plot.canvas import PlotCanvas
+import app.ui.panels.watch.plot.panel
+from app.ui.panels.watch.plot.canvas import PlotCanvas
 from app.ui.theme.theme import Theme
 canvas = PlotCanvas(Theme("light"))
 canvas.show_lines([], 0.0)

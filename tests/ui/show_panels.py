@@ -15,18 +15,20 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.ui.blockly.scheme import register_scheme
-from app.ui.panels import alerts, camera, doctor, health, plot, problems, robot, sensors
-from app.ui.panels.alarms import panel as alarms
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.behaviour import panel as behaviour
-from app.ui.panels.console import panel as console
-from app.ui.panels.graph import panel as graph
-from app.ui.panels.image import panel as image
-from app.ui.panels.inspector import panel as inspector
-from app.ui.panels.nodes import panel as nodes
-from app.ui.panels.recordings import panel as recordings
-from app.ui.panels.robots import panel as robots
-from app.ui.panels.topics import panel as topics
+from app.ui.panels.build import problems
+from app.ui.panels.build.behaviour import panel as behaviour
+from app.ui.panels.record.recordings import panel as recordings
+from app.ui.panels.robots import camera, health, robot, sensors
+from app.ui.panels.robots.robots import panel as robots
+from app.ui.panels.watch import alerts, doctor, plot
+from app.ui.panels.watch.alarms import panel as alarms
+from app.ui.panels.watch.console import panel as console
+from app.ui.panels.watch.graph import panel as graph
+from app.ui.panels.watch.image import panel as image
+from app.ui.panels.watch.inspector import panel as inspector
+from app.ui.panels.watch.nodes import panel as nodes
+from app.ui.panels.watch.topics import panel as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme

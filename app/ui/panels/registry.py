@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from types import ModuleType
 
 from app.ui import panels
 from app.ui.panels.base import Panel
-from nep.system.plugins import discover
+from nep.system.plugins import discover_own, installed_plugins
 
 
 class PanelRegistry(Mapping[str, Panel]):
@@ -21,11 +22,14 @@ class PanelRegistry(Mapping[str, Panel]):
 
     @cached_property
     def _panels(self) -> Mapping[str, Panel]:
-        return discover(panels.__name__, "PANEL", Panel)
+        own: dict[str, Panel] = {}
+        for folder in _folders():
+            own.update(discover_own(folder.__name__, "PANEL", Panel))
+        return {**installed_plugins(panels.__name__, Panel), **own}
 
     def import_steps(self) -> Sequence[Callable[[], object]]:
         """Return functions that import one panel module each, to divide the import into short steps."""
-        names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
+        names = [each.name for folder in _folders() for each in _members(folder)]
         return [*(partial(importlib.import_module, name) for name in names), lambda: self._panels]
 
     def __getitem__(self, name: str) -> Panel:
@@ -36,3 +40,11 @@ class PanelRegistry(Mapping[str, Panel]):
 
     def __len__(self) -> int:
         return len(self._panels)
+
+
+def _members(package: ModuleType) -> Iterable[pkgutil.ModuleInfo]:
+    return pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
+
+
+def _folders() -> Sequence[ModuleType]:
+    return [importlib.import_module(each.name) for each in _members(panels) if each.ispkg]

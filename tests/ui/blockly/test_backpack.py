@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.core.projects.backpack import Backpack
-from app.ui.panels.behaviour.backpack_storage import BackpackController
+from app.ui.panels.build.behaviour.backpack_storage import BackpackController
 from tests.ui.blockly_person import START, Person, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]

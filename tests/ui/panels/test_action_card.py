@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action, DataField
-from app.ui.panels.robots.action_card import ActionCard
-from app.ui.panels.robots.invocations import fields_text, progress_of
+from app.ui.panels.robots.robots.action_card import ActionCard
+from app.ui.panels.robots.robots.invocations import fields_text, progress_of
 from app.ui.theme.theme import Theme
 from tests.ui.sample_data import Invocation
 

@@ -10,10 +10,10 @@ from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
-from app.ui.panels.alarms import PANEL
-from app.ui.panels.alarms.columns import csv_text
-from app.ui.panels.alarms.panel import AlarmsPanel
-from app.ui.panels.alarms.phrases import (
+from app.ui.panels.watch.alarms import PANEL
+from app.ui.panels.watch.alarms.columns import csv_text
+from app.ui.panels.watch.alarms.panel import AlarmsPanel
+from app.ui.panels.watch.alarms.phrases import (
     PhrasePart,
     initial_text,
     parse_limit,
@@ -22,8 +22,8 @@ from app.ui.panels.alarms.phrases import (
     with_kind,
     with_slot_text,
 )
-from app.ui.panels.nodes import panel as nodes
-from app.ui.panels.topics import panel as topics
+from app.ui.panels.watch.nodes import panel as nodes
+from app.ui.panels.watch.topics import panel as topics
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.history import ActionResult, AlarmRecord
 from nep.programs.alarms.rule import KINDS, problem_of

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.ui.panels.alerts import PANEL, AlertsPanel
+from app.ui.panels.watch.alerts import PANEL, AlertsPanel
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 import nep
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.panels.alerts import PANEL, AlertsPanel
+from app.ui.panels.watch.alerts import PANEL, AlertsPanel
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from nep.masters.master import Master

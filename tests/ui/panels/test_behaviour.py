@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QLabel, QWidget
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
-from app.ui.panels.behaviour.panel import BehaviourPanel
-from app.ui.panels.behaviour.program_view import ProgramView
+from app.ui.panels.build.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
+from app.ui.panels.build.behaviour.panel import BehaviourPanel
+from app.ui.panels.build.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState
 from tests.ui.fakes import Session

@@ -8,8 +8,8 @@ from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
-from app.ui.panels.behaviour.tab import TabState
-from app.ui.panels.behaviour.tabs import NEW_TAB, BehaviourTabs
+from app.ui.panels.build.behaviour.tab import TabState
+from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
-from app.ui.panels.behaviour.panel import LOADING_TEXT_DELAY_S, LoadingMessage
+from app.ui.panels.build.behaviour.panel import LOADING_TEXT_DELAY_S, LoadingMessage
 
 
 def test_loading_message_appears_after_a_delay_and_disappears_when_the_page_is_loaded(qtbot) -> None:

@@ -8,8 +8,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.world.console import Console
-from app.ui.panels.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tooltip_text
-from app.ui.panels.console.panel import PANEL, ConsolePanel
+from app.ui.panels.watch.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tooltip_text
+from app.ui.panels.watch.console.panel import PANEL, ConsolePanel
 from app.ui.widgets import paint
 from nep.messages.message import Message
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE

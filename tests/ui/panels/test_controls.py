@@ -18,11 +18,11 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter, parameter_of
 from app.robots.description.model import Action
-from app.ui.panels.robots.controls.angle import AngleDial
-from app.ui.panels.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
-from app.ui.panels.robots.controls.picture import EmptyImageSource, PictureChoice
-from app.ui.panels.robots.controls.picture_file import MAX_FILE_BYTES, encode_image, read_picture
-from app.ui.panels.robots.form import ActionForm
+from app.ui.panels.robots.robots.controls.angle import AngleDial
+from app.ui.panels.robots.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
+from app.ui.panels.robots.robots.controls.picture import EmptyImageSource, PictureChoice
+from app.ui.panels.robots.robots.controls.picture_file import MAX_FILE_BYTES, encode_image, read_picture
+from app.ui.panels.robots.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
 from app.ui.widgets.inputs.fields import MIN_HEIGHT, LongTextField
@@ -387,7 +387,7 @@ def test_photo_is_rotated_by_its_exif_orientation(qapp, tmp_path, kind, orientat
 def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     dropped: list[Menu] = []
     monkeypatch.setattr(
-        "app.ui.panels.robots.controls.picture.open_below", lambda menu, _below: dropped.append(menu)
+        "app.ui.panels.robots.robots.controls.picture.open_below", lambda menu, _below: dropped.append(menu)
     )
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=Cameras())
     choice = child(form, PictureChoice)

@@ -10,10 +10,11 @@ from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
 from app.core.reports.not_installed import MissingLibraries, alert_missing
-from app.ui.panels import console
 from app.ui.panels.base import Blocker, PanelWidget, paused_blocker
-from app.ui.panels.doctor import PANEL, DoctorPanel
-from app.ui.panels.inspector.panel import PANEL as INSPECTOR
+from app.ui.panels.registry import PanelRegistry
+from app.ui.panels.watch import console
+from app.ui.panels.watch.doctor import PANEL, DoctorPanel
+from app.ui.panels.watch.inspector.panel import PANEL as INSPECTOR
 from app.ui.widgets import Button
 from nep.programs.doctor import Finding
 from tests.ui.fakes import Session
@@ -98,7 +99,7 @@ def test_panels_waiting_for_a_topic_are_listed_with_the_suggested_topic(
     qtbot, panel, window, monkeypatch
 ) -> None:
     now = [time.monotonic()]
-    monkeypatch.setattr("app.ui.panels.doctor.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("app.ui.panels.watch.doctor.time.monotonic", lambda: now[0])
     near, far, silent = (window.make(INSPECTOR) for _ in range(3))
     for each in (near, far, silent):
         qtbot.addWidget(each)
@@ -324,7 +325,7 @@ def test_empty_panels_open_the_doctor_with_their_topic_if_they_have_one(qtbot, q
     window = Window(Session())
     window.session.live.master = MasterState("connected", "127.0.0.1:7780")
     for name in ("inspector", "image", "console", "services"):
-        made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
+        made = window.make(PanelRegistry()[name])
         qtbot.addWidget(made)
         made.show_topic("/nothing")
         ticks(window, made, 2)
@@ -337,7 +338,7 @@ def test_empty_panels_open_the_doctor_with_their_topic_if_they_have_one(qtbot, q
 
 def test_paused_panels_are_reported_to_the_doctor(qtbot, window) -> None:
     for name in ("inspector", "image", "plot"):
-        made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
+        made = window.make(PanelRegistry()[name])
         qtbot.addWidget(made)
         assert list(made.blockers()) == []
         made.freeze.setChecked(True)
@@ -360,7 +361,7 @@ def test_console_filters_are_reported_to_the_doctor(qtbot, window) -> None:
 
 
 def test_empty_plot_opens_the_doctor(qtbot, window) -> None:
-    made = window.make(importlib.import_module("app.ui.panels.plot").PANEL, (900, 600))
+    made = window.make(importlib.import_module("app.ui.panels.watch.plot").PANEL, (900, 600))
     qtbot.addWidget(made)
     made._add_typed("/odom.speed", False)
     ticks(window, made, 6)

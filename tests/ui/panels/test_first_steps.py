@@ -10,8 +10,8 @@ import pytest
 from app import resources
 from app.core.projects.file_format import read_file
 from app.ui.panels.base import Panel
-from app.ui.panels.first_steps.panel import HINT_DELAY_S, PROGRESS_SETTING, FirstStepsPanel
-from app.ui.panels.first_steps.steps import (
+from app.ui.panels.build.first_steps.panel import HINT_DELAY_S, PROGRESS_SETTING, FirstStepsPanel
+from app.ui.panels.build.first_steps.steps import (
     SAY,
     STEPS,
     TURN,

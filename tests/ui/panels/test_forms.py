@@ -9,10 +9,10 @@ from app.errors import InputProblem
 from app.robots.description.inputs import Choice as Option
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action
-from app.ui.panels.robots.controls.chooser import control_for
-from app.ui.panels.robots.controls.colour import ColourSwatches
-from app.ui.panels.robots.form import ActionForm
-from app.ui.panels.robots.input_text import input_summary
+from app.ui.panels.robots.robots.controls.chooser import control_for
+from app.ui.panels.robots.robots.controls.colour import ColourSwatches
+from app.ui.panels.robots.robots.form import ActionForm
+from app.ui.panels.robots.robots.input_text import input_summary
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox, Segments, SliderWithUnit, Switch
 from nep.i18n import _, translate

@@ -18,9 +18,9 @@ from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
 from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
-from app.ui.panels.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
-from app.ui.panels.graph.scene import GraphScene
-from app.ui.panels.graph.texts import line_width, short_rate
+from app.ui.panels.watch.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
+from app.ui.panels.watch.graph.scene import GraphScene
+from app.ui.panels.watch.graph.texts import line_width, short_rate
 from nep.protocol.graph_view import (
     ClientInfo,
     GraphView,
@@ -439,7 +439,7 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [time.monotonic()]
-    monkeypatch.setattr("app.ui.panels.graph.panel.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("app.ui.panels.watch.graph.panel.time.monotonic", lambda: now[0])
     panel._update_quiet_nodes()
     now[0] += QUIET_TIMEOUT_S + 1
     more = graph(count=200)
@@ -467,7 +467,7 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
 def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.ui.panels.graph.panel.MAX_LINES_PER_TICK", 0)
+    monkeypatch.setattr("app.ui.panels.watch.graph.panel.MAX_LINES_PER_TICK", 0)
     before = panel.canvas.scene
     show(window, graph(revision=2, nodes=NODES[:-1]))
 

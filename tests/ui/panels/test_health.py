@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.ui.panels.health import PANEL, HealthPanel
+from app.ui.panels.robots.health import PANEL, HealthPanel
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from tests.ui.fakes import Session

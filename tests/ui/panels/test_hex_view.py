@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from app.ui.panels.inspector.hex_view import HexView, hex_line
+from app.ui.panels.watch.inspector.hex_view import HexView, hex_line
 from app.ui.theme.theme import Theme
 
 

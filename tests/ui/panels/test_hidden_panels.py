@@ -14,11 +14,11 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, thing_description
-from app.ui.panels.camera import CameraPanel
-from app.ui.panels.image.panel import ImagePanel
-from app.ui.panels.inspector.panel import InspectorPanel
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.robot.panel import RobotPanel
+from app.ui.panels.robots.camera import CameraPanel
+from app.ui.panels.robots.robot.panel import RobotPanel
+from app.ui.panels.watch.image.panel import ImagePanel
+from app.ui.panels.watch.inspector.panel import InspectorPanel
 from app.ui.shell.docking.dock import SUSPEND_DELAY_S, Dock, is_on_screen
 from app.ui.shell.main_window import TICK_MS, MainWindow
 from app.ui.theme.theme import Theme
@@ -354,7 +354,7 @@ def test_ticks_without_changes_repaint_only_the_status_bar(qtbot, case: Case, la
 
 
 def test_unchanged_camera_image_is_not_repainted(qtbot, case: Case, monkeypatch) -> None:
-    for module in ("app.ui.pictures.view", "app.ui.panels.camera"):
+    for module in ("app.ui.pictures.view", "app.ui.panels.robots.camera"):
         monkeypatch.setattr(f"{module}.STALE_AFTER_S", 1e9)  # independent of the load of the computer
     bench = case.window.show_layout("behaviour")
     camera = bench.docks["camera"]

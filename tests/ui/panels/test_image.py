@@ -14,11 +14,11 @@ from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 
 from app.core.messages.picture import Picture
-from app.ui.panels.camera import PANEL as CAMERA
-from app.ui.panels.camera import CameraPanel
-from app.ui.panels.image.actions import ACTION_SPECS
-from app.ui.panels.image.panel import PANEL, ImagePanel
-from app.ui.panels.image.snapshot import SnapshotJob
+from app.ui.panels.robots.camera import PANEL as CAMERA
+from app.ui.panels.robots.camera import CameraPanel
+from app.ui.panels.watch.image.actions import ACTION_SPECS
+from app.ui.panels.watch.image.panel import PANEL, ImagePanel
+from app.ui.panels.watch.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_of
 from app.ui.pictures.placement import PicturePlacement
 from app.ui.pictures.view import PictureView, RateText, pixel_text, rate_text

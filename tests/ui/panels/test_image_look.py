@@ -11,8 +11,8 @@ from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
 from app.core.messages.annotations import MAX_COORDINATE_PX, parse_shapes
 from app.core.messages.image_style import ColourScale
-from app.ui.panels.image.overlays import MAX_OVERLAYS
-from app.ui.panels.image.panel import PANEL, ImagePanel
+from app.ui.panels.watch.image.overlays import MAX_OVERLAYS
+from app.ui.panels.watch.image.panel import PANEL, ImagePanel
 from app.ui.pictures.annotations import bar_image, paint_annotations, paint_colour_bar
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message

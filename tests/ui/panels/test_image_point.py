@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 from app.core.run.acting.arming import Target
 from app.core.run.acting.picture_point import MESSAGE_TYPES, PicturePoint
 from app.core.world.world import World
-from app.ui.panels.image.panel import PANEL, ImagePanel
+from app.ui.panels.watch.image.panel import PANEL, ImagePanel
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
 from tests.pseudo import untranslated_in

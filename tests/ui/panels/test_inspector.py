@@ -14,12 +14,12 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
-from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE
-from app.ui.panels.inspector.diff import NO_BASE, changes_text, count_changes
-from app.ui.panels.inspector.footer import message_info
-from app.ui.panels.inspector.panel import PANEL, InspectorPanel
-from app.ui.panels.inspector.tree_model import TreeNode
-from app.ui.panels.inspector.values import clipboard_text, image_summary
+from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TREE
+from app.ui.panels.watch.inspector.diff import NO_BASE, changes_text, count_changes
+from app.ui.panels.watch.inspector.footer import message_info
+from app.ui.panels.watch.inspector.panel import PANEL, InspectorPanel
+from app.ui.panels.watch.inspector.tree_model import TreeNode
+from app.ui.panels.watch.inspector.values import clipboard_text, image_summary
 from app.ui.shell.commands.view import parse_topic_field
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.fields import parse_path
@@ -597,7 +597,7 @@ def test_value_is_plotted_by_action_or_footer_button_and_can_be_dragged(panel, w
     dragged: list[tuple[str, str]] = []
     monkeypatch.setattr(panel, "context", replace(panel.context, plot=lambda *field: plotted.append(field)))
     monkeypatch.setattr(
-        "app.ui.panels.inspector.panel.FieldDrag", lambda _viewport, *field: dragged.append(field)
+        "app.ui.panels.watch.inspector.panel.FieldDrag", lambda _viewport, *field: dragged.append(field)
     )
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", {**blackboard(), "a b.c": [1, 2]})

@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QModelIndex
 
 from app.core.messages.lazy_json import JsonIndex
-from app.ui.panels.inspector.diff import MISSING, NO_BASE, child_diffs, differs, mark_of
-from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
+from app.ui.panels.watch.inspector.diff import MISSING, NO_BASE, child_diffs, differs, mark_of
+from app.ui.panels.watch.inspector.tree_model import TreeModel, TreeNode
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from app.ui.panels.inspector.body import RAW, TABLE, TREE
-from app.ui.panels.inspector.panel import PANEL, InspectorPanel
+from app.ui.panels.watch.inspector.body import RAW, TABLE, TREE
+from app.ui.panels.watch.inspector.panel import PANEL, InspectorPanel
 from app.ui.widgets.table.model import CELL_ROLE
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press, ticks

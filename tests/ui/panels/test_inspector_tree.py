@@ -4,9 +4,9 @@ import pytest
 from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtTest import QSignalSpy, QTest
 
-from app.ui.panels.inspector.tree_model import TreeModel
-from app.ui.panels.inspector.tree_view import TreeView
-from app.ui.panels.inspector.values import search, value_text
+from app.ui.panels.watch.inspector.tree_model import TreeModel
+from app.ui.panels.watch.inspector.tree_view import TreeView
+from app.ui.panels.watch.inspector.values import search, value_text
 from app.ui.theme.theme import Theme
 
 FIRST = {"stamp": 1.5, "robots": {"Pepper": {"pose": {"x": 1, "y": 2}, "on": True}}, "list": [1, "two", None]}

@@ -8,13 +8,13 @@ import pytest
 from PySide6.QtWidgets import QLabel
 
 from app.core.network.source import GraphReceived, MasterLost, WatchFailed
-from app.ui.panels.image.panel import PANEL as IMAGE
-from app.ui.panels.inspector.panel import PANEL as INSPECTOR
-from app.ui.panels.inspector.panel import InspectorPanel
-from app.ui.panels.nodes.panel import PANEL as NODES
-from app.ui.panels.nodes.panel import NodesPanel
-from app.ui.panels.topics.panel import PANEL as TOPICS
-from app.ui.panels.topics.panel import TopicsPanel
+from app.ui.panels.watch.image.panel import PANEL as IMAGE
+from app.ui.panels.watch.inspector.panel import PANEL as INSPECTOR
+from app.ui.panels.watch.inspector.panel import InspectorPanel
+from app.ui.panels.watch.nodes.panel import PANEL as NODES
+from app.ui.panels.watch.nodes.panel import NodesPanel
+from app.ui.panels.watch.topics.panel import PANEL as TOPICS
+from app.ui.panels.watch.topics.panel import TopicsPanel
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 from tests.core.networks.fake_networks import Fake

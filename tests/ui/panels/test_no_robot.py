@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from app.ui.panels import camera, health, robot, robots, sensors
+from app.ui.panels.robots import camera, health, robot, robots, sensors
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import StatusFormatter
 from app.ui.shell.bars.toast import Toast

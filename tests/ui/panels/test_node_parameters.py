@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 
 import nep
 from app.core.networks.parameters import ReportedParameter
-from app.ui.panels.nodes.panel import PANEL, NodesPanel
-from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_values_text
+from app.ui.panels.watch.nodes.panel import PANEL, NodesPanel
+from app.ui.panels.watch.nodes.parameters import CHOICE, LINE, allowed_values_text
 from nep.messages.message import Message
 from nep.patterns.parameters.node_parameters import parameters_topic
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, ServerInfo, ServiceInfo, TopicInfo

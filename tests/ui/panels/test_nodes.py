@@ -9,8 +9,8 @@ from PySide6.QtTest import QTest
 
 from app.core.network.master import MasterState
 from app.core.network.nodes import NodeEntry, Nodes
-from app.ui.panels.nodes.panel import PANEL, NodesPanel
-from app.ui.panels.nodes.rows import (
+from app.ui.panels.watch.nodes.panel import PANEL, NodesPanel
+from app.ui.panels.watch.nodes.rows import (
     NodeRow,
     _name_tip,
     cpu_text,

@@ -12,16 +12,16 @@ import pytest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
 import app.ui.panels
-import app.ui.panels.behaviour
+import app.ui.panels.build.behaviour
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour import panel as behaviour
+from app.ui.panels.build.behaviour import panel as behaviour
 from app.ui.theme import icons
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, ticks
 from tests.ui.panels.test_behaviour import Editor
 
 BASES = {
-    "armed_strip",
+    "act.armed_strip",
     "base",
     "registry",
     "network_table",
@@ -30,18 +30,27 @@ BASES = {
     "no_robot",
     "row_actions",
 }  # modules without a panel
-NAMES = sorted({module.name for module in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES)
+FOLDERS = {each.name for each in pkgutil.iter_modules(app.ui.panels.__path__)} - BASES
+MODULES = {
+    each.name: f"{folder}.{each.name}"
+    for folder in FOLDERS
+    for each in pkgutil.iter_modules([f"{app.ui.panels.__path__[0]}/{folder}"])
+    if f"{folder}.{each.name}" not in BASES
+}
+NAMES = sorted(MODULES)
 
 
 @pytest.fixture(autouse=True)
 def without_web(monkeypatch) -> None:
     """Behaviour panel with a fake block editor, which is tested separately."""
     made = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
-    monkeypatch.setattr(app.ui.panels.behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made))
+    monkeypatch.setattr(
+        app.ui.panels.build.behaviour, "PANEL", Panel("behaviour", "Behaviour", "blocks", (), made)
+    )
 
 
 def description(name: str) -> Panel:
-    panel = importlib.import_module(f"app.ui.panels.{name}").PANEL
+    panel = importlib.import_module(f"app.ui.panels.{MODULES[name]}").PANEL
     assert isinstance(panel, Panel)
     return panel
 
@@ -120,16 +129,18 @@ def test_empty_panel_shows_an_explanatory_text(qtbot, qapp, name) -> None:
 def imported_panels(folder: Path) -> Iterator[tuple[str, str]]:
     """Return pairs of a panel module or package and another one that it imports."""
     for path in folder.rglob("*.py"):
-        own = path.relative_to(folder).with_suffix("").parts[0]
+        own = ".".join(path.relative_to(folder).with_suffix("").parts[:2])
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("app.ui.panels"):
-                other = (node.module or "").removeprefix("app.ui.panels").strip(".").partition(".")[0]
-                yield from ((own, each or alias.name) for alias in node.names for each in [other])
+                for alias in node.names:
+                    name = f"{node.module}.{alias.name}".removeprefix("app.ui.panels.")
+                    parts = name.split(".")
+                    yield own, ".".join(parts[:2]) if parts[0] in FOLDERS else parts[0]
 
 
 def test_panel_modules_do_not_import_other_panels() -> None:
     found = list(imported_panels(Path(app.ui.panels.__path__[0])))
-    assert ("inspector", "inspector") in found, "panels that are folders are read, too"
+    assert ("watch.inspector", "watch.inspector") in found, "panels that are folders are read, too"
     assert [(own, other) for own, other in found if other not in {own, *BASES}] == []
 
 

@@ -52,11 +52,11 @@ PANEL = Panel("counter", "Counter", "hash", (), Counter)
 @pytest.fixture
 def plug_in(tmp_path: Path) -> Iterator[None]:
     (tmp_path / "counter.py").write_text(dedent(SOURCE), encoding="utf-8")
-    home = importlib.import_module("app.ui.panels")
+    home = importlib.import_module("app.ui.panels.watch")
     home.__path__.append(str(tmp_path))
     yield
     home.__path__.remove(str(tmp_path))
-    sys.modules.pop("app.ui.panels.counter", None)
+    sys.modules.pop("app.ui.panels.watch.counter", None)
     if hasattr(home, "counter"):
         delattr(home, "counter")
 

@@ -7,7 +7,7 @@ from PySide6.QtTest import QTest
 
 from app.blocks import Problem
 from app.core.reports.not_installed import MissingLibraries, alert_missing
-from app.ui.panels.problems import PANEL, ProblemsPanel
+from app.ui.panels.build.problems import PANEL, ProblemsPanel
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import tab_stops
 from app.ui.widgets.labels import PartlyBoldLabel

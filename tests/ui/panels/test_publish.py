@@ -12,9 +12,9 @@ from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import SavedMessage
 from app.core.world.world import World
-from app.ui.panels.publish import PANEL
-from app.ui.panels.publish.panel import PublishPanel
-from app.ui.panels.topics import panel as topics
+from app.ui.panels.act.publish import PANEL
+from app.ui.panels.act.publish.panel import PublishPanel
+from app.ui.panels.watch.topics import panel as topics
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 from tests.ui.test_accessible import unsaid

@@ -11,13 +11,13 @@ from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
 from app.core.recording.replay.scale import clock_text
-from app.ui.panels.alarms import panel as alarms
-from app.ui.panels.recordings import PANEL
-from app.ui.panels.recordings import panel as panel_module
-from app.ui.panels.recordings.columns import badge_of
-from app.ui.panels.recordings.panel import RecordingsPanel
-from app.ui.panels.recordings.table import RecordingTable
-from app.ui.panels.topics import panel as topics
+from app.ui.panels.record.recordings import PANEL
+from app.ui.panels.record.recordings import panel as panel_module
+from app.ui.panels.record.recordings.columns import badge_of
+from app.ui.panels.record.recordings.panel import RecordingsPanel
+from app.ui.panels.record.recordings.table import RecordingTable
+from app.ui.panels.watch.alarms import panel as alarms
+from app.ui.panels.watch.topics import panel as topics
 from app.ui.text.numbers import group_digits, size_text
 from app.ui.widgets import Button
 from nep.programs.alarms.history import ActionResult, AlarmRecord

@@ -7,7 +7,7 @@ import pytest
 from app.core.robots.voices import SOUND_SETTING, Utterance
 from app.robots.virtual.body import Body
 from app.robots.virtual.simulation import drawing_state
-from app.ui.panels.robot.panel import PANEL, RobotPanel
+from app.ui.panels.robots.robot.panel import PANEL, RobotPanel
 from app.ui.robot_drawing.state import RobotState
 from tests.core.robots.test_voices import FakeSpeaker
 from tests.ui.fakes import Session

@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 
 from app.core.robots.known_robots import SETTING_KEY
 from app.robots.description.model import DataField
-from app.ui.panels.robots.invocations import feedback_text, progress_of
-from app.ui.panels.robots.list import seen_text
-from app.ui.panels.robots.panel import PANEL, RobotsPanel
+from app.ui.panels.robots.robots.invocations import feedback_text, progress_of
+from app.ui.panels.robots.robots.list import seen_text
+from app.ui.panels.robots.robots.panel import PANEL, RobotsPanel
 from app.ui.widgets.inputs.fields import LongTextField
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press

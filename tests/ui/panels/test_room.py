@@ -14,8 +14,8 @@ from app.robots.turtle import ROBOT as TURTLE
 from app.robots.virtual.body import Body
 from app.robots.virtual.room import Room
 from app.robots.virtual.simulation import drawing_state, room_state
-from app.ui.panels.robot.large_room import LargeRoom
-from app.ui.panels.robot.panel import ADDABLE_THINGS, PANEL, RobotPanel
+from app.ui.panels.robots.robot.large_room import LargeRoom
+from app.ui.panels.robots.robot.panel import ADDABLE_THINGS, PANEL, RobotPanel
 from app.ui.widgets import IconButton
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys, press

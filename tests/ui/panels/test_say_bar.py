@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu
 
 from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT
-from app.ui.panels.robot.panel import PANEL, RobotPanel
+from app.ui.panels.robots.robot.panel import PANEL, RobotPanel
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
 from tests.ui.sample_data import drawing, pepper

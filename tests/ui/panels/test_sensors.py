@@ -4,8 +4,8 @@ import pytest
 
 from app.robots.description.inputs import Choice
 from app.robots.description.model import DataField, Sensor
-from app.ui.panels import sensors
-from app.ui.panels.sensors import PANEL, SensorRow, SensorsPanel
+from app.ui.panels.robots import sensors
+from app.ui.panels.robots.sensors import PANEL, SensorRow, SensorsPanel
 from app.ui.text.sensor_values import ReadingText, quantity_text, reading_text
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme

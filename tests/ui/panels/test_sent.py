@@ -10,7 +10,7 @@ from PySide6.QtGui import QGuiApplication
 from app.core.run.acting.arming import Target
 from app.core.run.acting.sent_log import SentRecord
 from app.core.run.acting.shelf import SavedMessage
-from app.ui.panels.sent import PANEL, SentPanel
+from app.ui.panels.act.sent import PANEL, SentPanel
 from tests.pseudo import untranslated_in
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session

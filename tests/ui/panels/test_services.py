@@ -12,10 +12,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from app.core.run.acting.arming import Target
+from app.ui.panels.act.services import PANEL
+from app.ui.panels.act.services.panel import ServicesPanel
+from app.ui.panels.act.services.reply_view import MAX_ROWS, MAX_TEXT_CHARS, reply_rows
 from app.ui.panels.row_actions import service_actions
-from app.ui.panels.services import PANEL
-from app.ui.panels.services.panel import ServicesPanel
-from app.ui.panels.services.reply_view import MAX_ROWS, MAX_TEXT_CHARS, reply_rows
 from app.ui.widgets import Switch
 from nep.protocol.graph_view import ServerInfo, ServiceInfo
 from tests.ui.fakes import Session

@@ -10,8 +10,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.run.acting.arming import Target
-from app.ui.panels.timeline import PANEL
-from app.ui.panels.timeline.panel import TimelinePanel
+from app.ui.panels.record.timeline import PANEL
+from app.ui.panels.record.timeline.panel import TimelinePanel
 from app.ui.shell.bars.status_bar import StatusFormatter
 from tests.nep.recordings.messages import json_message, record
 from tests.ui.fakes import Session

@@ -6,7 +6,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.core.network.master import MasterState
-from app.ui.panels.topics.columns import (
+from app.ui.panels.watch.topics.columns import (
     age_cell,
     bandwidth_cell,
     curve_cell,
@@ -15,7 +15,7 @@ from app.ui.panels.topics.columns import (
     nodes_cell,
     type_cell,
 )
-from app.ui.panels.topics.panel import PANEL, TopicsPanel
+from app.ui.panels.watch.topics.panel import PANEL, TopicsPanel
 from app.ui.widgets import Button
 from app.ui.widgets.table.model import CELL_ROLE
 from tests.ui.fakes import Session

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from app.blocks.model.program import Variable
 from app.blocks.runtime.events import VariablesChanged
 from app.blocks.runtime.variables import VariableValue, display_value
-from app.ui.panels.variables import PANEL, VariablesPanel, rows_of, value_cell
+from app.ui.panels.build.variables import PANEL, VariablesPanel, rows_of, value_cell
 from app.ui.widgets.table.model import Order
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
 from tests.ui.fakes import Session

@@ -15,12 +15,12 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 from app.core.run.acting.picture_point import MESSAGE_TYPES, default_topic
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
-from app.ui.panels.alarms.phrases import payload_text
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.behaviour import panel as behaviour
-from app.ui.panels.inspector.tree_view import TreeView
-from app.ui.panels.nodes import rows as nodes
-from app.ui.panels.topics import columns as topics
+from app.ui.panels.build.behaviour import panel as behaviour
+from app.ui.panels.watch.alarms.phrases import payload_text
+from app.ui.panels.watch.inspector.tree_view import TreeView
+from app.ui.panels.watch.nodes import rows as nodes
+from app.ui.panels.watch.topics import columns as topics
 from app.ui.shell.docking.dock import Dock
 from app.ui.theme.theme import Theme
 from app.ui.widgets.table.cells import PADDING, header_font, header_width

@@ -8,10 +8,10 @@ import pytest
 
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
-from app.ui.panels.publish import PANEL as PUBLISH
-from app.ui.panels.publish.panel import PublishPanel
-from app.ui.panels.services import PANEL as SERVICES
-from app.ui.panels.services.panel import ServicesPanel
+from app.ui.panels.act.publish import PANEL as PUBLISH
+from app.ui.panels.act.publish.panel import PublishPanel
+from app.ui.panels.act.services import PANEL as SERVICES
+from app.ui.panels.act.services.panel import ServicesPanel
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.fakes import Session

@@ -125,7 +125,9 @@ def test_lists_of_command_ids_contain_only_existing_commands() -> None:
 
 
 def test_every_tab_command_of_the_tab_menu_is_registered() -> None:
-    source = (Path(app.__file__).parent / "ui" / "panels" / "behaviour" / "tabs.py").read_text("utf-8")
+    source = (Path(app.__file__).parent / "ui" / "panels" / "build" / "behaviour" / "tabs.py").read_text(
+        "utf-8"
+    )
     listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
     assert len(listed) == 6
     assert listed <= ABOUT

@@ -18,10 +18,10 @@ from app.core.storage.settings import Settings
 from app.robots import simulated
 from app.robots.description.description import parse, thing_description
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour.panel import BehaviourPanel
-from app.ui.panels.graph.panel import GraphPanel
+from app.ui.panels.build.behaviour.panel import BehaviourPanel
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.table_panel import TablePanel
+from app.ui.panels.watch.graph.panel import GraphPanel
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.main_window import STATUS_REFRESH_TICKS, MainWindow

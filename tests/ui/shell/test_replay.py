@@ -16,8 +16,8 @@ from app.core.alerts.intents import ShowRecordingFile
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.record.timeline.canvas import density_image
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.timeline.canvas import density_image
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message

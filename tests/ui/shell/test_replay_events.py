@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QApplication, QMenu
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.record.timeline.canvas import TimelineCanvas
+from app.ui.panels.record.timeline.event_lanes import LaneMark
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.timeline.canvas import TimelineCanvas
-from app.ui.panels.timeline.event_lanes import LaneMark
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep.recordings.writer import RecordingWriter

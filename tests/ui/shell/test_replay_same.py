@@ -14,12 +14,12 @@ from PySide6.QtCore import QModelIndex, Qt
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.console.panel import ConsolePanel
-from app.ui.panels.image.panel import ImagePanel
-from app.ui.panels.inspector.panel import InspectorPanel
-from app.ui.panels.plot.panel import PlotPanel
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.topics.panel import TopicsPanel
+from app.ui.panels.watch.console.panel import ConsolePanel
+from app.ui.panels.watch.image.panel import ImagePanel
+from app.ui.panels.watch.inspector.panel import InspectorPanel
+from app.ui.panels.watch.plot.panel import PlotPanel
+from app.ui.panels.watch.topics.panel import TopicsPanel
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message

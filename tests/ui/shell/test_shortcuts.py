@@ -11,8 +11,8 @@ from PySide6.QtTest import QTest
 
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
-from app.ui.panels.console.list import LogFindField
-from app.ui.panels.robots.controls.number import UnboundedNumberEdit
+from app.ui.panels.robots.robots.controls.number import UnboundedNumberEdit
+from app.ui.panels.watch.console.list import LogFindField
 from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.commands.commands import Commands

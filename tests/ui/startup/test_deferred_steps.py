@@ -108,7 +108,7 @@ def test_deferred_steps_import_every_panel() -> None:
 def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_path: Path) -> None:
     """Every import before the first paint delays each start."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
-    late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.console.panel", "importlib.metadata"]
+    late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.watch.console.panel", "importlib.metadata"]
     program = (
         "import sys\n"
         "from app.ui import application\n"

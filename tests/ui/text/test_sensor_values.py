@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from app.robots.description.description import Robot
-from app.ui.panels.behaviour.live_values import sensor_texts
+from app.ui.panels.build.behaviour.live_values import sensor_texts
 from tests.blocks.samples import robot
 
 SENSORS = [("Pepper", "battery"), ("Pepper", "pose"), ("Pepper", "sees_face"), ("NAO", "battery")]

@@ -16,7 +16,7 @@ from app import resources
 from app.blocks import Problem
 from app.blocks.toolbox.catalogue import Catalogue
 from app.core.projects.problems import ProblemLine
-from app.ui.panels.problems import ProblemRow
+from app.ui.panels.build.problems import ProblemRow
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.theme import icons
 from app.ui.theme import tokens as theme_tokens

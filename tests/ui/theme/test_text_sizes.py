@@ -13,7 +13,7 @@ from app.core.alerts.intents import ShowAlarms
 from app.core.run.view import RunView
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
-from app.ui.panels.robots import panel as robots
+from app.ui.panels.robots.robots import panel as robots
 from app.ui.shell.bars.status_bar import StatusBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.overlay import Overlay

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from app.ui.panels.plot.pace import DRAW_INTERVAL_TICKS, MAX_CPU_SHARE, DrawThrottle
+from app.ui.panels.watch.plot.pace import DRAW_INTERVAL_TICKS, MAX_CPU_SHARE, DrawThrottle
 
 
 def test_fast_plot_redraws_as_often_as_it_advances_one_pixel() -> None:

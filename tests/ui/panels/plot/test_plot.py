@@ -16,12 +16,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.network.mailbox import Batch
-from app.ui.panels.plot import PANEL
-from app.ui.panels.plot.curve_style import DASH_PATTERNS, CurveStyle
-from app.ui.panels.plot.export import CSV_KIND, PNG_KIND, SVG_KIND
-from app.ui.panels.plot.panel import IDLE_STATS_UPDATE_TICKS, PlotPanel
-from app.ui.panels.plot.plotted_curve import MINUS, value_text
-from app.ui.panels.plot.time_view import TimeView
+from app.ui.panels.watch.plot import PANEL
+from app.ui.panels.watch.plot.curve_style import DASH_PATTERNS, CurveStyle
+from app.ui.panels.watch.plot.export import CSV_KIND, PNG_KIND, SVG_KIND
+from app.ui.panels.watch.plot.panel import IDLE_STATS_UPDATE_TICKS, PlotPanel
+from app.ui.panels.watch.plot.plotted_curve import MINUS, value_text
+from app.ui.panels.watch.plot.time_view import TimeView
 from app.ui.widgets.field_drag import dropped_field, field_mime_data
 from nep.messages.message import Message
 from tests.ui.fakes import Session

@@ -1,0 +1,1 @@
+"""Panels to build programs from blocks."""

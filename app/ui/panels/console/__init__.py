@@ -1,6 +1,0 @@
-"""Console panel: log records of Studio, programs and robots.
-
-The records are stored in `app.core.world.console`; `list` filters and paints them.
-"""
-
-from app.ui.panels.console.panel import PANEL as PANEL

@@ -1,3 +1,0 @@
-"""First steps panel: tutorial of six steps. Completed steps are detected from the blocks and the runs."""
-
-from app.ui.panels.first_steps.panel import PANEL as PANEL

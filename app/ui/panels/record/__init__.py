@@ -1,0 +1,1 @@
+"""Panels to record messages, and to replay recordings."""

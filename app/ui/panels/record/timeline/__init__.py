@@ -1,0 +1,12 @@
+"""Timeline panel: contents of the open recording, and controls for its replay.
+
+`transport` contains the row of controls, `canvas` the ruler and the lanes.
+"""
+
+from __future__ import annotations
+
+from app.ui.panels.base import Panel
+from app.ui.panels.record.timeline.panel import TimelinePanel
+from nep.i18n import lazy
+
+PANEL = Panel("timeline", lazy("Timeline"), "film", (), TimelinePanel)

@@ -1,6 +1,0 @@
-"""Topics panel: all topics of the network with their rates, bandwidths and losses.
-
-`columns` contains the columns and their cells.
-"""
-
-from app.ui.panels.topics.panel import PANEL as PANEL

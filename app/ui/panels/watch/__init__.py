@@ -1,0 +1,1 @@
+"""Panels to watch messages, nodes, alarms and the state of the network."""
