@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.ui.shell.main_window import DEFAULT_SIZE, MainWindow
 from nep.i18n import _, number
+from nep.messages.codecs import content_of
 
 POLL_MS = 100
 SETTLE_S = 0.6
@@ -178,7 +179,7 @@ class SelfDrive(QObject):
     def _inspect(self) -> None:
         topics = self._window.session.shown.topics
         poses = [topic.name for topic in topics if topic.name.endswith(("/pose", "/state"))]
-        cameras = [topic.name for topic in topics if topic.codec == "image"]
+        cameras = [topic.name for topic in topics if content_of(topic.codec) == "image"]
         if cameras:
             self._window.open_topic(cameras[0])
         if poses:

@@ -14,6 +14,7 @@ import typer
 
 from nep.errors import NepError
 from nep.masters.process import view
+from nep.messages.codecs import content_of
 from nep.messages.fields import leaf_paths
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
@@ -92,7 +93,7 @@ def _fields(ctx: typer.Context, topic: str) -> Iterator[str]:
         name = f"nep-complete-{os.getpid()}"
         with Node(name, master=_reachable_master(ctx), wait_s=_REPLY_TIMEOUT_S) as node:
             topic_info = node.graph(_REPLY_TIMEOUT_S).topics.get(topic)
-            if topic_info is None or topic_info.codec == "image":
+            if topic_info is None or content_of(topic_info.codec) == "image":
                 return
             with node.new_sub(topic, topic_info.msg_type) as subscriber:
                 message = subscriber.receive(_MESSAGE_TIMEOUT_S)

@@ -15,6 +15,7 @@ from app.core.network.source import NODE_NAME
 from app.core.network.topics import Topic, key_of
 from app.core.network.web_texts import PageNode
 from app.core.networks.kinds import find_kind
+from nep.messages.codecs import content_of
 from nep.protocol.graph_view import ServiceInfo
 from nep.protocol.topic_pattern import is_pattern, matches
 
@@ -229,7 +230,7 @@ def _is_hidden(node: DrawnNode, options: GraphOptions) -> bool:
 
 def _boxes(graph_input: GraphInput, options: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
-    image_topics = {topic.key for topic in graph_input.topics if topic.codec == "image"}
+    image_topics = {topic.key for topic in graph_input.topics if content_of(topic.codec) == "image"}
     drawn_nodes: dict[str, DrawnNode] = {}
     key_counts: Counter[str] = Counter()
     for entry in sorted(graph_input.nodes, key=lambda each: (each.since_ns, each.id)):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from nep.backends.base import find_backend
 from nep.i18n import _, lazy
+from nep.messages.codecs import content_of
 from nep.protocol.graph_view import TopicInfo
 
 _ROS_2_IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
@@ -62,7 +63,7 @@ def _ros_2_readable_type(info: TopicInfo) -> str:
 
 def _ros_readable_type(info: TopicInfo) -> str:
     # A json subscriber reads any message as a map, also of a package that is not installed here.
-    if info.codec == "image":
+    if content_of(info.codec) == "image":
         return "image"
     return _ROS_STRING_TYPE if info.msg_type == _ROS_STRING_TYPE else "json"
 

@@ -10,6 +10,7 @@ from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.folder import CACHE_BYTES
 from app.core.recording.opener import RecordingOpener
 from nep.errors import NepError
+from nep.messages.codecs import content_of
 from nep.recordings.export import Part
 from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
@@ -117,7 +118,7 @@ def read_preview(
 
 
 def _pictures(recording: Recording, count: int, display_size: Size) -> tuple[Picture | None, ...]:
-    topics = [each for each in recording.topics.values() if each.codec == "image"]
+    topics = [each for each in recording.topics.values() if content_of(each.codec) == "image"]
     if not topics:
         return ()
     topic = max(topics, key=lambda each: each.message_count).name

@@ -16,6 +16,7 @@ from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.storage.background_worker import BackgroundWorker
 from nep.errors import NepError, RecordingTooLargeError
 from nep.i18n import _
+from nep.messages.codecs import content_of
 from nep.recordings.reader import Recording
 
 SUFFIX = ".mcap"
@@ -225,7 +226,7 @@ def read_picture(path: Path, display_size: Size, opener: RecordingOpener) -> Pic
     """
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
-            topics = [each for each in recording.topics.values() if each.codec == "image"]
+            topics = [each for each in recording.topics.values() if content_of(each.codec) == "image"]
             if not topics:
                 return None
             topic = max(topics, key=lambda each: each.message_count).name

@@ -14,6 +14,7 @@ from app.core.series.field_path import MISSING, FieldPath, kind_of_value
 from app.core.series.samples import Samples
 from app.core.series.states import States
 from nep.errors import NepError
+from nep.messages.codecs import content_of
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -194,7 +195,7 @@ class TopicSeries:
         return (stamp_ns + (0 if difference is None else difference.offset_ns) - self._origin_ns) / 1e9
 
     def _read(self, message: Message) -> object:
-        if message.size_bytes > LARGE_BYTES or message.codec == "image":
+        if message.size_bytes > LARGE_BYTES or content_of(message.codec) == "image":
             self.unreadable_count += 1
             return UNREADABLE
         try:

@@ -12,6 +12,7 @@ from app.ui.panels.base import PanelContext
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
+from nep.messages.codecs import content_of
 
 
 class RowAction(NamedTuple):
@@ -100,4 +101,4 @@ def show_messages(context: PanelContext, key: str) -> None:
 def has_fields(context: PanelContext, key: str) -> bool:
     """Return False for topics with images, which have no fields to plot, else True."""
     topic = context.session.shown.topic(key)
-    return topic is None or topic.codec != "image"
+    return topic is None or content_of(topic.codec) != "image"

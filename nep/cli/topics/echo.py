@@ -34,6 +34,7 @@ from nep.cli.topics.topic_wait import TopicMonitor
 from nep.cli.values import encode_json, escape_for_terminal, format_payload
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, format_list, ngettext
+from nep.messages.codecs import content_of
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -315,7 +316,7 @@ def _format_header(message: Message) -> str:
 
 
 def _format_body(message: Message, max_width: int, *, in_full: bool) -> str:
-    if message.codec == "image":
+    if content_of(message.codec) == "image":
         return _image_summary(message)
     try:
         payload = message.payload

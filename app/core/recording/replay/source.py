@@ -20,6 +20,7 @@ from app.core.network.mailbox import DrainResult, Mailbox
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError, RecordingError
+from nep.messages.codecs import content_of
 from nep.messages.message import Message, new_message
 from nep.recordings.formats.index import CorruptRange
 from nep.recordings.player import DueMessages, Playback, PlayerStatus
@@ -346,7 +347,7 @@ class ReplaySource:
         if not messages:
             return
         copies = [_own_copy(message) for message in messages]
-        self._image_sink.offer([each for each in copies if each.codec == "image"])
+        self._image_sink.offer([each for each in copies if content_of(each.codec) == "image"])
         with self._changed:
             for topic, group in groupby(sorted(copies, key=_topic), key=_topic):
                 self._mailbox.post(topic, list(group))
@@ -362,7 +363,7 @@ class ReplaySource:
 
     def _apply_seek(self, messages: Sequence[Message]) -> None:
         copies = [_own_copy(message) for message in messages if message.topic in self._panel_topics]
-        images = [each for each in copies if each.codec == "image"]
+        images = [each for each in copies if content_of(each.codec) == "image"]
         self._image_sink.reset([each.topic for each in images])
         self._image_sink.offer(images)
         with self._changed:

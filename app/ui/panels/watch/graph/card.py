@@ -29,6 +29,7 @@ from app.ui.widgets import (
 from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, ngettext, number
+from nep.messages.codecs import content_of
 
 if TYPE_CHECKING:
     from nep.protocol.graph_view import GraphView, ServiceInfo
@@ -414,7 +415,7 @@ def _topic_content(topic: Topic, sources: CardSources) -> CardContent:
         tuple(table for table in tables if table.rows),
         clock_offset_text(sources.view) if not topic.network else "",
         topic.key,
-        topic.codec != "image",
+        content_of(topic.codec) != "image",
         "" if topic.network else f"alarm.topic:{topic.name}",  # alarms work on Studio's own network only
     )
 

@@ -10,6 +10,7 @@ from app.core.network.topics import Topic
 from app.core.network.watches import Suspendable, Watch
 from app.core.session import Session
 from nep.errors import NepError
+from nep.messages.codecs import content_of
 from nep.messages.message import Message
 
 ANNOTATION_TYPES = ("foxglove.ImageAnnotations", "ImageAnnotations", "image_annotations")
@@ -19,7 +20,7 @@ MAX_OVERLAYS = 8
 
 def may_contain_annotations(topic: Topic) -> bool:
     """Return True if the message type or the name of a topic indicates annotations for images."""
-    if topic.codec not in {"json", "msgpack"}:
+    if content_of(topic.codec) != "values":
         return False
     return (
         topic.msg_type.rpartition("/")[2] in ANNOTATION_TYPES

@@ -27,6 +27,7 @@ from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.field_drag import FieldDrag
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, pgettext
+from nep.messages.codecs import content_of
 from nep.messages.fields import path_text
 
 if TYPE_CHECKING:
@@ -199,7 +200,7 @@ class InspectorPanel(PanelWidget):
             self.body.show_waiting(topic_label(self._topic), has_publisher, self.doctor_action(self._topic))
 
     def _show_message(self, message: Message) -> None:
-        is_large = message.size_bytes > LARGE_BYTES and message.codec != "image"
+        is_large = message.size_bytes > LARGE_BYTES and content_of(message.codec) != "image"
         if self._is_raw_mode:
             self._show_raw(message, "")
         elif is_large and message.codec != "json" and message is not self._requested_large_message:

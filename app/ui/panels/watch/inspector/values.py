@@ -12,6 +12,7 @@ from app.core.messages.reader import LARGE_BYTES, ReadResult, read
 from app.ui.text.numbers import size_text
 from nep.errors import NepError
 from nep.i18n import _, ngettext
+from nep.messages.codecs import content_of
 
 if TYPE_CHECKING:
     from nep.messages.message import Message
@@ -111,7 +112,7 @@ def decode_now(message: Message) -> ReadResult:
 
     Errors are not raised, but returned in the `ReadResult`.
     """
-    if message.codec != "image":
+    if content_of(message.codec) != "image":
         return read(message)
     try:
         return ReadResult(message, image_summary(message))
@@ -126,7 +127,7 @@ def payload_or_default(message: Message, default: object) -> object:
         message: Message to decode.
         default: Returned for images, for large messages, and if decoding fails.
     """
-    if message.size_bytes > LARGE_BYTES or message.codec == "image":
+    if message.size_bytes > LARGE_BYTES or content_of(message.codec) == "image":
         return default
     decoded = read(message)
     return default if decoded.error is not None else decoded.value
