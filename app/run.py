@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import TextIO
 
 import nep
-from app.blocks import Program, ProjectCompiler
+from app.blocks.compiler.compiler import ProjectCompiler
 from app.blocks.interrupts import without_interrupts
+from app.blocks.model.program import Program
 from app.blocks.model.project import Project
 from app.blocks.model.workspace import Workspace, parse_workspace
 from app.blocks.runtime.events import (

@@ -28,7 +28,7 @@ from PySide6.QtCore import QElapsedTimer, QEventLoop, QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView, register_scheme
 from bench.blocks import TRUSTED
 

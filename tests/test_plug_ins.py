@@ -13,8 +13,9 @@ from types import ModuleType
 import pytest
 
 import nep
-from app.blocks import compile_behaviour, editor_definitions
+from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.toolbox.catalogue import english_categories
+from app.blocks.toolbox.definitions import editor_definitions
 from app.robots.description.description import parse, thing_description
 from app.robots.kit import Driver
 from nep.masters.master import Master

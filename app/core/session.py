@@ -69,8 +69,8 @@ from app.core.world.part import Resource, SessionPart
 from app.core.world.shown import ShownWorld
 from app.core.world.world import World
 from nep.i18n import lazy
-from nep.masters.master import master_address
 from nep.messages.message import Message
+from nep.system.addresses import master_address
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication, QLibraryInfo, QLocale, Qt, QTimer, QTranslator
 from PySide6.QtGui import QIcon
@@ -30,7 +31,6 @@ from app.core.session import Session
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
 from app.ui.panels.registry import PanelRegistry
-from app.ui.self_drive import SelfDrive
 from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
@@ -43,6 +43,12 @@ from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
 from nep.i18n import ENGLISH, _, format_list, language
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.ui import self_drive as driving
+else:
+    driving = lazy_module("app.ui.self_drive")
 
 LOG_INTERVAL_MS = 500
 RESTART_EXIT_CODE = -1
@@ -50,9 +56,15 @@ RESTART_EXIT_CODE = -1
 FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW_MODULE = "app.ui.blockly.view"
 PRELOADED_MODULES = (
+    "app.blocks.compiler.compiler",
+    "app.blocks.fixes.fixes",
+    "app.blocks.toolbox.definitions",
     "app.ui.shell.dialogs.command_palette",
+    "app.ui.shell.dialogs.network_access",
+    "app.ui.shell.dialogs.other_networks",
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
+    "app.ui.shell.dialogs.web_pages",
 )
 """Modules to import after the first paint, so that their first use isn't delayed."""
 
@@ -76,7 +88,7 @@ class Options:
     theme: str | None = None
     self_drive: Path | None = None
     opens_new_window: bool = False
-    make_driver: Callable[[MainWindow], SelfDrive] | None = None
+    make_driver: Callable[[MainWindow], driving.SelfDrive] | None = None
     """Factory of the `SelfDrive` that operates the window; called before the window is shown."""
     loads_web_view: bool = True
     """True to load the block editor's web page; False avoids the start of the web engine."""
@@ -412,7 +424,7 @@ def _run_window(
     if isinstance(application, Application):
         application.set_file_opener(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
-        driver = SelfDrive(window, options.self_drive)
+        driver = driving.SelfDrive(window, options.self_drive)
     sandbox.configure_sandbox(os.environ, sandbox_test)  # requires the event loop, which creates the page
     code = application.exec()
     speaker.close()

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from app import resources
-from app.blocks import compile_behaviour, editor_definitions
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.toolbox.definitions import editor_definitions
 from app.robots.description.description import parse
 from tests.blocks.fakes import FakeLink, Play, until
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.blocks import Problem
+from app.blocks.model.program import Problem
 from app.core.messages.picture import Picture
 from app.core.network import topics as topics_module
 from app.core.network.nodes import GATEWAY

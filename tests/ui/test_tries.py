@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.blocks.compiler.stack import Stack
+from app.blocks.model.stack import Stack
 from app.robots.description.description import parse, thing_description
 from app.robots.turtle import ROBOT
 from tests.blocks.samples import block, number

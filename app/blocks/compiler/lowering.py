@@ -16,14 +16,19 @@ from app.blocks.compiler.program_names import PageNames
 from app.blocks.model.block import Block
 from app.blocks.model.fields import Argument, ValueInput
 from app.blocks.model.mutators import Branches, FunctionInput, Inputs, Items, function_name, inputs_of
-from app.blocks.model.workspace import PlacedBlock, Workspace
+from app.blocks.model.workspace import (
+    PLAIN_CALL,
+    PLAIN_FUNCTION,
+    RESULT_CALL,
+    RESULT_FUNCTION,
+    PlacedBlock,
+    Workspace,
+)
 from app.blocks.toolbox.catalogue import Catalogue
 from nep.i18n import _
 
-PLAIN, RESULT = "functions_define", "functions_define_result"
-CALL, CALL_RESULT = "functions_call", "functions_result"
 END_BLOCK = "functions_end"
-_HAS_RESULT = {PLAIN: False, RESULT: True}
+_HAS_RESULT = {PLAIN_FUNCTION: False, RESULT_FUNCTION: True}
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,7 @@ class Lowering:
     def called_function(self, placed_block: PlacedBlock) -> Function | None:
         """Return the function that a block of the rewritten `workspace` calls; None if there is none."""
         kind = placed_block.type.partition(":")[0]
-        function = self._find_function(placed_block) if kind in (CALL, CALL_RESULT) else None
+        function = self._find_function(placed_block) if kind in (PLAIN_CALL, RESULT_CALL) else None
         if function is None:
             return None
         definitions = (script[0] for script in self.workspace.scripts)
@@ -153,7 +158,7 @@ class Lowering:
         )
         return (
             None
-            if function is None or (placed_block.type == CALL_RESULT and not function.has_result)
+            if function is None or (placed_block.type == RESULT_CALL and not function.has_result)
             else function
         )
 
@@ -226,7 +231,7 @@ class Lowering:
             "%INPUTS", _escape_placeholders(input_names)
         )
         arguments = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
-        if placed_block.type == RESULT:
+        if placed_block.type == RESULT_FUNCTION:
             result = tuple(argument for argument in arguments if argument.name == "RESULT")
             self._catalogue.blocks[f"{END_BLOCK}:{placed_block.id}"] = replace(
                 block, shape="statement", text="return %RESULT", python="return %RESULT", arguments=result

@@ -5,9 +5,16 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 
-from app.blocks.compiler.lowering import CALL, CALL_RESULT, PLAIN, RESULT
 from app.blocks.model.mutators import function_name, inputs_of
-from app.blocks.model.workspace import PlacedBlock, is_enabled, saved_blocks
+from app.blocks.model.workspace import (
+    PLAIN_CALL,
+    PLAIN_FUNCTION,
+    RESULT_CALL,
+    RESULT_FUNCTION,
+    PlacedBlock,
+    is_enabled,
+    saved_blocks,
+)
 from app.blocks.toolbox.catalogue import categories
 
 BLOCK_FIXES = frozenset({"limit", "define", "after"})
@@ -44,7 +51,7 @@ def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | Non
                 return result
     if verb == "define":
         for block in saved_blocks(result):
-            if block.get("id") == target and block.get("type") in (CALL, CALL_RESULT):
+            if block.get("id") == target and block.get("type") in (PLAIN_CALL, RESULT_CALL):
                 return _with_definition(result, block)
     return _fix_scripts(result, verb, target)
 
@@ -105,7 +112,7 @@ def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -
     extra_state: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
     call_block = PlacedBlock("", "", {}, extra_state=extra_state)
     definition: dict[str, object] = {
-        "type": RESULT if call.get("type") == CALL_RESULT else PLAIN,
+        "type": RESULT_FUNCTION if call.get("type") == RESULT_CALL else PLAIN_FUNCTION,
         "x": 40,
         "y": 40,
         "fields": {"NAME": function_name(call_block)},

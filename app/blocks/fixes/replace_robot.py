@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
 
-from app.blocks.categories.robot import robot_blocks
 from app.blocks.model.robot_text import block_type_of
 from app.blocks.model.workspace import saved_blocks
 from app.robots.description.description import Robot
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.blocks.categories import robot as robot_category
+else:  # the categories take long to import
+    robot_category = lazy_module("app.blocks.categories.robot")
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
@@ -39,7 +45,7 @@ def block_counts_by_robot(workspace: Mapping[str, object], ids: Collection[str])
 
 def block_types_of(robot: Robot) -> frozenset[str]:
     """Return the types of all blocks of a robot."""
-    return frozenset(block.type for block in robot_blocks(robot, [robot]))
+    return frozenset(block.type for block in robot_category.robot_blocks(robot, [robot]))
 
 
 def supports_blocks(

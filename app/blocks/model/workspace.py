@@ -14,6 +14,8 @@ from app.blocks.model.names import UniqueTexts
 from nep.i18n import _
 
 MAX_DEPTH = 40
+PLAIN_FUNCTION, RESULT_FUNCTION = "functions_define", "functions_define_result"
+PLAIN_CALL, RESULT_CALL = "functions_call", "functions_result"
 _DISABLED_BY_USER = "MANUALLY_DISABLED"
 
 

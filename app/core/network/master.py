@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from app.core.reports.crash import crash_extra, exit_text, is_crash
 from app.core.reports.own_process import module_command
 from nep.errors import NepError
-from nep.masters.master import is_running, start_process
+from nep.masters.process import is_running, start_process
 from nep.protocol.graph_view import GraphView
 from nep.system.lazy_import import lazy_module
 

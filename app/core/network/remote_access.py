@@ -12,7 +12,7 @@ from app.core.storage.settings import ListSettings
 from app.errors import SettingsError
 from nep.errors import NepError
 from nep.i18n import _
-from nep.masters.master import listen
+from nep.masters.process import listen
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 

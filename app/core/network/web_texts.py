@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from app.core.network.web_pages import DEFAULT_PORT, WebPages
 from nep.i18n import _, ngettext, number
-from nep.masters.master import master_address
-from nep.system.addresses import OwnAddress
+from nep.system.addresses import OwnAddress, master_address
 
 if TYPE_CHECKING:
     from nep.programs.web.context import ConnectedPage, Rejection

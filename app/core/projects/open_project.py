@@ -7,16 +7,15 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from app.blocks import Problem, Program, ProjectCompiler, editor_definitions
-from app.blocks.compiler.stack import Stack
-from app.blocks.fixes.fixes import BLOCK_FIXES, fix
 from app.blocks.fixes.replace_robot import blocks_of, with_robot_replaced
 from app.blocks.model import deep_json
+from app.blocks.model.program import Problem, Program
 from app.blocks.model.project import ALWAYS_ID, Page, Project
+from app.blocks.model.stack import Stack
 from app.blocks.model.workspace_json import LONG_TEXT_LENGTH, WorkspaceJson
 from app.core.projects.examples import translated
 from app.core.projects.file_format import (
@@ -33,6 +32,19 @@ from app.core.storage.background_worker import BackgroundWorker
 from app.errors import DescriptionError, DocumentError
 from app.robots.description.description import Robot, parse
 from nep.i18n import _, lazy
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.blocks.compiler import compiler as project_compiler
+    from app.blocks.fixes import fixes
+    from app.blocks.toolbox import definitions as toolbox
+else:  # imported after the window is shown
+    project_compiler = lazy_module("app.blocks.compiler.compiler")
+    fixes, replace_robot = (
+        lazy_module("app.blocks.fixes.fixes"),
+        lazy_module("app.blocks.fixes.replace_robot"),
+    )
+    toolbox = lazy_module("app.blocks.toolbox.definitions")
 
 DEFAULT_NAME = lazy("New behaviour")
 
@@ -111,7 +123,6 @@ class OpenProject:
         self.definitions_revision = 0
         self._connected_robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
-        self._page_cache = ProjectCompiler()
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
         self._compiling_key: Key | None = None
@@ -305,14 +316,14 @@ class OpenProject:
     def _fixed_page(self, action: str) -> Page | None:
         verb, _colon, target = action.partition(":")
         page = self.project.always
-        if verb in BLOCK_FIXES:
+        if verb in fixes.BLOCK_FIXES:
             page = next(
                 (each for each in self.project.pages[1:] if target.startswith(each.block_prefix)), page
             )
         page_action = (
             f":{target}".replace(f":{page.block_prefix}", ":") if page.block_prefix else f":{target}"
         )
-        blocks = deep_json.run_deep(lambda: fix(page.workspace.blocks, verb + page_action))
+        blocks = deep_json.run_deep(lambda: fixes.fix(page.workspace.blocks, verb + page_action))
         return page.with_workspace(WorkspaceJson.from_blocks(blocks)) if blocks is not None else None
 
     def replace_missing_robot(self, missing: str, robot: Robot) -> bool:
@@ -329,7 +340,13 @@ class OpenProject:
         project = self.project
         for page in pages:
             blocks = deep_json.run_deep(
-                partial(with_robot_replaced, page.workspace.blocks, missing, missing_robot.model, robot)
+                partial(
+                    with_robot_replaced,
+                    page.workspace.blocks,
+                    missing,
+                    missing_robot.model,
+                    robot,
+                )
             )
             project = project.with_page(page.with_workspace(WorkspaceJson.from_blocks(blocks)))
         self.apply_project(project)
@@ -441,7 +458,7 @@ class OpenProject:
         tried_page = page.with_workspace(WorkspaceJson.from_blocks(blocks))
         pages = (tried_page, *(each for each in self.project.modules if each.id != page_id))
         robots, absent = self._connected_robots, self.absent_robots
-        program = ProjectCompiler().compile(pages, robots, absent=absent, name=self.name)
+        program = project_compiler.ProjectCompiler().compile(pages, robots, absent=absent, name=self.name)
         return replace(program, shows_value=stack.is_value)
 
     def newest_program(self) -> Program | None:
@@ -477,6 +494,10 @@ class OpenProject:
     def _key(self) -> Key:
         return self.name, self.revision, self.edits, self.definitions_revision
 
+    @cached_property
+    def _page_cache(self) -> project_compiler.ProjectCompiler:
+        return project_compiler.ProjectCompiler()
+
     def _compile_job(self) -> Callable[[], Program]:
         # Compiles the current state; it may run in any thread, and parses there.
         pages, robots = self.project.pages, self._connected_robots
@@ -489,7 +510,7 @@ class OpenProject:
     def definitions(self) -> Mapping[str, object]:
         """Return the block and toolbox definitions for the editor, including those of connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
-            definitions = editor_definitions(self._connected_robots, self.absent_robots, self._topics)
+            definitions = toolbox.editor_definitions(self._connected_robots, self.absent_robots, self._topics)
             self._definitions = (self.definitions_revision, definitions)
         return self._definitions[1]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from app.blocks import editor_definitions
 from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import DEFAULT_NAME, CompiledProgram, OpenProject
 from app.core.projects.titles import unique_titles
@@ -17,6 +17,12 @@ from app.core.storage.background_worker import BackgroundWorker
 from app.errors import DocumentError
 from app.robots.description.description import Robot
 from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.blocks.toolbox import definitions as toolbox
+else:  # imported after the window is shown
+    toolbox = lazy_module("app.blocks.toolbox.definitions")
 
 MAX_CLOSED_TABS = 20
 
@@ -211,7 +217,7 @@ class OpenProjects:
         hidden tabs keep their blocks.
         """
         absent = {robot.name: robot for document in self._documents for robot in document.absent_robots}
-        return editor_definitions(self._robots, tuple(absent.values()), self._topics)
+        return toolbox.editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from app.blocks import Problem
 from app.blocks.fixes.replace_robot import (
     block_counts_by_robot,
     block_types_by_robot,
     block_types_of,
     supports_blocks,
 )
+from app.blocks.model.program import Problem
 from app.blocks.model.project import Page
 from app.robots.description.description import Robot
 from nep.i18n import _, ngettext

@@ -10,8 +10,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
-from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program, Variable
+from app.blocks.model.stack import Stack
 from app.blocks.runtime.events import (
     BlocksTraced,
     CommandReplaced,

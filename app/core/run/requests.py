@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.blocks.compiler.stack import SHOW_BLOCK_ID, Stack
 from app.blocks.model.program import Program
+from app.blocks.model.stack import SHOW_BLOCK_ID, Stack
 from app.core.projects.open_project import OpenProject
 from app.core.projects.problems import CONNECT_PREFIX
 from app.robots.description.description import Robot

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from app.blocks.compiler.stack import Stack
 from app.blocks.model.program import Program
+from app.blocks.model.stack import Stack
 from app.core.projects.open_project import OpenProject
 from app.core.run.requests import RequestedRun
 from app.robots.description.description import Robot

@@ -43,7 +43,7 @@ class BlocklyView(BlocklyHost):
     canvas_button_pressed = Signal(
         str
     )  # name of the pressed button of the empty canvas: "robot" or "examples"
-    try_requested = Signal(str)  # script to try, as JSON (`app.blocks.compiler.stack`)
+    try_requested = Signal(str)  # script to try, as JSON (`app.blocks.model.stack`)
     visible_sensors_changed = Signal(tuple)  # (robot, sensor) of each sensor block in the open flyout
     command_requested = Signal(str)  # id of a window command such as "variable.rename:ID"
     watched_variables_changed = Signal(tuple)  # ids of the variables whose values the page shows

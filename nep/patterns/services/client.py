@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import queue
 import threading
@@ -25,9 +24,14 @@ from nep.patterns.services.typed import UNTYPED, CallTypes
 from nep.protocol.service_wire import CallKind, read_error_reply
 from nep.system.arguments import check_optional_time_limit
 from nep.system.forks import current_generation
+from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
+    import asyncio
+
     from typing_extensions import Self
+else:
+    asyncio = lazy_module("asyncio")
 
 
 TimeLimit = float | Literal["default"] | None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from app.blocks import Program, compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.compiler.foreign import EQUIVALENT_BLOCKS
+from app.blocks.model.program import Program
 from app.blocks.model.workspace import parse_workspace
 from app.blocks.toolbox.catalogue import categories
 from tests.blocks.samples import block, robot, started, workspace

@@ -11,11 +11,11 @@ import copy
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.compiler.program_names import COMMANDS
 from app.blocks.model.fields import StatementInput, ValueInput, VariableField
 from app.blocks.toolbox.catalogue import Catalogue
+from app.blocks.toolbox.definitions import editor_definitions
 from app.errors import DescriptionError
 from app.robots.description.description import parse, thing_description
 from tests.blocks.samples import MODEL, block, robot, stack, started, workspace

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from app.blocks import Program, ProjectCompiler, compile_behaviour
 from app.blocks.compiler import compiler as compiler_module
+from app.blocks.compiler.compiler import ProjectCompiler, compile_behaviour
+from app.blocks.model.program import Program
 from app.blocks.model.project import Page, PageKind, Project
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.robots.description.description import Robot

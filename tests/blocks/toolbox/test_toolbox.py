@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from app.blocks import editor_definitions
 from app.blocks.toolbox.catalogue import categories
+from app.blocks.toolbox.definitions import editor_definitions
 from tests.blocks.samples import nao, robot
 from tools.blocks_page import page
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app import resources
-from app.blocks import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.project import Project
 from app.core.projects.examples import translated
 from app.core.projects.file_format import read_file

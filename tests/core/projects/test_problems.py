@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.blocks import compile_behaviour
+from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.fixes.replace_robot import block_types_by_robot, supports_blocks, with_robot_replaced
 from app.blocks.model.project import Project
 from app.core.projects.journal import Journal

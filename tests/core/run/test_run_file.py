@@ -318,7 +318,7 @@ def test_examples_run_on_the_virtual_robot():
 
 @pytest.mark.timeout(240)
 def test_generated_program_runs_as_a_python_file(master, pepper, tmp_path):
-    from app.blocks import compile_behaviour
+    from app.blocks.compiler.compiler import compile_behaviour
 
     saved = workspace(started(say("Hi"), write(text("done"))))
     path = tmp_path / "program.py"

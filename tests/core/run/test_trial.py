@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.blocks.compiler.stack import Stack
+from app.blocks.model.stack import Stack
 from app.core.projects.open_project import OpenProject
 from app.core.run.requests import RequestedRun
 from app.core.run.trial import Trial

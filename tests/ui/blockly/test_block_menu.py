@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import number, robot, workspace
 from tests.ui.blockly_person import TOKENS, WAIT_MS, Person, editor, outlined

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 
-from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, boolean, started, text, workspace, write
 from tests.ui.blockly.test_block_menu import choose, looked_at, open_menu

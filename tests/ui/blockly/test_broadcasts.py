@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, stack, started, text, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QMimeData
 
-from app.blocks.compiler.stack import Stack
+from app.blocks.model.stack import Stack
 from app.core.projects.file_format import parse_file
 from app.errors import DocumentError
 from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import robot
 from tests.ui.blockly.test_block_menu import choose, double_click, looked_at, open_menu, program

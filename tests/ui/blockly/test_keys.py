@@ -8,8 +8,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMainWindow
 
-from app.blocks import editor_definitions
 from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, list_of, number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app import resources
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from app.core.projects.examples import translated
 from app.core.projects.file_format import read_file
 from app.robots.description.description import parse, thing_description

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import call, define, given, list_of, started, text, workspace, write
 from tests.ui.blockly_person import Person, editor

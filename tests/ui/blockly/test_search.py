@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from nep.i18n import install, language
 from tests.blocks.samples import nao, robot
 from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace

@@ -7,7 +7,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import robot, started, workspace
 from tests.ui.blockly.test_block_menu import ROWS, looked_at

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from app.blocks import editor_definitions
 from app.blocks.runtime.variables import display_value
+from app.blocks.toolbox.definitions import editor_definitions
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor

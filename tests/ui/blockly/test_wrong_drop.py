@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QPoint
 
-from app.blocks import editor_definitions
+from app.blocks.toolbox.definitions import editor_definitions
 from tests.blocks.samples import number, robot
 from tests.ui.blockly_person import START, WAIT_MS, Person, editor, workspace
 

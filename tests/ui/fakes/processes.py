@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO
 
-from app.blocks import Program
+from app.blocks.model.program import Program
 from app.blocks.runtime.events import (
     BlocksTraced,
     CommandReplaced,

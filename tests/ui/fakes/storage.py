@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from app.blocks import Problem, Program
+from app.blocks.model.program import Problem, Program
 from app.blocks.model.project import Project
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.projects import journal as journal_module

@@ -11,8 +11,8 @@ from typing import Protocol
 
 import pytest
 
-from app.blocks import compile_behaviour
-from app.blocks.compiler.stack import Stack
+from app.blocks.compiler.compiler import compile_behaviour
+from app.blocks.model.stack import Stack
 from app.blocks.runtime.events import (
     BlocksTraced,
     ProgramEnded,

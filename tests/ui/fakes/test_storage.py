@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.blocks import Problem, Program
+from app.blocks.model.program import Problem, Program
 from app.core.network.doctor import Doctor
 from app.core.projects.journal import Journal
 from app.core.projects.open_project import OpenProject

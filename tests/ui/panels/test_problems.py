@@ -5,7 +5,7 @@ from PySide6.QtCore import QPoint, QRectF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF
 from PySide6.QtTest import QTest
 
-from app.blocks import Problem
+from app.blocks.model.program import Problem
 from app.core.reports.not_installed import MissingLibraries, alert_missing
 from app.ui.panels.build.problems import PANEL, ProblemsPanel
 from app.ui.widgets import paint

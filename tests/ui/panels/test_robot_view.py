@@ -9,7 +9,7 @@ from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
-from app.blocks.compiler.stack import Stack
+from app.blocks.model.stack import Stack
 from app.ui.panels.robots.robot.panel import PANEL, STALE_AFTER_S, RobotPanel
 from tests.blocks.samples import block, number, started, workspace
 from tests.ui.fakes import Session

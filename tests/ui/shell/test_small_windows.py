@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QPoint, QRect
 from PySide6.QtWidgets import QWidget
 
 from app import resources
-from app.blocks import Problem
+from app.blocks.model.program import Problem
 from app.ui.panels.base import Panel, PanelWidget
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.app_bar import AppBar

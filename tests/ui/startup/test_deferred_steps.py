@@ -109,6 +109,8 @@ def test_window_is_built_without_importing_panels_editor_and_heavy_packages(tmp_
     """Every import before the first paint delays each start."""
     late = ["PySide6.QtWebEngineCore", "PySide6.QtNetwork", "cv2", "numpy", "psutil", "nep.programs.doctor"]
     late += ["pyqtgraph", "app.ui.blockly.view", "app.ui.panels.watch.console.panel", "importlib.metadata"]
+    late += ["asyncio", "app.blocks.compiler.lowering", "nep.masters.server", "app.ui.self_drive"]
+    late += ["app.ui.shell.dialogs.network_access", "app.ui.shell.dialogs.web_pages.sheet"]
     program = (
         "import sys\n"
         "from app.ui import application\n"

@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor, QIcon, QImage, QPainter
 from PySide6.QtSvg import QSvgRenderer
 
 from app import resources
-from app.blocks import Problem
+from app.blocks.model.program import Problem
 from app.blocks.toolbox.catalogue import Catalogue
 from app.core.projects.problems import ProblemLine
 from app.ui.panels.build.problems import ProblemRow

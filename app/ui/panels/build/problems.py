@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.blocks import Problem
+from app.blocks.model.program import Problem
 from app.core.projects.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
@@ -29,7 +29,7 @@ from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
-    from app.blocks import Program
+    from app.blocks.model.program import Program
     from app.core.alerts.alerts import ActiveAlert
     from app.core.projects.open_project import OpenProject
     from app.robots.description.description import Robot

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QUrl
 
-from app.blocks.compiler.stack import Stack
 from app.blocks.model import deep_json
+from app.blocks.model.stack import Stack
 from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import OpenProject
 from app.core.session import Session

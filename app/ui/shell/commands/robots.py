@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.session import Session
 from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
-from app.ui.shell.dialogs.network_access import NetworkAccessSheet
-from app.ui.shell.dialogs.other_networks import OtherNetworksSheet
-from app.ui.shell.dialogs.web_pages import WebPagesSheet
 from app.ui.shell.projects import ProjectController
 from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    from app.ui.shell.dialogs import network_access, other_networks, web_pages
+else:  # imported after the window is shown
+    network_access = lazy_module("app.ui.shell.dialogs.network_access")
+    other_networks = lazy_module("app.ui.shell.dialogs.other_networks")
+    web_pages = lazy_module("app.ui.shell.dialogs.web_pages")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +57,9 @@ class RobotCommands:
     ) -> None:
         # `undo` reverts the last edit of the blocks.
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
-        self._network_access: NetworkAccessSheet | None = None
-        self._other_networks: OtherNetworksSheet | None = None
-        self._web_pages: WebPagesSheet | None = None
+        self._network_access: network_access.NetworkAccessSheet | None = None
+        self._other_networks: other_networks.OtherNetworksSheet | None = None
+        self._web_pages: web_pages.WebPagesSheet | None = None
 
     def toggle_reset_before_run(self) -> None:
         """Toggle the setting that virtual robots return to their start position before each run."""
@@ -174,7 +179,7 @@ class RobotCommands:
     def open_network_access(self) -> None:
         """Open the sheet that controls access from other computers."""
         if self._network_access is None:
-            self._network_access = NetworkAccessSheet(
+            self._network_access = network_access.NetworkAccessSheet(
                 self._shell.theme, self._shell.surface, self._session.remote_access
             )
         self._network_access.open()
@@ -182,7 +187,7 @@ class RobotCommands:
     def open_other_networks(self) -> None:
         """Open the sheet to select other networks to monitor."""
         if self._other_networks is None:
-            self._other_networks = OtherNetworksSheet(
+            self._other_networks = other_networks.OtherNetworksSheet(
                 self._shell.theme, self._shell.surface, self._session.live.networks
             )
         self._other_networks.open()
@@ -190,7 +195,7 @@ class RobotCommands:
     def open_web_pages(self) -> None:
         """Open the sheet of the web server."""
         if self._web_pages is None:
-            self._web_pages = WebPagesSheet(
+            self._web_pages = web_pages.WebPagesSheet(
                 self._shell.theme,
                 self._shell.surface,
                 self._session.web_pages,

@@ -32,7 +32,7 @@ from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
 from nep.i18n import _, lazy, ngettext, pgettext
 
 if TYPE_CHECKING:
-    from app.blocks import Program
+    from app.blocks.model.program import Program
     from app.blocks.model.workspace_json import WorkspaceJson
     from app.core.network.watches import Suspendable, Watch
     from app.core.projects.open_project import OpenProject

@@ -9,8 +9,7 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from app.blocks.compiler.lowering import PLAIN, RESULT
-from app.blocks.model.workspace import saved_blocks
+from app.blocks.model.workspace import PLAIN_FUNCTION, RESULT_FUNCTION, saved_blocks
 
 SavedJson = Mapping[str, object]
 _HAT = {"type": "events_started", "id": "try hat"}
@@ -70,7 +69,9 @@ class Stack:
         if first is None:
             return None
         functions = [
-            top for top in tops or () if isinstance(top, dict) and top.get("type") in (PLAIN, RESULT)
+            top
+            for top in tops or ()
+            if isinstance(top, dict) and top.get("type") in (PLAIN_FUNCTION, RESULT_FUNCTION)
         ]
         result["blocks"] = {"languageVersion": 0, "blocks": [*functions, {**_HAT, "next": {"block": first}}]}
         return result

@@ -10,8 +10,8 @@ import copy
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.compiler.stack import SHOW_BLOCK_ID, Stack
 from app.blocks.model.program import Program
+from app.blocks.model.stack import SHOW_BLOCK_ID, Stack
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, call, define, get, number, robot, say, stack, started, text, workspace
 
