@@ -39,7 +39,7 @@ class Pages:
         thread = group.start(group.name, body)
 
         def join() -> None:
-            thread.join(10)
+            thread.join(60)
             assert not thread.is_alive()
 
         return join

@@ -280,7 +280,7 @@ def test_stop_is_repeated_only_once_for_a_robot_whose_stop_is_always_late(
         session.tick()
     assert (link.state, session.runs.view().confirm_label) == ("not stopped", "Pepper isn't moving")
     session.runs.stop()  # Stop by a person gives the robot another chance
-    tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
+    tick_until(session, lambda: len({each["id"] for each in pepper.heard("stop")}) == 3, LONG_S)
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
 
 

@@ -106,7 +106,7 @@ def say(socket: zmq.Socket[bytes], *requests: Request) -> None:
 def answers(socket: zmq.Socket[bytes], count: int) -> None:
     """Wait for `count` replies of the master."""
     for _ in range(count):
-        assert socket.poll(10_000), "the master does not answer any more"
+        assert socket.poll(60_000), "the master does not answer any more"
         socket.recv()
 
 

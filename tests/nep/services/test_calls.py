@@ -302,7 +302,7 @@ def test_timed_out_calls_are_not_executed(make: Make, spin) -> None:
     client = make("client").new_client("/tired")
     eventually(lambda: client.is_connected)
     with pytest.raises(nep.ServiceTimeoutError):
-        client.call("late", timeout_s=0.05)
+        client.call("late", timeout_s=0.3)
     # Its time limit starts on arrival, possibly after the client's timeout.
     eventually(lambda: any(call.is_late for call in node._services.queues[0]._calls))
     spin(node)

@@ -126,12 +126,12 @@ def test_commands_received_before_a_stop_are_not_run_after_the_stop(busy, how):
     driver, ears, go_on = busy
     for number in range(100):
         ears.invoke(f"q{number}", "light")
-    ears.rize({"node": "action", "robots": "Turtle", "id": "r", "primitives": {"primitive": "leds"}})
     if how == "native":
         ears.command(id="s", op="stop")
     elif how == "action":
         ears.invoke("s", "stop")
     else:
+        ears.rize({"node": "action", "robots": "Turtle", "id": "r", "primitives": {"primitive": "leds"}})
         stop = {"primitive": "stop", "input": "", "options": "none"}
         ears.rize({"node": "action", "robots": ["Turtle"], "id": "s", "primitives": stop})
     eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
@@ -144,6 +144,7 @@ def test_commands_received_before_a_stop_are_not_run_after_the_stop(busy, how):
     else:
         answered = ears.heard["action_state"]
         eventually(lambda: ("s", "success") in [(each["id"], each["state"]) for each in answered])
+        assert ("r", "success") not in [(each["id"], each["state"]) for each in answered]
     eventually(lambda: ears.invoke("after", "light") or "succeeded" in ears.states("after"))
 
 
