@@ -43,9 +43,9 @@ _MAX_ENDPOINTS = 32
 _MAX_PID = 2**32 - 1
 _NODE_ID_PATTERN = re.compile("[0-9a-f]{16}")
 _ENDPOINT_PATTERN = re.compile(
-    r"tcp://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}(?:%[\w.-]{1,20})?\]):(\d{1,5})", re.ASCII
+    r"(?:tcp|nanomsg)://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}(?:%[\w.-]{1,20})?\]):(\d{1,5})",
+    re.ASCII,
 )
-_NANOMSG_ENDPOINT_PATTERN = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _MAX_UNCONNECTED_NODES = 100
 """Maximum number of ids in `RegisteredNode.unconnected_node_ids`."""
@@ -496,14 +496,8 @@ def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, record_id:
 # ---- validation of registrations
 
 
-def is_nanomsg_endpoint(endpoint: str) -> bool:
-    """Return True for `nanomsg://HOST:PORT/PORT`, the endpoint of a nanomsg publisher."""
-    match = _NANOMSG_ENDPOINT_PATTERN.fullmatch(endpoint)
-    return match is not None and all(1 <= int(port) <= 65535 for port in match.groups())
-
-
-def is_tcp_endpoint(endpoint: str) -> bool:
-    """Return True for `tcp://HOST:PORT`, the endpoint of a ZeroMQ publisher."""
+def is_publisher_endpoint(endpoint: str) -> bool:
+    """Return True for `tcp://HOST:PORT` (ZeroMQ) and `nanomsg://HOST:PORT`, the endpoints of publishers."""
     match = _ENDPOINT_PATTERN.fullmatch(endpoint)
     return match is not None and 1 <= int(match.group(1)) <= 65535
 
@@ -586,12 +580,12 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
                 code="endpoint-count",
             )
         for endpoint in record.endpoints:
-            if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
+            if not is_publisher_endpoint(endpoint):
                 shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
                     _(
                         "'{said}' isn't a publisher endpoint; it must have the form 'tcp://HOST:PORT' or "
-                        "'nanomsg://HOST:PORT/PORT'"
+                        "'nanomsg://HOST:PORT'"
                     ).format(said=shown_endpoint),
                     code="endpoint",
                 )

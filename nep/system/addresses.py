@@ -182,13 +182,13 @@ def reachable_endpoint(endpoints: Sequence[str], master: str) -> str:
         endpoints: Endpoints of the publisher.
         master: Address of this program's master.
     """
+    addresses = {endpoint: endpoint.rpartition("://")[2] for endpoint in endpoints}
     if is_loopback(master):
-        local = [each for each in endpoints if is_loopback(each.removeprefix("tcp://"))]
+        local = [endpoint for endpoint, address in addresses.items() if is_loopback(address)]
         return (local or [*endpoints, ""])[0]
-    for endpoint in endpoints:
-        address = endpoint.removeprefix("tcp://")
+    for endpoint, address in addresses.items():
         if host_of(address) == ANY_HOST:
-            return f"tcp://{host_of(master)}:{address.rpartition(':')[2]}"
+            return f"{endpoint.removesuffix(address)}{host_of(master)}:{address.rpartition(':')[2]}"
         if not is_loopback(address):
             return endpoint
     return ""

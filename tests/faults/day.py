@@ -58,11 +58,12 @@ class Master:
 class Day:
     """Programs on the hosts of one test; they are killed at its end.
 
-    `address` is the address at which other hosts reach the master.
+    `backend` is that of their nodes, and `address` the one at which other hosts reach the master.
     """
 
-    def __init__(self, hosts: Network, stack: ExitStack) -> None:
+    def __init__(self, hosts: Network, stack: ExitStack, backend: str) -> None:
         self.hosts = hosts
+        self.backend = backend
         self.address = ""
         self.master: Master
         self._stack = stack
@@ -86,7 +87,9 @@ class Day:
         self, part: Callable[[], None], host: Host, topic: str, *, master: str = "", **more: Any
     ) -> Part:
         """Start a program of `traffic` on a host and wait until it is ready."""
-        options = json.dumps({"node": f"{part.__name__}-{host.name}", "topic": topic, **more})
+        options = json.dumps(
+            {"node": f"{part.__name__}-{host.name}", "topic": topic, "backend": self.backend, **more}
+        )
         program = running(
             traffic.code_of(part),
             options,
@@ -98,10 +101,10 @@ class Day:
 
 
 @contextmanager
-def day(hosts: Network) -> Iterator[Day]:
+def day(hosts: Network, backend: str) -> Iterator[Day]:
     """Yield a `Day` and kill its programs at the end."""
     with ExitStack() as stack:
-        yield Day(hosts, stack)
+        yield Day(hosts, stack, backend)
 
 
 def balance(sent: int, subscriber: Part) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from tests.faults.hosts import CannotMakeHostsError, network
 
 _OUT_S, _OUT_LONG_S = 1.0, 10.0
 """How long a fault lasts."""
+_each_backend = pytest.mark.parametrize("today", ["zeromq", "nanomsg"], indirect=True)
 
 
 @pytest.fixture
@@ -33,10 +34,10 @@ def _with_long(is_long: bool) -> None:
 
 
 @pytest.fixture
-def today() -> Iterator[Day]:
-    """Network of hosts with a master on a host of its own."""
+def today(request: pytest.FixtureRequest) -> Iterator[Day]:
+    """Network of hosts with a master on a host of its own; the parameter is the back end."""
     try:
-        with network() as hosts, day(hosts) as made:
+        with network() as hosts, day(hosts, getattr(request, "param", "zeromq")) as made:
             made.begin_master(hosts.host("m"))
             yield made
     except CannotMakeHostsError as error:
@@ -55,6 +56,7 @@ def _tell(scenario: scenarios.Scenario, measured: scenarios.Measured) -> None:
 
 
 @pytest.mark.timeout(150)
+@_each_backend
 def test_every_message_is_received_or_counted_as_lost_under_network_faults(today: Day) -> None:
     with ThreadPoolExecutor(len(scenarios.SIDE_BY_SIDE)) as side_by_side:
         begun = {each: side_by_side.submit(each, today, _OUT_S) for each in scenarios.SIDE_BY_SIDE}
@@ -74,6 +76,7 @@ def test_failover_to_another_master_loses_no_message(
 
 
 @pytest.mark.timeout(300)
+@_each_backend
 @pytest.mark.usefixtures("_with_long")
 @pytest.mark.parametrize("scenario", [*scenarios.SIDE_BY_SIDE, *scenarios.ALONE])
 def test_long_network_fault_causes_no_uncounted_loss(today: Day, scenario: scenarios.Scenario) -> None:

@@ -84,7 +84,7 @@ def publisher() -> None:
     Commands: go, pause, look, told (the sequence number that the master knows), end (closes the node).
     """
     options = json.loads(sys.argv[1])
-    node = nep.node(options["node"])
+    node = nep.node(options["node"], options["backend"])
     pub = node.new_pub(options["topic"], latched=options.get("latched", False))
     filling = "x" * options.get("size", 0)
     sent = options.get("after", 0)
@@ -145,7 +145,7 @@ class _Heard:
 def subscriber() -> None:
     """Receive messages and spend `work_s` seconds on each. Commands: look, again, end."""
     options = json.loads(sys.argv[1])
-    node = nep.node(options["node"])
+    node = nep.node(options["node"], options["backend"])
     sub = node.new_sub(
         options["topic"], keep=options.get("keep", "all"), max_messages=options.get("max_messages", 10_000)
     )
@@ -186,7 +186,7 @@ def subscriber() -> None:
 def server() -> None:
     """Reply to each call with its number, and count executed and repeated requests. Commands: look."""
     options = json.loads(sys.argv[1])
-    node = nep.node(options["node"])
+    node = nep.node(options["node"], options["backend"])
     done: Counter[str] = Counter()
 
     def carry_out(request: dict[str, Any]) -> dict[str, Any]:
@@ -205,7 +205,7 @@ def client() -> None:
     address.
     """
     options = json.loads(sys.argv[1])
-    node = nep.node(options["node"])
+    node = nep.node(options["node"], options["backend"])
     asking = node.new_client(options["topic"], timeout_s=options.get("timeout_s", 1.0))
     ends: Counter[str] = Counter()
     calls = wrong = 0

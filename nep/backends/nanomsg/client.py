@@ -16,7 +16,7 @@ from typing import Any
 
 from nep.backends.bases.deadlines import Deadlines
 from nep.backends.bases.pending_calls import OutcomeCallback, PendingCall, PendingCalls
-from nep.backends.nanomsg.library import load_pynng
+from nep.backends.nanomsg.library import Connections, load_pynng
 from nep.backends.nanomsg.server import close_context, join_parts, split_parts
 from nep.backends.services import ClientSpec, OpenCall, Outcome
 from nep.errors import NepError, ServerGoneError, WireError
@@ -54,23 +54,15 @@ class NanomsgClient(PendingCalls[_Call]):
         self._framing = framing
         self._deadlines = deadlines
         self._on_close = on_close
-        self._pipes: set[int] = set()
+        self._connections = Connections(socket)
         self._late_calls: dict[int, _Call] = {}
         """Calls that timed out or were cancelled, oldest first, to count their late replies."""
         self._threads: set[threading.Thread] = set()
-        socket.add_post_pipe_connect_cb(self._handle_pipe_added)
-        socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
-
-    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        self._pipes.add(pipe.id)
-
-    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        self._pipes.discard(pipe.id)
 
     @property
     def is_connected(self) -> bool:
         """True if a server is connected."""
-        return not self.is_closed and bool(self._pipes)
+        return not self.is_closed and bool(self._connections)
 
     # ---- calling
 

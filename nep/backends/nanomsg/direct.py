@@ -12,18 +12,18 @@ from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.bases.publisher import BasePublisher
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.library import listen, load_pynng, new_socket, queue_length
-from nep.backends.nanomsg.sub_socket import PollableSub
+from nep.backends.nanomsg.library import Connections, listen, load_pynng, new_socket, queue_length
+from nep.backends.nanomsg.sub_socket import PollableSocket
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
 from nep.backends.zeromq.subscriber import UnbatchedReader
+from nep.backends.zeromq.transport import close_on_error
 from nep.errors import ClosedError, NepError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.addresses import resolve_address
-from nep.system.waits import wait_until
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -93,59 +93,43 @@ class DirectPublisher(BasePublisher):
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
     ) -> None:
         check_direct(direct)
-        self._changed = threading.Condition(threading.RLock())
-        super().__init__(spec, self._changed)
+        self._lock = threading.Lock()
+        super().__init__(spec, self._lock)
         self.missing: tuple[str, ...] = ()
         self._on_close = on_close
         self._generation = direct.generation
-        self._pipes: set[int] = set()
         self._is_closed = False
         self._has_warned = False
         self._sent_at = 0.0
         self.fd = -1
         """-1, because the socket receives nothing."""
         self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec))
-        self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
-        self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
-        try:
+        self._connections = Connections(self._socket)
+        with close_on_error(self.release):
             self.endpoint = attach(
                 self._socket, direct, is_publisher=True, owner=f"a publisher of '{spec.topic}'"
             )
-        except BaseException:
-            self.release()
-            raise
 
     @property
     def subscribers(self) -> int:
         """Number of connections, with or without a subscription to the topic."""
-        return len(self._pipes)
+        return len(self._connections)
 
     @property
     def has_subscribers(self) -> bool:
         """True if there is at least one connection."""
-        return bool(self._pipes)
-
-    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        with self._changed:
-            self._pipes.add(pipe.id)
-            self._changed.notify_all()
-
-    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        with self._changed:
-            self._pipes.discard(pipe.id)
-            self._changed.notify_all()
+        return bool(self._connections)
 
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds for a connection."""
-        with self._changed:
-            wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
+        self._connections.wait_for_any(timeout_s)
 
     def send(self, encoded: Encoded) -> None:
         """Publish one frame. Drops in full queues can't be detected; a large message is logged once."""
         frame = to_frame(
             self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
         )
-        with self._changed:
+        with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self._count_locked(len(frame))
@@ -171,7 +155,7 @@ class DirectPublisher(BasePublisher):
 
     def send_bye(self) -> None:
         """Stop accepting messages."""
-        with self._changed:
+        with self._lock:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
@@ -181,11 +165,10 @@ class DirectPublisher(BasePublisher):
         report how much of the queue it has sent.
         """
         flush_deadline = min(deadline, self._sent_at + _LINGER_S)
-        with self._changed:
-            wait_until(self._changed, lambda: not self._pipes, flush_deadline - time.monotonic())
+        self._connections.wait_for_none(flush_deadline - time.monotonic())
 
     def release(self) -> None:
-        """Close the socket. Call without the lock, because pynng waits for its running callbacks."""
+        """Close the socket."""
         self.send_bye()
         self._socket.close()
 
@@ -201,16 +184,13 @@ class DirectSubSocket(UnbatchedReader):
         self.problem = ""
         self._spec = spec
         self._codec = codec_for(spec.msg_type).name
-        self._sub = PollableSub(codec_for(self._codec))
+        self._sub = PollableSocket("Sub0", codec_for(self._codec))
         self.fd = self._sub.fd
         self._sub.socket.subscribe(b"")  # frames of generation B don't start with the topic
-        try:
+        with close_on_error(self.close):
             self.endpoint = attach(
                 self._sub.socket, direct, is_publisher=False, owner=f"a subscriber of '{spec.topic}'"
             )
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def has_input(self) -> bool:

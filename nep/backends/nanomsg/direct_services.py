@@ -16,6 +16,7 @@ from nep.backends.nanomsg.library import listen, new_socket
 from nep.backends.nanomsg.server import REPLY_TIMEOUT_S, NanomsgServer
 from nep.backends.nanomsg.surveys import NanomsgSurveyor
 from nep.backends.services import ClientSpec, ServerSpec
+from nep.backends.zeromq.transport import close_on_error
 from nep.protocol.service_wire import HEADER_BYTES, MAX_PAYLOAD_BYTES, NATIVE, ORIGINAL, Framing
 
 if TYPE_CHECKING:
@@ -35,13 +36,10 @@ class DirectServices(OpenServices[NanomsgServer, NanomsgClient | NanomsgSurveyor
         """Create a surveyor and wait up to `wait_s` seconds for a respondent to connect."""
         self.check_open()
         surveyor = NanomsgSurveyor(spec, direct, self.discard)
-        try:
+        with close_on_error(surveyor.close):
             self.add_client(surveyor)
             surveyor.wait_for_any(wait_s)
             self.check_open()
-        except BaseException:
-            surveyor.close()
-            raise
         return surveyor
 
     def create_respondent(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
@@ -66,16 +64,10 @@ class DirectServices(OpenServices[NanomsgServer, NanomsgClient | NanomsgSurveyor
     ) -> NanomsgServer:
         self.check_open()
         socket = new_socket(kind, send_timeout=_REPLY_TIMEOUT_MS, recv_max_size=_MAX_MESSAGE_BYTES)
-        try:
-            server = NanomsgServer(socket, attach_socket(socket), spec, framing, self.discard)
-        except BaseException:
-            socket.close()
-            raise
-        try:
+        with close_on_error(socket.close):
+            server = NanomsgServer(socket, attach_socket, spec, framing, self.discard)
+        with close_on_error(lambda: server.close(0.0)):
             self.add_server(server)
-        except BaseException:
-            server.close(0.0)
-            raise
         return server
 
     def create_client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
@@ -84,18 +76,12 @@ class DirectServices(OpenServices[NanomsgServer, NanomsgClient | NanomsgSurveyor
         socket = new_socket(
             "Req0", resend_time=_NEVER_RESEND, recv_max_size=_MAX_MESSAGE_BYTES, **_RECONNECT_MS
         )
-        try:
+        with close_on_error(socket.close):
             client = NanomsgClient(socket, spec, _framing(direct), self.deadlines, self.discard)
             dial(socket, f"{direct.ip}:{direct.port}")
-        except BaseException:
-            socket.close()
-            raise
-        try:
+        with close_on_error(client.close):
             self.add_client(client)
             self.deadlines.add_client(client)
-        except BaseException:
-            client.close()
-            raise
         return client
 
 

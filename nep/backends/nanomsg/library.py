@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import importlib
 import sys
+import threading
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -18,11 +19,14 @@ from nep.system.addresses import LOOPBACK, ORIGINAL_PORTS, host_of
 from nep.system.descriptors import check_free_descriptors
 from nep.system.exits import call_after_nodes, cancel_after_nodes
 from nep.system.forks import call_in_child, prevent_finalization
+from nep.system.waits import wait_until
 
 MAX_QUEUE_LENGTH = 8192
 """Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
 FDS_PER_SOCKET = 6
 """Number of file descriptors that a socket needs, including its port and a connection."""
+FDS_PER_CONNECTION = 2
+"""Number of file descriptors that another connection of a socket needs."""
 _PORT_ATTEMPTS = 100
 _MODULE_NAME = "pynng.nng"
 _exit_handler: Callable[[], object] | None = None
@@ -61,6 +65,38 @@ def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
     socket = getattr(load_pynng(), kind)(**options)
     _sockets.add(socket)
     return socket
+
+
+class Connections:
+    """Number of a socket's connections, for which threads can wait.
+
+    Args:
+        socket: Socket of pynng that is neither bound nor connected yet.
+    """
+
+    def __init__(self, socket: Any) -> None:  # noqa: ANN401 - not typed
+        self._changed = threading.Condition()
+        self._pipe_ids: set[int] = set()
+        socket.add_post_pipe_connect_cb(lambda pipe: self._update(self._pipe_ids.add, pipe.id))
+        socket.add_post_pipe_remove_cb(lambda pipe: self._update(self._pipe_ids.discard, pipe.id))
+
+    def _update(self, change: Callable[[int], None], pipe_id: int) -> None:
+        with self._changed:
+            change(pipe_id)
+            self._changed.notify_all()
+
+    def __len__(self) -> int:
+        return len(self._pipe_ids)
+
+    def wait_for_any(self, timeout_s: float) -> None:
+        """Wait up to `timeout_s` seconds for a connection."""
+        with self._changed:
+            wait_until(self._changed, lambda: bool(self._pipe_ids), timeout_s)
+
+    def wait_for_none(self, timeout_s: float) -> None:
+        """Wait up to `timeout_s` seconds until all connections are closed."""
+        with self._changed:
+            wait_until(self._changed, lambda: not self._pipe_ids, timeout_s)
 
 
 def _forked() -> None:

@@ -1,52 +1,64 @@
 """Publisher that subscribers find through the master.
 
-A PUB socket doesn't report its subscribers. Subscribers therefore send a hello to a second port, with
-the local address of their connection. Once the hello and the connection have both arrived, the
-publisher sends the history and an echo, as on the native wire. Messages are sent in the publishing
-thread; hellos are read in the I/O thread.
+It listens with a BUS socket, because a PUB socket can't receive: a subscriber sends its hello over the
+connection over which it receives. The publisher replies with the history and an echo, as on the native
+wire. Messages are sent in the publishing thread; hellos are read in the I/O thread.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from nep.backends.base import PublisherSpec
 from nep.backends.bases.publisher import BasePublisher
 from nep.backends.bases.rejections import RejectionCounter
-from nep.backends.nanomsg.endpoints import format_endpoint, subscriber_topic_part
-from nep.backends.nanomsg.library import bound_port, listen, load_pynng, new_socket, queue_length
+from nep.backends.nanomsg.endpoints import format_endpoint, parse_endpoint, subscriber_topic_part
+from nep.backends.nanomsg.library import listen, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import HandshakePublisher
-from nep.errors import ClosedError
+from nep.backends.zeromq.sockets import RemoteConnection
+from nep.errors import AddressInUseError, ClosedError, TooManyFilesError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
-from nep.protocol.wire import (
-    BYE,
-    MAX_SUBSCRIPTION_BYTES,
-    Header,
-    extension_part,
-    parse_hello,
-    topic_part,
-)
-from nep.system.addresses import LOOPBACK
+from nep.protocol.requests import PublisherCount
+from nep.protocol.wire import BYE, MAX_SUBSCRIPTION_BYTES, Header, extension_part, parse_hello, topic_part
+from nep.system.lazy_import import lazy_module
 from nep.system.waits import wait_until
 
+if TYPE_CHECKING:
+    import psutil
+else:
+    psutil = lazy_module("psutil")
+
 _logger = logging.getLogger("nep")
-_MAX_HELLOS = 10_000
 _HELLO_QUEUE_LENGTH = 1000
+_MAX_HELLOS_AT_ONCE = 1000
+"""Maximum number of hellos read at once, so that other sockets are served during a flood of hellos."""
 _BYE_RETRY_S = 0.05
 
 
-class NanomsgPublisher(HandshakePublisher, BasePublisher):
-    """Publisher with a PUB socket for messages and a PULL socket for hellos.
+@dataclass(eq=False)
+class _Connection:
+    pipe: Any
+    address: str
+    subscriber: int | None = None
+    """Id of the subscriber, None before its hello."""
+    tcp: RemoteConnection | None = None
+    """Connection in the system, if the peer is on another computer."""
 
-    Never close pynng objects with the lock held: closing waits for callbacks in other threads, which
-    acquire the lock.
+
+class NanomsgPublisher(HandshakePublisher, BasePublisher):
+    """Publisher with a BUS socket that listens at each address of this computer that the session serves.
+
+    pynng calls back with a lock of the socket held. The callbacks therefore don't acquire the publisher's
+    lock; they only queue the event.
     """
 
     def __init__(
@@ -55,34 +67,34 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
         on_close: Callable[[NanomsgPublisher, float], None],
         serve_soon: Callable[[Pollable], None],
     ) -> None:
-        nng = load_pynng()
-        self._try_again_error = nng.TryAgain
+        self._nng_error = load_pynng().NNGException
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        # the history is sent in one burst
-        send_queue_length = max(queue_length(spec.codec), 2 * spec.history)
-        self._message_socket: Any = new_socket("Pub0", send_buffer_size=send_queue_length)
-        self._hello_socket: Any = new_socket(
-            "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=MAX_SUBSCRIPTION_BYTES
+        self._socket: Any = new_socket(
+            "Bus0",
+            send_buffer_size=max(queue_length(spec.codec), 2 * spec.history),  # history is sent in one burst
+            recv_buffer_size=_HELLO_QUEUE_LENGTH,
+            recv_max_size=MAX_SUBSCRIPTION_BYTES,
         )
-        self.fd = int(self._hello_socket.recv_fd)
-        self._endpoint = ""
+        self.fd = int(self._socket.recv_fd)
+        self._listeners: dict[str, tuple[Any, str]] = {}
+        """Listener and its endpoint by host."""
         self._history: History[bytes] = History(spec.history)
         self._topic = topic_part(spec.topic)
         self._is_closed = False
         self._is_released = False
-        self._pipes: dict[int, str] = {}
-        """Remote address of each connection, by its id."""
-        self._hellos: dict[str, int] = {}
-        """Subscriber id by the address of its connection, which may not be established yet."""
-        self._events: deque[tuple[int, str]] = deque()
-        self._rejections = RejectionCounter()
+        self._connections: dict[int, _Connection] = {}
+        """Connections by the id of their pipe."""
+        self._events: deque[tuple[int, _Connection | None]] = deque()
+        """Pipes that were opened, and pipes that were closed (None)."""
+        self.rejections = RejectionCounter()
+        """Counter of rejected hellos."""
         changed = threading.Condition(threading.Lock())
         BasePublisher.__init__(self, spec, changed)
         HandshakePublisher.__init__(self, changed, {})
-        self._message_socket.add_post_pipe_connect_cb(self._handle_pipe_added)
-        self._message_socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
+        self._socket.add_pre_pipe_connect_cb(self._handle_pipe_added)  # before its hello can arrive
+        self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
 
     # ---- subscribers
 
@@ -94,23 +106,35 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
     @property
     def has_subscribers(self) -> bool:
         """True if any subscriber is connected, with or without a hello."""
-        return bool(self._pipes)
+        return bool(self._connections)
 
-    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - loopback only
-        """Listen on the loopback interface on the first call, and return the endpoint.
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """TCP endpoints at which the publisher listens."""
+        return tuple(parse_endpoint(endpoint) for _listener, endpoint in self._listeners.values())
 
-        `hosts` is ignored, because this back end connects only nodes of one computer. Raises
-        `AddressInUseError` and `TooManyFilesError`.
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
+        """Listen at these addresses of this computer only; return the endpoints in the order of `hosts`.
+
+        Each address gets its own port. Addresses at which listening fails are skipped; if it fails at all
+        of them, raises `AddressInUseError` or `TooManyFilesError`.
         """
-        if not self._endpoint:
-            owner = f"a publisher of '{self.spec.topic}'"
-            message_listener, hello_listener = (
-                listen(each, f"{LOOPBACK}:0", owner) for each in (self._message_socket, self._hello_socket)
-            )
-            self._endpoint = format_endpoint(
-                LOOPBACK, bound_port(message_listener), bound_port(hello_listener)
-            )
-        return (self._endpoint,)
+        last_error: AddressInUseError | TooManyFilesError | None = None
+        with self._changed:
+            if self._is_released:
+                return ()
+            for host in [each for each in self._listeners if each not in hosts]:
+                self._listeners.pop(host)[0].close()
+            for host in [each for each in hosts if each not in self._listeners]:
+                try:
+                    listener = listen(self._socket, f"{host}:0", f"a publisher of '{self.spec.topic}'")
+                except (AddressInUseError, TooManyFilesError) as error:
+                    last_error = error
+                else:
+                    self._listeners[host] = listener, format_endpoint(str(listener.local_address))
+            if last_error is not None and not self._listeners:
+                raise last_error
+            return tuple(self._listeners[each][1] for each in hosts if each in self._listeners)
 
     def unbind_local(self) -> None:
         """Do nothing, because this back end has no Unix sockets."""
@@ -131,88 +155,101 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
             header = self._next_header_locked(size, has_extension=bool(extension))
             tail = b"".join((header.pack(), data, extension))
             self._history.add(tail, size)
-            self._message_socket.send(self._topic + tail, block=False)
+            self._socket.send(self._topic + tail, block=False)
 
-    # ---- subscribers, in the I/O thread
+    # ---- connections, in the I/O thread
 
-    def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
+    def serve(self, now: float) -> PollState:
         """Process hellos, connections and disconnections."""
         with self._changed:
-            while self._events:
-                self._update_connection_locked(*self._events.popleft())
-            while not self._is_released:
+            for _number in range(_MAX_HELLOS_AT_ONCE):
                 try:
-                    frame = self._hello_socket.recv(block=False)
-                except self._try_again_error:
-                    break
-                self._process_hello_locked(frame)
-        return PollState()
+                    message = self._socket.recv_msg(block=False)
+                except self._nng_error:  # no more input, or closed
+                    self._update_connections_locked()
+                    return PollState()
+                self._update_connections_locked()
+                connection = None if message.pipe is None else self._connections.get(message.pipe.id)
+                if connection is not None:  # otherwise closed already
+                    self._process_hello_locked(connection, message.bytes)
+        return PollState(due=now)
 
     def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        self._events.append((pipe.id, str(pipe.remote_address)))
+        self._events.append((pipe.id, _Connection(pipe, str(pipe.remote_address))))
         self._serve_soon(self)
 
     def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        self._events.append((pipe.id, ""))
+        self._events.append((pipe.id, None))
         self._serve_soon(self)
 
-    def _update_connection_locked(self, pipe: int, address: str) -> None:
-        # `address` is "" for a closed connection. Call with the lock held.
-        if address:
-            self._pipes[pipe] = address
-            self._complete_handshake_locked(address)
-            return
-        subscriber = self._hellos.pop(self._pipes.pop(pipe, ""), None)
-        if subscriber is not None and subscriber not in self._hellos.values():  # otherwise it has reconnected
-            self._counts_at_hello.pop(subscriber, None)
-            self._changed.notify_all()
+    def _update_connections_locked(self) -> None:
+        # a connected subscriber may leave without being reported as missing
+        self._expected_ids.difference_update(self._counts_at_hello)
+        while self._events:
+            pipe_id, connection = self._events.popleft()
+            if connection is not None:
+                self._connections[pipe_id] = connection
+                continue
+            removed = self._connections.pop(pipe_id, None)
+            subscriber = None if removed is None else removed.subscriber
+            if subscriber is not None and not self._find(subscriber):
+                self._counts_at_hello.pop(subscriber, None)
+                self._changed.notify_all()
 
-    def _process_hello_locked(self, frame: bytes) -> None:
-        address, _space, part = frame.partition(b" ")
-        hello = parse_hello(part)
-        if hello is not None and len(self._hellos) >= _MAX_HELLOS:
-            self._discard_unconnected_hellos_locked()
-        if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MAX_HELLOS:
-            if self._rejections.add(f"an invalid hello of {len(frame)} bytes"):
-                _logger.info("'%s' received %s", self.spec.topic, self._rejections.recent_message())
-            return
-        remote = address.decode("ascii", "replace")
-        self._hellos[remote] = hello.subscriber
-        if remote in self._pipes.values():
-            self._complete_handshake_locked(remote)
+    def _find(self, subscriber: int) -> list[_Connection]:
+        return [each for each in self._connections.values() if each.subscriber == subscriber]
 
-    def _discard_unconnected_hellos_locked(self) -> None:
-        # Discards hellos whose connection was never established or is closed. Call with the lock held.
-        connected_addresses = set(self._pipes.values())
-        self._hellos = {
-            address: subscriber
-            for address, subscriber in self._hellos.items()
-            if address in connected_addresses
-        }
-
-    def _complete_handshake_locked(self, address: str) -> None:
-        # Sends the history, then the echo, after which the subscriber counts losses. Call with the lock held.
-        subscriber = self._hellos.get(address)
-        if subscriber is None or self._is_released:
+    def _process_hello_locked(self, connection: _Connection, frame: bytes) -> None:
+        hello = parse_hello(frame)
+        if hello is None or hello.topic != self.spec.topic:
+            if self.rejections.add(f"an invalid hello of {len(frame)} bytes"):
+                _logger.info("'%s' received %s", self.spec.topic, self.rejections.recent_message())
+            self._close_connections([connection])
             return
-        self._counts_at_hello[subscriber] = self.count
+        if connection.subscriber is not None:
+            return  # repeated: a subscriber sends each hello to all its publishers
+        # a connection from an old address of the subscriber's computer would stay open for minutes
+        self._close_connections(self._find(hello.subscriber))
+        connection.subscriber = hello.subscriber
+        self._counts_at_hello[hello.subscriber] = self.count
+        # The history, then the echo: from here on the subscriber counts losses.
+        prefix = subscriber_topic_part(hello.subscriber, self.spec.topic)
         for message in self._history:
-            self._message_socket.send(
-                subscriber_topic_part(subscriber, self.spec.topic) + message, block=False
-            )
-        self._send_notice_locked(subscriber, 0)
+            self._socket.send(prefix + message, block=False)
+        self._send_notice_locked(hello.subscriber, 0)
         self._changed.notify_all()
+
+    def _close_connections(self, connections: Iterable[_Connection]) -> None:
+        for connection in connections:
+            with contextlib.suppress(self._nng_error):  # closed already
+                connection.pipe.close()
+
+    def counts(self) -> PublisherCount:
+        """Return the statistics that a renewal reports.
+
+        Because it is called once per second, this method also closes connections that don't respond.
+        """
+        with self._changed:
+            remote_connections = [
+                each for each in self._connections.values() if not each.address.startswith("127.")
+            ]
+            if RemoteConnection.can_detect_silence and any(each.tcp is None for each in remote_connections):
+                tcp_by_address = _tcp_connections()
+                for each in remote_connections:
+                    each.tcp = tcp_by_address.get(each.address)
+            self._close_connections(
+                each for each in remote_connections if each.tcp is not None and each.tcp.is_silent()
+            )
+        return super().counts()
 
     def _send_notice_locked(self, subscriber: int, flags: int) -> None:
         header = Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id)
-        self._message_socket.send(
-            subscriber_topic_part(subscriber, self.spec.topic) + header.pack(), block=False
-        )
+        self._socket.send(subscriber_topic_part(subscriber, self.spec.topic) + header.pack(), block=False)
 
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, flush for up to `timeout_s` seconds and close the sockets. Must be called only once."""
+        """Unregister, flush for up to `timeout_s` seconds and close the socket. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
@@ -247,14 +284,26 @@ class NanomsgPublisher(HandshakePublisher, BasePublisher):
             self._counts_at_hello.clear()
 
     def release(self) -> None:
-        """Close the sockets. The I/O thread must have stopped serving them."""
+        """Close the socket. The I/O thread must have stopped serving it."""
         with self._changed:
             if self._is_released:
                 return
             self._is_closed = self._is_released = True
-        self._hello_socket.close()
-        self._message_socket.close()
+        self._socket.close()
 
     def _send_bye_locked(self) -> None:
         for subscriber in () if self._is_released else self._counts_at_hello:
             self._send_notice_locked(subscriber, BYE)
+
+
+def _tcp_connections() -> dict[str, RemoteConnection]:
+    # Connections of this process by the peer's address. pynng doesn't expose their descriptors.
+    try:
+        return {
+            f"{each.raddr.ip}:{each.raddr.port}": RemoteConnection(each.fd, (each.raddr.ip, each.raddr.port))
+            for each in psutil.Process().net_connections("tcp4")
+            if each.status == psutil.CONN_ESTABLISHED
+        }
+    except (psutil.Error, OSError) as error:
+        _logger.debug("can't list the connections of this process: %s", error)
+        return {}

@@ -14,10 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 from nep.backends.bases.server import BaseServer
-from nep.backends.nanomsg.library import load_pynng
-from nep.backends.services import (
-    ServerSpec,
-)
+from nep.backends.nanomsg.library import Connections, load_pynng
+from nep.backends.services import ServerSpec
 from nep.errors import WireError
 from nep.protocol.service_wire import NATIVE, Framing, Reply, split_frame
 
@@ -64,21 +62,28 @@ def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
 
 
 class NanomsgServer(BaseServer):
-    """Server on a socket that is already bound or connected, with a thread that receives calls.
-
-    Implements `ServerTransport`.
-    """
+    """Server on a socket, with a thread that receives calls. Implements `ServerTransport`."""
 
     def __init__(
         self,
         socket: Any,  # noqa: ANN401 - pynng is not typed
-        endpoint: str,
+        attach: Callable[[object], str],
         spec: ServerSpec,
         framing: Framing,
         on_close: Callable[[NanomsgServer], object],
     ) -> None:
+        """Initialize the server.
+
+        Args:
+            socket: Socket of pynng.
+            attach: Binds or connects the socket and returns its endpoint.
+            spec: Settings of the server.
+            framing: Format of calls and replies.
+            on_close: Called when the server is closed.
+        """
         super().__init__(spec)
-        self.endpoints: tuple[str, ...] = (endpoint,)
+        self._connections = Connections(socket)
+        self.endpoints: tuple[str, ...] = (attach(socket),)
         self._socket = socket
         self._framing = framing
         self._on_close = on_close
@@ -86,14 +91,8 @@ class NanomsgServer(BaseServer):
         self._replied_at = 0.0
         self._contexts: set[Any] = set()
         """Contexts that wait for a call, or whose call is not answered yet."""
-        self._disconnected = threading.Event()
-        socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         self._thread = threading.Thread(target=self._receive_calls, name=f"nep-{spec.service}", daemon=True)
         self._thread.start()
-
-    def _handle_pipe_removed(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        if self.is_closed and not self._socket.pipes:
-            self._disconnected.set()
 
     def _receive_calls(self) -> None:
         while (context := self._new_context()) is not None and (data := receive(context)) is not None:
@@ -151,9 +150,7 @@ class NanomsgServer(BaseServer):
                 return
             self.is_closed = True
         self._on_close(self)
-        remaining_s = min(timeout_s, self._replied_at + _LINGER_S - time.monotonic())
-        if remaining_s > 0.0 and self._socket.pipes:
-            self._disconnected.wait(remaining_s)
+        self._connections.wait_for_none(min(timeout_s, self._replied_at + _LINGER_S - time.monotonic()))
         with self._lock:
             contexts, self._contexts = tuple(self._contexts), set()
         for context in contexts:  # before the socket: pynng can't close contexts of a closed socket

@@ -1,12 +1,12 @@
-"""SUB socket connected to publishers, with a hello sent to the second port of each publisher.
+"""BUS socket connected to publishers; it sends a hello over each new connection.
 
 Not thread-safe. See `nep.backends.zeromq.subscriber.Readable`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from dataclasses import dataclass
 from typing import Any
 
 import zmq
@@ -16,8 +16,8 @@ from nep.backends.bases.loss import PublisherTracker
 from nep.backends.bases.message_parser import MessageParser
 from nep.backends.bases.rejections import RejectionCounter
 from nep.backends.nanomsg.endpoints import parse_endpoint, split_message, subscriber_topic_part
-from nep.backends.nanomsg.library import FDS_PER_SOCKET, load_pynng, new_socket, queue_length
-from nep.backends.zeromq.sockets import SHORT_WAIT_S
+from nep.backends.nanomsg.library import FDS_PER_CONNECTION, load_pynng, new_socket, queue_length
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, is_remote
 from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
@@ -29,20 +29,28 @@ from nep.protocol.wire import hello_part, topic_part
 from nep.system.descriptors import check_free_descriptors
 
 _logger = logging.getLogger("nep")
-_HELLO_QUEUE_LENGTH = 8
+_MAX_SKIPPED_MESSAGES = 1000
+"""Maximum number of messages skipped at once, so that a publisher can't keep a thread busy."""
 
 
-class PollableSub:
-    """SUB socket with a file descriptor for polling."""
+class PollableSocket:
+    """Socket that receives messages, with a file descriptor for polling.
 
-    def __init__(self, codec: Codec) -> None:
+    Args:
+        kind: Name of pynng's class, such as "Sub0".
+        codec: Codec of the messages.
+        options: Further options of the socket.
+    """
+
+    def __init__(self, kind: str, codec: Codec, **options: object) -> None:
         nng = load_pynng()
         self._empty_errors = (nng.TryAgain, nng.Timeout, nng.Closed)
         self.socket: Any = new_socket(
-            "Sub0",
+            kind,
             recv_buffer_size=queue_length(codec),
             recv_max_size=0,
             recv_timeout=round(SHORT_WAIT_S * 1000),
+            **options,
         )
         self.fd = int(self.socket.recv_fd)
         self._queue_length = queue_length(codec)
@@ -65,25 +73,13 @@ class PollableSub:
             return bytes(self.socket.recv(block=may_wait))
         except self._empty_errors:
             return None
+        except RuntimeError:  # pynng can't return a message of 0 bytes
+            return b""
 
     def close(self) -> None:
         """Close the socket."""
         self._is_closed = True
         self.socket.close()
-
-
-@dataclass
-class _Link:
-    # Connection to a publisher, with the PUSH socket for the hello.
-    endpoint: str
-    address: str
-    hello_socket: Any
-    dialer: Any = None
-
-    def close(self) -> None:
-        if self.dialer is not None:
-            self.dialer.close()
-        self.hello_socket.close()
 
 
 class NanomsgSubSocket(UnbatchedReader):
@@ -92,8 +88,11 @@ class NanomsgSubSocket(UnbatchedReader):
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
         self.rejections = RejectionCounter()
-        self._sub = PollableSub(codec_for(spec.msg_type))
-        self.fd = self._sub.fd
+        self._nng_error = load_pynng().NNGException
+        self._bus = PollableSocket(
+            "Bus0", codec_for(spec.msg_type), reconnect_time_min=100, reconnect_time_max=1000
+        )
+        self.fd = self._bus.fd
         self._topic_name = spec.topic
         self._topic = topic_part(spec.topic)
         self._own_topic = subscriber_topic_part(spec.id, spec.topic)
@@ -101,12 +100,9 @@ class NanomsgSubSocket(UnbatchedReader):
         self._parser = MessageParser(
             spec, self._own_topic, self.sources, self.disconnect, lambda _publisher, _seq: None
         )
-        self._links: dict[int, _Link] = {}
-        self._hello_sockets: dict[str, Any] = {}
-        """Sockets for the hellos, by address of the publisher. Also read by pynng's threads."""
-        self._sub.socket.subscribe(self._topic)
-        self._sub.socket.subscribe(self._own_topic)
-        self._sub.socket.add_post_pipe_connect_cb(self._handle_pipe_added)
+        self._dialers: dict[int, Any] = {}
+        """Dialers by publisher id."""
+        self._bus.socket.add_post_pipe_connect_cb(self._send_hello)
 
     @property
     def received(self) -> int:
@@ -129,7 +125,9 @@ class NanomsgSubSocket(UnbatchedReader):
     @property
     def has_input(self) -> bool:
         """True if a message can be read."""
-        return self._sub.has_input
+        return self._bus.has_input
+
+    # ---- connections
 
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher, and disconnect from silent publishers that it replaces. Idempotent."""
@@ -137,81 +135,75 @@ class NanomsgSubSocket(UnbatchedReader):
             self.sources.count_missing(replaced)
             self.disconnect(replaced)
         source = self.sources.add_listed(remote)
-        self._sub.enlarge_queue(remote.publisher.history)
+        self._bus.enlarge_queue(remote.publisher.history)
         source.is_silent = False
         source.bye_deadline = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
-        link = self._links.get(remote.publisher.id)
-        if (
-            not endpoint
-            or endpoint == source.failed_endpoint
-            or (link is not None and link.endpoint == endpoint)
-        ):
+        url = parse_endpoint(endpoint)
+        if not endpoint or endpoint == source.failed_endpoint or (url and url == source.endpoint):
             return
-        if link is not None:
-            self._remove_link(remote.publisher.id)
-            source.has_echoed = False
-        source.failed_endpoint = source.problem = source.endpoint = ""
-        addresses = parse_endpoint(endpoint)
-        reason = "" if addresses is None else self._create_link(remote.publisher.id, endpoint, *addresses)
-        if addresses is not None and not reason:
-            source.endpoint = f"tcp://{addresses[0]}"
-            return
-        source.failed_endpoint = endpoint
-        source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
-            shown=ascii(endpoint[:100])[1:-1],
-            name=remote.node_name,
-            why=reason or _("not an endpoint of 'nanomsg'"),
-        )
-        if self.rejections.add(source.problem):
-            _logger.warning("subscription to '%s': %s", self._topic_name, source.problem)
+        source.failed_endpoint = source.problem = ""
+        reason = self._connect(remote.publisher.id, url) if url else _("not an endpoint of 'nanomsg'")
+        if reason:
+            source.failed_endpoint = endpoint
+            source.problem = _("can't connect to the endpoint '{shown}' of '{name}': {why}").format(
+                shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=reason
+            )
+            if self.rejections.add(source.problem):
+                _logger.warning("subscription to '%s': %s", self._topic_name, source.problem)
 
-    def _create_link(self, publisher: int, endpoint: str, address: str, hello_address: str) -> str:
-        # The hello is sent once the connection is established. Returns the error, or "".
-        nng = load_pynng()
+    def _connect(self, publisher: int, url: str) -> str:
+        # Replaces the connection to a publisher. Returns the error, or "".
+        self._close_dialer(publisher)
+        source = self.sources.get(publisher)
+        source.reset_connection(url)
         try:
-            check_free_descriptors(2 * FDS_PER_SOCKET, f"a subscriber of '{self._topic_name}'")
-            # with a queue, sending never blocks pynng's threads
-            link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE_LENGTH))
-            self._links[publisher] = link
-            self._hello_sockets[address] = link.hello_socket
-            link.hello_socket.dial(f"tcp://{hello_address}", block=False)
-            link.dialer = self._sub.socket.dial(f"tcp://{address}", block=False)
-        except (nng.NNGException, TooManyFilesError) as error:
-            self._remove_link(publisher)
+            check_free_descriptors(FDS_PER_CONNECTION, f"a subscriber of '{self._topic_name}'")
+            self._dialers[publisher] = self._bus.socket.dial(url, block=False)
+        except (self._nng_error, TooManyFilesError) as error:
             return str(error)
+        source.endpoint = url
         return ""
 
-    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        # Called in a thread of pynng. Sends the hello with the local address of the connection.
-        hello_socket = self._hello_sockets.get(str(pipe.remote_address))
-        if hello_socket is not None:
-            hello_socket.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
+    def _send_hello(self, _pipe: object) -> None:
+        # Called in a thread of pynng. A BUS socket sends to all; publishers that know the hello ignore it.
+        with contextlib.suppress(self._nng_error):  # closed meanwhile
+            self._bus.socket.send(self._hello, block=False)
 
     def reconnect_remote(self) -> None:
-        """Do nothing, because this back end connects only nodes of one computer."""
+        """Reconnect to publishers on other computers, because the address of this computer has changed."""
+        for publisher, source in self.sources.items():
+            if is_remote(source.endpoint):
+                self._connect(publisher, source.endpoint)
 
     def reconnect(self, publisher: int) -> None:
-        """Do nothing, because nanomsg reconnects automatically."""
+        """Disconnect from the endpoint of a known publisher and connect to it again."""
+        self._connect(publisher, self.sources.get(publisher).endpoint)
 
     def disconnect(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
         self.sources.pop(publisher)
-        self._remove_link(publisher)
+        self._close_dialer(publisher)
 
-    def _remove_link(self, publisher: int) -> None:
-        link = self._links.pop(publisher, None)
-        if link is not None:
-            self._hello_sockets.pop(link.address, None)
-            link.close()
+    def _close_dialer(self, publisher: int) -> None:
+        dialer = self._dialers.pop(publisher, None)
+        if dialer is not None:
+            dialer.close()
+
+    # ---- reading
 
     def read(self, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
-        while (frame := self._sub.recv(may_wait=may_wait)) is not None:
-            is_alone = frame.startswith(self._own_topic)
-            prefix = self._own_topic if is_alone else self._topic
+        """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`.
+
+        Also returns None after `_MAX_SKIPPED_MESSAGES` notices, malformed messages and messages to others.
+        """
+        for number in range(_MAX_SKIPPED_MESSAGES):
+            frame = self._bus.recv(may_wait=may_wait and not number)
+            if frame is None:
+                break
             try:
-                message = self._parser.parse(prefix, split_message(frame, prefix, is_alone=is_alone))
+                parts = split_message(frame, self._topic, self._own_topic)
+                message = None if parts is None else self._parser.parse(*parts)
             except WireError as error:
                 if self.rejections.add(error.reason):
                     _logger.warning("malformed message on '%s': %s", self._topic_name, error)
@@ -225,7 +217,5 @@ class NanomsgSubSocket(UnbatchedReader):
         self.sources.count_dropped(count)
 
     def close(self) -> None:
-        """Close all sockets."""
-        for publisher in list(self._links):
-            self._remove_link(publisher)
-        self._sub.close()
+        """Close the socket and all connections."""
+        self._bus.close()

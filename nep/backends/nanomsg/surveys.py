@@ -14,13 +14,13 @@ from typing import Any
 
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.direct import attach
-from nep.backends.nanomsg.library import load_pynng, new_socket
+from nep.backends.nanomsg.library import Connections, load_pynng, new_socket
 from nep.backends.nanomsg.server import close_context, receive
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_call_limits
+from nep.backends.zeromq.transport import close_on_error
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
-from nep.system.waits import wait_until
 
 _JSON_CODEC = 1
 _MAX_SURVEY_TIMEOUT_MS = 2**31 - 1
@@ -54,37 +54,22 @@ class NanomsgSurveyor:
         self.late = 0
         """Always 0, because pynng drops late replies."""
         self._on_close = on_close
-        self._changed = threading.Condition(threading.Lock())
-        self._pipes: set[int] = set()
+        self._lock = threading.Lock()
         self._surveys: dict[int, _Survey] = {}
         self._survey_count = 0
         self._socket: Any = new_socket("Surveyor0")
-        self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
-        self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
-        try:
+        self._connections = Connections(self._socket)
+        with close_on_error(self._socket.close):
             attach(self._socket, direct, is_publisher=True, owner=f"a surveyor of '{spec.service}'")
-        except BaseException:
-            self._socket.close()
-            raise
 
     @property
     def respondents(self) -> int:
         """Number of connected respondents."""
-        return len(self._pipes)
-
-    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        with self._changed:
-            self._pipes.add(pipe.id)
-            self._changed.notify_all()
-
-    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
-        with self._changed:
-            self._pipes.discard(pipe.id)
+        return len(self._connections)
 
     def wait_for_any(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` seconds for a respondent to connect."""
-        with self._changed:
-            wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
+        self._connections.wait_for_any(timeout_s)
 
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, callback: OutcomeCallback
@@ -94,11 +79,11 @@ class NanomsgSurveyor:
         All entries are the same object, because nng has no separate call for each respondent. The list
         is empty if no respondent is connected. See `SurveyTransport.start_survey`.
         """
-        with self._changed:
+        with self._lock:
             if self.is_closed:
                 raise self._closed_error()
             check_call_limits(self.spec.service, len(self._surveys), 0, len(data))
-            count = len(self._pipes)
+            count = len(self._connections)
             if not count:
                 return []
             limit_ms = (
@@ -129,7 +114,7 @@ class NanomsgSurveyor:
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel the survey; its callback isn't called."""
         for call in calls[:1]:
-            with self._changed:
+            with self._lock:
                 survey = self._surveys.pop(call.number, None)
             if survey is not None:
                 self._finish(survey)
@@ -144,7 +129,7 @@ class NanomsgSurveyor:
 
     def close(self) -> None:
         """Close the surveyor; surveys in progress fail with `ClosedError`. Idempotent."""
-        with self._changed:
+        with self._lock:
             if self.is_closed:
                 return
             self.is_closed = True

@@ -23,7 +23,6 @@ from nep.backends.services import (
     ServerTransport,
     SurveyTransport,
 )
-from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
 from nep.backends.zeromq.transport import (
     DIRECT_WAIT_S,
@@ -32,11 +31,9 @@ from nep.backends.zeromq.transport import (
     ZeromqTransport,
     close_on_error,
 )
-from nep.errors import NepError
-from nep.i18n import _
 from nep.protocol.requests import NodeRecord
 from nep.protocol.service_wire import SURVEY_PREFIX
-from nep.system.addresses import is_loopback
+from nep.system.forks import close_in_child
 
 
 class NanomsgTransport(ZeromqTransport):
@@ -86,15 +83,11 @@ class NanomsgTransport(ZeromqTransport):
         self._direct_services.close(timeout_s)
         super().close(max(0.0, deadline - time.monotonic()))
 
-    def _session(self, address: str) -> MasterSession:
-        if not is_loopback(address):
-            raise NepError(
-                _(
-                    "nodes of 'nanomsg' must be on the same computer as their master; use a master on this "
-                    "computer, or 'zeromq' to reach the master at '{address}'"
-                ).format(address=address)
-            )
-        return super()._session(address)
+    def _give_up_in_child(self) -> None:
+        super()._give_up_in_child()
+        for publisher in self._publishers:
+            if isinstance(publisher, NanomsgPublisher):
+                close_in_child(*publisher.endpoints)
 
     def _new_publisher(
         self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
@@ -109,11 +102,8 @@ class NanomsgTransport(ZeromqTransport):
         with close_on_error(publisher.release):
             self._direct_endpoints[spec.id] = publisher.endpoint
             self._add_publisher(publisher)
-        try:
+        with close_on_error(lambda: publisher.close(0.0)):
             publisher.wait_for_any(DIRECT_WAIT_S)
-        except BaseException:
-            publisher.close(0.0)
-            raise
         return publisher
 
     def _create_direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
@@ -125,9 +115,6 @@ class NanomsgTransport(ZeromqTransport):
         with close_on_error(readable.close):
             self._direct_endpoints[spec.id] = readable.endpoint
             self._add_subscriber(subscriber)
-        try:
+        with close_on_error(subscriber.close):
             self._start_serving(io, subscriber)
-        except BaseException:
-            subscriber.close()
-            raise
         return subscriber

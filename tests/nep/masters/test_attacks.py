@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 import nep
 from nep.masters.master import Master
-from nep.masters.registry import is_tcp_endpoint
+from nep.masters.registry import is_publisher_endpoint
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
@@ -297,12 +297,13 @@ BAD_ENDPOINTS = [
     "ipc:///tmp/x", "ipc://@nep-5000", "inproc://ended", "pgm://10.0.0.1;239.192.1.1:5555", "ws://10.0.0.1:80",
     "udp://10.0.0.1:5000", "tcp://127.0.0.1:5000\n", "tcp://127.0.0.1:٣٤", "tcp://a b:5000", "tcp://\x1b[2J:5000",
     "tcp://" + "a" * 300 + ":5000", "memory", "TCP://127.0.0.1:5000", "tcp://@127.0.0.1:5000",
+    "nanomsg://127.0.0.1:5000/5001", "nanomsg://127.0.0.1:0",
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("endpoint", BAD_ENDPOINTS, ids=ascii)
 def test_invalid_endpoints_are_rejected(endpoint: str) -> None:
-    assert not is_tcp_endpoint(endpoint)
+    assert not is_publisher_endpoint(endpoint)
 
 
 @pytest.mark.parametrize(
@@ -313,10 +314,11 @@ def test_invalid_endpoints_are_rejected(endpoint: str) -> None:
         "tcp://robot-2.local:5000",
         "tcp://[::1]:5000",
         "tcp://[fe80::1%eth0]:5",
+        "nanomsg://10.0.0.1:5000",
     ],
 )
 def test_all_host_forms_are_valid_endpoints(endpoint: str) -> None:
-    assert is_tcp_endpoint(endpoint)
+    assert is_publisher_endpoint(endpoint)
 
 
 @pytest.mark.parametrize("endpoint", ["ipc:///tmp/x", "inproc://x", "udp://127.0.0.1:9", "tcp://a b:9", "x"])

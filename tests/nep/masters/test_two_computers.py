@@ -25,7 +25,7 @@ with Master("127.0.0.1:7780", learn_s=0.0) as master:
 """
 SUBSCRIBER = """
 import json, nep, sys
-node = nep.node("subscriber")
+node = nep.node("subscriber", sys.argv[1])
 sub = node.new_sub("t")
 print("ready")
 while True:
@@ -35,7 +35,7 @@ while True:
 """
 PUBLISHER = """
 import nep, sys
-node = nep.node("publisher")
+node = nep.node("publisher", sys.argv[1])
 pub = node.new_pub("t", latched=True)
 print(pub.subscribers)
 for line in sys.stdin:
@@ -110,22 +110,23 @@ def advertised(computers: Computers) -> str:
 
 
 @pytest.mark.timeout(240)
+@pytest.mark.parametrize("backend", ["zeromq", "nanomsg"])
 def test_two_computers_communicate_after_an_address_change_and_a_cable_reconnection(
-    computers: Computers,
+    computers: Computers, backend: str
 ) -> None:
     near = {"before": computers.inside("a"), "NEP_MASTER": "127.0.0.1:7780"}
     far = {"before": computers.inside("b"), "NEP_MASTER": "10.77.0.1:7780"}
     with ExitStack() as stack:
         assert stack.enter_context(running(MASTER, **near)).line() == "ready"
-        subscriber = stack.enter_context(running(SUBSCRIBER, **near))
+        subscriber = stack.enter_context(running(SUBSCRIBER, backend, **near))
         assert subscriber.line() == "ready"
-        publisher = stack.enter_context(running(PUBLISHER, **far))
+        publisher = stack.enter_context(running(PUBLISHER, backend, **far))
         assert publisher.line() == "1", "the subscriber answered before new_pub returned"
         publisher.say("first")
         assert json.loads(subscriber.line()) == "first"
-        with running(SUBSCRIBER, **far) as other:
+        with running(SUBSCRIBER, backend, **far) as other:
             assert other.line() == "ready"
-            with running(PUBLISHER, **near) as here:
+            with running(PUBLISHER, backend, **near) as here:
                 assert here.line() == "2"
                 here.say("to both")
                 hears(other, "to both")

@@ -116,7 +116,7 @@ def _endpoint_change(bench: Bench) -> None:
 )
 def _unusable_endpoint(bench: Bench) -> None:
     publisher, sub = bench.create_subscribed_publisher(bench.new_topic())
-    for endpoints in (("nanomsg://127.0.0.1:4000/4001",), ("tcp://there is none:1",), ("",), ()):
+    for endpoints in (("nanomsg://127.0.0.1:4000",), ("tcp://there is none:1",), ("",), ()):
         unusable = bench.create_publisher(publisher.topic, is_listed=False)
         unusable.record = replace(unusable.record, endpoints=endpoints)
         bench.master.submit(AddPublisher(unusable.node, unusable.record))
