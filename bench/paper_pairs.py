@@ -289,8 +289,6 @@ def around(
             why = "it is measured in L-local only" if elsewhere else paper_clients.why_missing(row)
             if why:
                 missing[row] = why
-        if elsewhere:
-            missing["nep over nanomsg"] = "nep's back end nanomsg joins the nodes of one computer only"
         try:
             if rosbridge_sources and "rospy" not in missing:
                 at = stack.enter_context(rosbridge(rosbridge_sources, places.ros_master, hosts[0], folder))

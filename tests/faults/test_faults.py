@@ -18,7 +18,9 @@ from tests.faults.hosts import CannotMakeHostsError, network
 
 _OUT_S, _OUT_LONG_S = 1.0, 10.0
 """How long a fault lasts."""
-_each_backend = pytest.mark.parametrize("today", ["zeromq", "nanomsg"], indirect=True)
+_each_backend = pytest.mark.parametrize(
+    "today", ["zeromq", pytest.param("nanomsg", marks=pytest.mark.long)], indirect=True
+)
 
 
 @pytest.fixture
