@@ -13,7 +13,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.alarms import SessionAlarms
 from app.core.alerts.alerts import Alerts
 from app.core.faults import FaultAlerts, log_errors
 from app.core.network.doctor import create_doctor
@@ -32,6 +31,7 @@ from app.core.network.traffic import Traffic
 from app.core.network.web_pages import WebPages, WebServerStarted
 from app.core.networks.networks import NetworkEvent
 from app.core.networks.parameters import ParameterSetter
+from app.core.parts.alarms import SessionAlarms
 from app.core.parts.health import HealthChecks, MessageCounts
 from app.core.parts.programs import (
     CurrentRun,

@@ -1,1 +1,1 @@
-"""Active problems and their next steps. Alarms that a person defines are in `app.core.alarms`."""
+"""Active problems and their next steps. Alarms that a person defines are in `app.core.parts.alarms`."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from itertools import count
 from typing import Protocol
 
-from app.core.alarms import severity_of
+from app.core.parts.alarms import severity_of
 from app.core.run.view import RunState
 from nep.i18n import _
 from nep.programs.alarms import AlarmEvent

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
-from app.core.recording.replay.scale import clock_text
+from app.core.timeline.times import clock_text
 from app.ui.panels.record.recordings import PANEL
 from app.ui.panels.record.recordings import panel as panel_module
 from app.ui.panels.record.recordings.columns import badge_of

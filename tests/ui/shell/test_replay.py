@@ -16,10 +16,10 @@ from app.core.alerts.intents import ShowRecordingFile
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.record.timeline.canvas import density_image
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
+from app.ui.timeline.layers import counts_image
 from nep.messages.message import Message
 from nep.recordings.reader import Recording
 from tests.nep.recordings.messages import json_message, picture, record
@@ -253,7 +253,7 @@ def test_mouse_seeks_selects_lanes_and_zooms_in_the_timeline(qtbot, window, sess
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(x, 10))
     at_ns = canvas.time_at(x)
     until(qtbot, window, lambda: replay.player.position_ns == at_ns)
-    y = round(canvas._lanes_top() + 1.5 * canvas._row_height())
+    y = round(canvas.geometry_of_lanes().lane_rect(1).center().y())
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(20, y))
     assert replay.selected_topic == "/camera"
     assert replay.player.position_ns == at_ns
@@ -270,7 +270,7 @@ def test_mouse_seeks_selects_lanes_and_zooms_in_the_timeline(qtbot, window, sess
 
 
 def test_timeline_lanes_are_darker_where_the_message_density_is_higher():
-    made = density_image([0, 1, 2, 4], 4, QColor("#ffffff"))
+    made = counts_image([0, 1, 2, 4], 4, QColor("#ffffff"))
     alphas = [made.pixelColor(x, 0).alphaF() for x in range(4)]
     assert made.format() == QImage.Format.Format_ARGB32_Premultiplied
     assert alphas[0] == 0.0

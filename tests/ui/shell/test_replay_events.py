@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QApplication, QMenu
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.record.timeline.canvas import TimelineCanvas
-from app.ui.panels.record.timeline.event_lanes import LaneMark
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
+from app.ui.timeline.layers import PaintedMark
+from app.ui.timeline.view import TimelineView
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import START_NS, STEP_NS, TestClock, json_message, limits
 from tests.ui.shell_parts import Answers
@@ -98,7 +98,7 @@ class Shown:
         self.wait(lambda: replay.densities is not None and replay.densities.spans.alarms)
         assert window.bench is not None
         self.panel = window.bench.docks["timeline"].panel
-        self.canvas: TimelineCanvas = self.panel.canvas
+        self.canvas: TimelineView = self.panel.canvas
 
     def wait(self, true: Callable[[], object]) -> None:
         until(self.qtbot, self.window, true)
@@ -106,9 +106,9 @@ class Shown:
     def place(self, words: str) -> QPoint:
         """Return a clickable position on the mark whose text contains the words."""
 
-        def found() -> list[LaneMark]:
+        def found() -> list[PaintedMark]:
             self.canvas.grab()
-            return [each for each in self.canvas._marks if words in each.text]
+            return [each for each in self.canvas.marks if words in each.mark.tooltip]
 
         self.wait(lambda: len(found()) == 1)
         (mark,) = found()
@@ -157,7 +157,9 @@ def test_click_seeks_to_a_run_or_alarm_and_both_are_marked(shown):
         shown.press(words)
         shown.wait(lambda step=step: shown.replay.player.position_ns == at(step))
     shown.wait(lambda: running in colours(36, line))
-    assert canvas._theme.colour("error").name() in colours(65, canvas._lanes_top() + canvas._row_height() / 2)
+    assert canvas._theme.colour("error").name() in colours(
+        65, canvas.geometry_of_lanes().lane_rect(0).center().y()
+    )
     for key, step in ((Qt.Key.Key_Right, 55), (Qt.Key.Key_Left, 10)):
         QTest.keyClick(canvas, key, Qt.KeyboardModifier.ControlModifier)
         shown.wait(lambda step=step: shown.replay.player.position_ns == at(step))

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 from app.core.recording.replay.spans import RecordedSpans, spans_of
 from app.core.storage.background_worker import BackgroundWorker
+from app.core.timeline.lanes import Notch
 from nep.errors import NepError, RecordingError
 from nep.recordings.formats.message_counts import TopicStats
 from nep.recordings.reader import Recording
 
-MAX_MARKS = 2_000
-"""Maximum number of loss marks of one topic; later losses are added to the last mark."""
+MAX_NOTCHES = 2_000
+"""Maximum number of notches for losses of one topic; later losses are added to the last one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,29 +31,11 @@ class Density:
     bucket_count: int
     counts: Mapping[str, Sequence[int]]
 
-    def peak(self, topic: str) -> int:
-        """Return the highest number of messages of a topic in one interval."""
-        counts = self.counts.get(topic)
-        return max(counts, default=0) if counts is not None else 0
-
-
-@dataclass(frozen=True, slots=True)
-class LossMark:
-    """Losses of a topic within one second.
-
-    Attributes:
-        at_ns: End of the second.
-        count: Number of messages that were lost or could not be written.
-    """
-
-    at_ns: int
-    count: int
-
 
 @dataclass(frozen=True, slots=True)
 class _Result:
     density: Density | None = None
-    losses: Mapping[str, tuple[LossMark, ...]] | None = None
+    losses: Mapping[str, tuple[Notch, ...]] | None = None
     spans: RecordedSpans | None = None
 
 
@@ -67,7 +50,7 @@ class Densities:
         self._worker: BackgroundWorker[_Result] = BackgroundWorker("studio-density")
         self.newest: Density | None = None
         self.problem = ""
-        self.losses: Mapping[str, tuple[LossMark, ...]] = {}
+        self.losses: Mapping[str, tuple[Notch, ...]] = {}
         self.spans = RecordedSpans()
         self._requested_range: tuple[int, int, int] | None = None
         self._worker.submit("losses", lambda: _Result(losses=losses_of(recording)))
@@ -128,39 +111,39 @@ def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -
     )
 
 
-def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
-    """Return marks, by topic, for the times at which the recorder's loss counter increased.
+def losses_of(recording: Recording) -> dict[str, tuple[Notch, ...]]:
+    """Return the times, by topic, at which the recorder's loss counter increased: once a second at most.
 
     A message that arrived late was first counted as lost. Such messages are subtracted from the newest
-    earlier marks, so that the sum of all marks is the final number of lost messages.
+    earlier notches, so that the sum of all notches is the number of messages lost or not written.
     """
-    marks_by_topic: dict[str, list[LossMark]] = {}
+    notches_by_topic: dict[str, list[Notch]] = {}
     last_counts: dict[str, int] = {}
     for at_ns, stats_by_topic in _changing_stats(recording):
         for topic, stats in stats_by_topic.items():
             missing_count = _missing_count(stats)
             increase = missing_count - last_counts.get(topic, 0)
             last_counts[topic] = missing_count
-            marks = marks_by_topic.setdefault(topic, [])
+            notches = notches_by_topic.setdefault(topic, [])
             if increase <= 0:
-                _subtract_late(marks, -increase)
-            elif len(marks) < MAX_MARKS:
-                marks.append(LossMark(at_ns, increase))
+                _subtract_late(notches, -increase)
+            elif len(notches) < MAX_NOTCHES:
+                notches.append(Notch(at_ns, increase))
             else:
-                marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + increase)
+                notches[-1] = Notch(notches[-1].at_ns, notches[-1].count + increase)
     if recording.is_complete:  # not all counts were read
         last_counts = {topic: _missing_count(stats) for topic, stats in recording.stats().items()}
-    for topic, marks in marks_by_topic.items():
-        _subtract_late(marks, sum(mark.count for mark in marks) - last_counts.get(topic, 0))
-    return {topic: tuple(marks) for topic, marks in marks_by_topic.items() if marks}
+    for topic, notches in notches_by_topic.items():
+        _subtract_late(notches, sum(notch.count for notch in notches) - last_counts.get(topic, 0))
+    return {topic: tuple(notches) for topic, notches in notches_by_topic.items() if notches}
 
 
-def _subtract_late(marks: list[LossMark], count: int) -> None:
-    # Late messages are subtracted from the newest marks.
-    while marks and count > 0:
-        newest = marks.pop()
+def _subtract_late(notches: list[Notch], count: int) -> None:
+    # Late messages are subtracted from the newest notches.
+    while notches and count > 0:
+        newest = notches.pop()
         if newest.count > count:
-            marks.append(LossMark(newest.at_ns, newest.count - count))
+            notches.append(Notch(newest.at_ns, newest.count - count))
         count -= newest.count
 
 

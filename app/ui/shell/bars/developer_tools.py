@@ -7,8 +7,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from app.core.recording.recordings import SessionRecordings
-from app.core.recording.replay.scale import duration_text
 from app.core.session import Session
+from app.core.timeline.times import duration_text
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_bar import GAP, ToolBar
 from app.ui.shell.commands.commands import Commands

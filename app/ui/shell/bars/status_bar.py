@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_status
 from app.core.network.web_texts import host_text, web_status
-from app.core.recording.replay.scale import clock_text, date_text
 from app.core.robots.health_facts import has_reported, health_items
 from app.core.robots.robot_link import STOPPING
 from app.core.run.view import connected_text
 from app.core.session import Session
+from app.core.timeline.times import clock_text, date_text
 from app.ui.text.numbers import age_text, group_digits, length_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint

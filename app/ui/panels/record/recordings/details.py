@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, select_part
 from app.core.recording.folder import RecordingInfo
-from app.core.recording.replay.scale import duration_text
 from app.core.recording.topic_choice import file_stem
+from app.core.timeline.times import duration_text
 from app.ui.panels.record.recordings.film_strip import FilmStrip
 from app.ui.panels.record.recordings.topic_list import TopicList, shortest_choice
 from app.ui.text import plain

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPai
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.core.recording.film_strip import FilmStripPreview
-from app.core.recording.replay.scale import clock_text, duration_text
+from app.core.timeline.times import clock_text, duration_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _

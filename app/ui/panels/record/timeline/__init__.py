@@ -1,6 +1,6 @@
 """Timeline panel: contents of the open recording, and controls for its replay.
 
-`transport` contains the row of controls, `canvas` the ruler and the lanes.
+`transport` contains the row of controls, `lanes` the contents of the widget in `app.ui.timeline`.
 """
 
 from __future__ import annotations

@@ -12,12 +12,15 @@ from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.recording.replay.replay import STEP_NS, Replay
+from app.core.timeline.lanes import Mark
+from app.core.timeline.selection import TimelineSelection
 from app.ui.panels.act.armed_strip import ArmDurationMenu
 from app.ui.panels.base import PanelContext, PanelWidget
-from app.ui.panels.record.timeline.canvas import TimelineCanvas
+from app.ui.panels.record.timeline.lanes import BOOKMARKS, replay_content
 from app.ui.panels.record.timeline.sending import ReplayStrip, SendChooser
 from app.ui.panels.record.timeline.transport import TransportRow
 from app.ui.panels.row_actions import RowAction, fill_menu
+from app.ui.timeline.view import TimelineView
 from app.ui.widgets import Chip, EmptyAction, EmptyState, Segments, Separator
 from app.ui.widgets.keyboard import has_no_modifiers
 from app.ui.widgets.menus import Menu
@@ -26,7 +29,8 @@ from nep.i18n import _, pgettext
 from nep.recordings.bookmarks import Bookmark
 
 FROM_START, BY_CLOCK = "start", "clock"
-ZOOM_FACTOR = 1.5
+MAX_INTERVALS = 4000
+"""Maximum number of intervals in which messages are counted."""
 
 
 class TimelinePanel(PanelWidget):
@@ -37,7 +41,7 @@ class TimelinePanel(PanelWidget):
         theme = self.theme
         self._shown_replay: Replay | None = None
         self._state: tuple[object, ...] = ()
-        self.transport, self.canvas = TransportRow(theme), TimelineCanvas(theme)
+        self.transport, self.canvas = TransportRow(theme), TimelineView(theme, _("Timeline"))
         self.ruler = Segments(
             theme,
             ((FROM_START, _("From start"), None), (BY_CLOCK, _("Clock"), None)),
@@ -64,10 +68,15 @@ class TimelinePanel(PanelWidget):
         self.pages = self.make_page_stack(self.empty, body)
         self.setFocusProxy(self.canvas)
         self.ruler.changed.connect(self._set_ruler)
-        self.canvas.selected.connect(self._select_topic)
-        self.canvas.opened.connect(self.context.open_topic)
-        self.canvas.rename_requested.connect(self.rename_bookmark)
-        self.canvas.menu_requested.connect(self._show_menu)
+        self.canvas.position_requested.connect(self._seek)
+        self.canvas.range_requested.connect(self._loop)
+        self.canvas.lane_selected.connect(self._select_topic)
+        self.canvas.lane_opened.connect(self.context.open_topic)
+        self.canvas.mark_opened.connect(lambda mark: self._run_on_mark(mark, self.rename_bookmark))
+        self.canvas.menu_requested.connect(
+            lambda mark, position: self._run_on_mark(mark, lambda each: self._show_menu(each, position))
+        )
+        self.canvas.viewport_changed.connect(self._request_counts)
         self.transport.bookmark_requested.connect(self._add_bookmark)
         self.transport.arm_requested.connect(self.show_send_chooser)
         self.strip.change_requested.connect(self.show_send_chooser)
@@ -88,20 +97,21 @@ class TimelinePanel(PanelWidget):
             self._shown_replay, self._state = replay, ()
             self.set_title(_("Timeline"), replay.name)
             self.chip.set(pgettext("message", "recorded"), "info", "")
-            self.canvas.show_replay(replay)
+            self.canvas.show_range(replay.start_ns, replay.end_ns)
             self.pages.setCurrentIndex(1)
             self.ruler.setVisible(True)
         is_new = replay.densities is not None and replay.densities.collect_results()
-        state = (replay.selected_topic, tuple(replay.bookmarks))
+        state = (tuple(replay.bookmarks),)
         if is_new or state != self._state:
             self._state = state
-            self.canvas.update_scroll_range()
+            self.canvas.set_content(replay_content(replay))
         self.transport.show_replay(replay, player)
         self.strip.refresh()
         self.transport.set_armed(is_armed=self.strip.isVisibleTo(self))
         if self._lower_pages.currentWidget() is self.chooser:
             self.chooser.refresh()
-        self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
+        loop_ns = player.loop if player.is_looping else None
+        self.canvas.select(TimelineSelection(player.position_ns, loop_ns, replay.selected_topic))
 
     def _update_text(self) -> None:
         # Shows the progress of opening, the error, or how to open a recording.
@@ -136,26 +146,41 @@ class TimelinePanel(PanelWidget):
 
     def source_changed(self) -> None:
         self._shown_replay = None
-        self.canvas.show_replay(None)
+        self.canvas.clear()
         self._lower_pages.setCurrentWidget(self.canvas)
 
     def theme_changed(self) -> None:
-        self.canvas.refresh_lanes()
+        self.canvas.repaint_lanes()
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
         """Select a topic. Steps of the replay then lead from one message of this topic to the next."""
         self._select_topic(name)
-        self.canvas.show_topic(name)
+        self.canvas.show_lane(name)
 
     def _select_topic(self, topic: str) -> None:
         if self._shown_replay is not None:
             self._shown_replay.select_topic(topic)
 
+    def _seek(self, at_ns: int) -> None:
+        if self._shown_replay is not None:
+            self._shown_replay.seek(at_ns)
+
+    def _loop(self, start_ns: int, end_ns: int) -> None:
+        if self._shown_replay is not None:
+            self._shown_replay.loop(start_ns, end_ns)
+
+    def _request_counts(self) -> None:
+        # The messages of the visible range are counted in a background thread.
+        replay, scale = self._shown_replay, self.canvas.scale
+        if replay is not None and replay.densities is not None and scale is not None:
+            width = self.canvas.geometry_of_lanes().plot.width()
+            intervals = max(1, min(MAX_INTERVALS, round(width)))
+            replay.densities.request(scale.start_ns, scale.end_ns + 1, intervals)
+
     def _set_ruler(self, mode: str) -> None:
-        self.canvas.shows_clock = mode == BY_CLOCK
-        self.canvas.refresh_lanes()
+        self.canvas.set_clock(is_shown=mode == BY_CLOCK)
 
     def _add_bookmark(self) -> None:
         self.context.run("replay.bookmark")
@@ -193,12 +218,6 @@ class TimelinePanel(PanelWidget):
             (NONE, Qt.Key.Key_BracketRight): lambda: replay.set_loop_edge(is_start=False),
             (NONE, Qt.Key.Key_L): replay.toggle_loop,
             (NONE, Qt.Key.Key_B): self._add_bookmark,
-            (NONE, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
-            (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
-            (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM_FACTOR),
-            (NONE, Qt.Key.Key_0): self.canvas.show_all,
-            (NONE, Qt.Key.Key_Up): lambda: self._select_neighbour(-1),
-            (NONE, Qt.Key.Key_Down): lambda: self._select_neighbour(1),
         }
         action = actions.get((modifiers, event.key()))
         if action is None and event.text() in {"[", "]"}:  # typed with AltGr on many keyboard layouts
@@ -206,16 +225,9 @@ class TimelinePanel(PanelWidget):
                 (NONE, Qt.Key.Key_BracketLeft if event.text() == "[" else Qt.Key.Key_BracketRight)
             ]
         if action is None:
-            return False
+            return self.canvas.handle_key(event)
         action()
         return True
-
-    def _select_neighbour(self, by: int) -> None:
-        # Selects the next topic above or below.
-        replay = self._shown_replay
-        if replay is not None and (topics := list(replay.recorded_topics)):
-            index = topics.index(replay.selected_topic) if replay.selected_topic in topics else 0
-            self.show_topic(topics[max(0, min(len(topics) - 1, index + by))])
 
     # -- sending ------------------------------------------------------------------------------------------
 
@@ -239,6 +251,10 @@ class TimelinePanel(PanelWidget):
 
     # -- bookmarks ----------------------------------------------------------------------------------------
 
+    def _run_on_mark(self, mark: Mark, action: Callable[[Bookmark], object]) -> None:
+        if isinstance(mark.key, Bookmark):
+            action(mark.key)
+
     def _run_on_current_bookmark(self, action: Callable[[Bookmark], object]) -> None:
         bookmark = self._shown_replay.current_bookmark() if self._shown_replay is not None else None
         if bookmark is not None:
@@ -260,9 +276,12 @@ class TimelinePanel(PanelWidget):
         """Start editing the name of a bookmark in place."""
         replay = self._shown_replay
         if replay is not None and not self._reject_note(bookmark):
-            self.canvas.rename(
-                bookmark,
+            self.canvas.edit(
+                BOOKMARKS,
+                bookmark.at_ns,
+                bookmark.name,
                 lambda name: self._apply_change(lambda: replay.rename_bookmark(bookmark, name.strip())),
+                _("Bookmark name"),
             )
 
     def delete_bookmark(self, bookmark: Bookmark) -> None:

@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from app.core.recording.replay.replay import Replay
-from app.core.recording.replay.scale import clock_text, date_text, duration_text
+from app.core.timeline.times import clock_text, date_text, duration_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Switch, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow

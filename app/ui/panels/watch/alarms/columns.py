@@ -7,7 +7,7 @@ import datetime as dt
 import io
 from collections.abc import Callable, Iterable
 
-from app.core.alarms import SessionAlarms, severity_of
+from app.core.parts.alarms import SessionAlarms, severity_of
 from app.ui.text.dates import clock_text, date_time_text
 from app.ui.text.numbers import seconds_text
 from app.ui.widgets.table.model import Cell, Column

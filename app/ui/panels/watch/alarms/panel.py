@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QActionGroup, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.alarms import severity_of
+from app.core.parts.alarms import severity_of
 from app.core.recording.recordings import saved_file_name
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget

@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.recording.replay.scale import clock_text
+from app.core.timeline.times import clock_text
 from app.ui.text import plain
 from app.ui.text.numbers import age_text, group_digits, latency_text, size_text
 from app.ui.theme.theme import Theme

@@ -6,8 +6,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.messages.history import MessageHistory
-from app.core.recording.replay.scale import clock_text
 from app.core.series.feed import SeriesFeed
+from app.core.timeline.times import clock_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import FixedWidthLabel, IconButton
 from app.ui.widgets.inputs.slider import SliderTrack

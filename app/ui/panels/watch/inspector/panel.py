@@ -14,7 +14,7 @@ from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult
 from app.core.network.topics import split_key
 from app.core.networks.kinds import find_kind
 from app.core.networks.networks import topic_label
-from app.core.recording.replay.scale import clock_text
+from app.core.timeline.times import clock_text
 from app.ui.panels.base import ANY_TYPE, Blocker, Panel, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.watch.inspector.actions import InspectorActions
 from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody

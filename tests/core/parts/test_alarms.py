@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.alarms import FILE_NAME, MAX_MESSAGE_AGE_S
+from app.core.parts.alarms import FILE_NAME, MAX_MESSAGE_AGE_S
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
@@ -139,7 +139,7 @@ def test_complete_alarms_and_their_snooze_are_restored_after_a_restart(tmp_path:
 
 
 def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("app.core.alarms.MAX_ALARMS", 5)
+    monkeypatch.setattr("app.core.parts.alarms.MAX_ALARMS", 5)
     session = at_rest(tmp_path)
     for _ in range(5):
         session.alarms.create(BELOW)
