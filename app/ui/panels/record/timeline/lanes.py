@@ -38,6 +38,7 @@ RESULT_STYLES: Mapping[str, tuple[str, Status, str]] = {
     "failed": ("circle-x", "error", lazy("failed")),
 }
 """Icon, status and text for each result of a run, by id."""
+_ALARM_STATUS: Mapping[bool, Status] = {True: "error", False: "warn"}
 TOPIC_ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
 
 
@@ -121,8 +122,8 @@ def _run_mark(span: RecordedSpan, start_ns: int) -> Mark:
 
 
 def _alarm_mark(span: RecordedSpan, start_ns: int) -> Mark:
-    text = alarm_text(span)
-    icon, status = ("circle-x", "error") if span.is_error else ("triangle-alert", "warn")
+    text, status = alarm_text(span), _ALARM_STATUS[span.is_error]
+    icon = "circle-x" if span.is_error else "triangle-alert"
     return Mark(span.start_ns, span.end_ns, text, _with_times(text, span, start_ns), icon=icon, status=status)
 
 
