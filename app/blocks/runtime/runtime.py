@@ -231,7 +231,7 @@ class Runtime:
 
     def _on_script_error(self, error: BehaviourError) -> None:
         group = self.scheduler.current_script().group
-        self.scheduler.record_failure(error.sentence)
+        self.scheduler.record_failure(error.sentence, error.block)
         if group.ends_program:
             self._fail(error)
         else:

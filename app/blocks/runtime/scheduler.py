@@ -381,14 +381,17 @@ class Scheduler:
         with self._lock:
             return self.trace.take({script.number: script.block for script in self._scripts if script.block})
 
-    def record_failure(self, message: str) -> None:
+    def record_failure(self, message: str, block: str | None = None) -> None:
         """Record that the current block of the calling script has failed.
 
         Args:
             message: Message for the user.
+            block: Id of the value in the current block that failed, or None.
         """
+        script = self._current_script()
         with self._lock:
-            self._record_end_locked(self._current_script(), "failed", message)
+            value_block = block if block is not None and block != script.block else ""
+            self._record_end_locked(script, "failed", message, value_block)
 
     def record_stop(self) -> None:
         """Record that all scripts have ended, after `stop`. Thread-safe."""
@@ -424,14 +427,17 @@ class Scheduler:
             record = create(self.trace.time_s(), script.number, script.block)
             self.trace.add(record, len(script.block) + text_length)
 
-    def _record_end_locked(self, script: Script, cause: EndCause | None = None, message: str = "") -> None:
+    def _record_end_locked(
+        self, script: Script, cause: EndCause | None = None, message: str = "", value_block: str = ""
+    ) -> None:
         if script.block is None:
             return
         if cause is None:
             is_canceled = script.is_ending or script.group.has_ended
             cause = "canceled" if is_canceled else "stopped" if self._is_stopping else ""
         message = message[:MAX_TEXT_LENGTH]
-        self._record_locked(script, partial(BlockEnded, cause=cause, text=message), len(message))
+        create = partial(BlockEnded, cause=cause, text=message, value_block=value_block)
+        self._record_locked(script, create, len(message) + len(value_block))
         script.block, script.is_interrupted, script.must_restart = None, False, False
 
     def _record_wait_locked(self, script: Script, cause: WaitCause) -> None:

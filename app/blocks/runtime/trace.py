@@ -63,12 +63,14 @@ class BlockEnded(TraceRecord, frozen=True, array_like=True, tag="ended", gc=Fals
         block: Id of the block.
         cause: Why the run ended.
         text: Message if the block failed, else "".
+        value_block: Id of the value in the block that failed, or "".
     """
 
     script: int
     block: str
     cause: EndCause = ""
     text: _Text = ""
+    value_block: str = ""
 
 
 class BlockWaiting(TraceRecord, frozen=True, array_like=True, tag="waiting", gc=False):
@@ -215,10 +217,12 @@ class RunningBlocks:
 
     Attributes:
         begun: Ids of all blocks that have begun.
+        failure: End of the first block that failed, or None.
     """
 
     def __init__(self) -> None:
         self.begun: frozenset[str] = frozenset()
+        self.failure: BlockEnded | None = None
         self._blocks: dict[int, str] = {}
 
     @property
@@ -236,6 +240,8 @@ class RunningBlocks:
             elif isinstance(record, BlockEnded):
                 if record.cause in ("", "canceled"):
                     self._blocks.pop(record.script, None)
+                elif record.cause == "failed" and self.failure is None:
+                    self.failure = record
             elif isinstance(record, RecordsLost):
                 self._blocks = dict(record.blocks)
                 begun.update(record.blocks.values())

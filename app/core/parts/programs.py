@@ -15,8 +15,8 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import Launcher, LaunchFailed
 from app.core.run.control import Runs
+from app.core.run.run_record import RunRecord
 from app.core.run.spare_child import SpareChild
-from app.core.run.view import RunState
 from app.core.world.console import Console
 from app.core.world.live import LiveWorld
 from app.core.world.part import SessionPart
@@ -86,15 +86,15 @@ class CurrentRun(SessionPart):
 
     task = lazy("update the run")
 
-    def __init__(self, runs: Runs, on_state: Callable[[RunState], object]) -> None:
-        # `on_state` is called with the state of the run at each tick.
-        self._runs, self._on_state = runs, on_state
+    def __init__(self, runs: Runs, on_record: Callable[[RunRecord], object]) -> None:
+        # `on_record` is called with the record of the run at each tick.
+        self._runs, self._on_record = runs, on_record
 
     def tick(self) -> None:
         """Update the run and its robots."""
         self._runs.update_robots()
         self._runs.tick()
-        self._on_state(self._runs.state)
+        self._on_record(self._runs.record)
 
     def close(self) -> None:
         """Stop the program and its robots."""

@@ -8,6 +8,7 @@ from itertools import count
 from typing import Protocol
 
 from app.core.parts.alarms import severity_of
+from app.core.run.run_record import RunRecord
 from app.core.run.view import RunState
 from nep.i18n import _
 from nep.programs.alarms import AlarmEvent
@@ -16,7 +17,6 @@ from nep.programs.alarms.sentences import event_text
 MAX_ACTIVE_ALARMS = 200
 """Maximum number of active alarms that are sent repeatedly; further alarms are sent once."""
 MAX_TEXT_LENGTH = 200
-_ACTIVE_STATES = frozenset({"running", "paused"})
 
 
 class SendEvent(Protocol):
@@ -45,7 +45,8 @@ class RecordedEvents:
         self._send_event, self._clock_ns = send_event, clock_ns
         self._numbers = count(1)
         self._active_events: dict[str, tuple[str, Mapping[str, object]]] = {}
-        self._run: RunState | None = None
+        self._run: RunRecord | None = None
+        self._run_state: RunState | None = None
         self._run_entry: dict[str, object] = {}
 
     def resend(self, to: str) -> None:
@@ -59,41 +60,33 @@ class RecordedEvents:
 
     # ---- behaviours
 
-    def update_run(self, run: RunState) -> None:
-        """Send an event if the state of the run has changed. Called at each tick."""
-        previous, self._run = self._run, run
-        if run is previous:
+    def update_run(self, run: RunRecord) -> None:
+        """Send an event if the run or its state has changed. Called at each tick."""
+        if run is not self._run:
+            if self._run is not None:
+                self._send_result(self._run)
+            self._run, self._run_state, self._run_entry = run, None, {}
+        if run.state is self._run_state:
             return
-        was_active, is_active = (
-            previous is not None and previous.state in _ACTIVE_STATES,
-            run.state in _ACTIVE_STATES,
-        )
-        is_same_run = was_active and previous is not None and _is_unchanged(previous, run)
-        if was_active and not (is_active and is_same_run):
-            self._end_run(run if is_same_run else None)
-        elif self._run_entry and not is_active:
+        self._run_state = run.state
+        if not run.is_active:
             self._send_result(run)
-        if is_active and not is_same_run:
-            self._run_entry = self._new_entry(f"run-{next(self._numbers)}", run.tried_label or run.name)
+        elif not self._run_entry:
+            self._run_entry = self._new_entry(f"run-{next(self._numbers)}", run.name)
             self._add("runs", self._run_entry)
 
-    def _end_run(self, run: RunState | None) -> None:
-        # `run` is None if the end was not observed.
-        self._run_entry["until_ns"] = self._clock_ns()
-        self._active_events.pop(str(self._run_entry.get("id")), None)
-        if run is None:
-            self._send_event("runs", dict(self._run_entry))
-            self._run_entry = {}
-        else:
-            self._send_result(run)
-
-    def _send_result(self, run: RunState) -> None:
+    def _send_result(self, run: RunRecord) -> None:
         # Sent again with the robots' time once they have replied.
+        if not self._run_entry:
+            return
+        if self._run_entry["until_ns"] is None:
+            self._run_entry["until_ns"] = self._clock_ns()
+            self._active_events.pop(str(self._run_entry["id"]), None)
         content = {**self._run_entry, **_result(run)}
         if content != self._run_entry:
             self._run_entry = content
             self._send_event("runs", dict(content))
-        if run.state in {"proven", "ready"}:
+        if run.state.state in {"proven", "ready"}:
             self._run_entry = {}
 
     # ---- alarms
@@ -132,17 +125,12 @@ class RecordedEvents:
             self._active_events[key or str(content["id"])] = (role, content)
 
 
-def _is_unchanged(previous: RunState, run: RunState) -> bool:
-    # The clock of the same run is set once more when its scripts begin.
-    return run.started_s == previous.started_s or (run.is_started and not previous.is_started)
-
-
-def _result(run: RunState) -> dict[str, object]:
-    if run.errors:
-        return {"result": "failed", "words": next(iter(run.errors.values()))[:MAX_TEXT_LENGTH]}
-    if run.is_finished:
+def _result(run: RunRecord) -> dict[str, object]:
+    if run.failure:
+        return {"result": "failed", "words": run.failure[:MAX_TEXT_LENGTH]}
+    if run.state.is_finished:
         return {"result": "ended", "words": ""}
-    report = run.report
+    report = run.state.report
     if report is None or not report.is_confirmed or not report.robots:
         return {"result": "stopped", "words": ""}
     elapsed_ms = max(1, round(report.elapsed_ms))

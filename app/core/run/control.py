@@ -23,7 +23,6 @@ from app.blocks.runtime.events import (
     RunnerEvent,
     VariablesChanged,
 )
-from app.blocks.runtime.trace import RunningBlocks
 from app.blocks.runtime.variables import VariableValue
 from app.core.alerts.alerts import Alerts
 from app.core.projects.open_project import OpenProject
@@ -36,6 +35,7 @@ from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.requests import OpenBehaviours, RequestedRun
+from app.core.run.run_record import RunRecord
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner
 from app.core.run.stop_job import stop_program, stop_robot
@@ -112,14 +112,13 @@ class Runs:
         self._robots = ProgramRobots(fleet)
         fleet.robots_in_use = lambda: self.used_robots
         self._stop_reporter = StopReporter(fleet, alerts, console)
-        self._run = RunState()
+        self._record = RunRecord(RunState())
         self._view: tuple[RunState, OpenProject, RunView] | None = None
         self._stop_number = self._stop_mark = 0
         self._stopped_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
-        self._traced = RunningBlocks()  # of the program's trace
         self._earlier_blocks: frozenset[str] = frozenset()  # that began in earlier runs
         self._errors = BlockErrors()
         self._warnings = RunWarnings(lambda text: self._console.add("warn", self._run.name, text))
@@ -140,6 +139,22 @@ class Runs:
         return self._run
 
     @property
+    def record(self) -> RunRecord:
+        """Record of the current run, else of the last one."""
+        return self._record
+
+    @property
+    def _run(self) -> RunState:
+        return self._record.state
+
+    @_run.setter
+    def _run(self, state: RunState) -> None:
+        self._record.state = state
+
+    def _begin_record(self, state: RunState) -> None:
+        self._earlier_blocks, self._record = self.ran_blocks, RunRecord(state)
+
+    @property
     def used_robots(self) -> tuple[str, ...]:
         """Names of the robots that the running or paused program uses."""
         return self._used_robots if self.active else ()
@@ -147,7 +162,7 @@ class Runs:
     @property
     def ran_blocks(self) -> frozenset[str]:
         """Ids of all blocks that have begun since Studio was started."""
-        return self._earlier_blocks | self._traced.begun
+        return self._earlier_blocks | self._record.blocks.begun
 
     @property
     def tried_value(self) -> TriedValue | None:
@@ -407,12 +422,17 @@ class Runs:
         # The run's clock starts with the first event of its scripts.
         if not self._run.is_started:
             self._run = replace(self._run, is_started=True, started_s=self._clock())
-        run, previous_blocks = self._run, self._traced.blocks
+        run, traced = self._run, self._record.blocks
+        previous_blocks = traced.blocks
         match event:
             case BlocksTraced():
-                self._traced.apply(event.records)
-                if self._traced.blocks != previous_blocks:
-                    self._mark_blocks(running=self._traced.blocks, stopped=self.stopped_blocks)
+                traced.apply(event.records)
+                if traced.blocks != previous_blocks:
+                    self._mark_blocks(running=traced.blocks, stopped=self.stopped_blocks)
+                if traced.failure is not None and not run.errors:
+                    self._set_errors(
+                        {traced.failure.value_block or traced.failure.block: traced.failure.text}
+                    )
             case ProgramRunning():
                 if event.description and event.description != run.description:
                     self._run = replace(run, description=event.description)
@@ -504,7 +524,6 @@ class Runs:
             return
         self.open_question.reset(runner)
         self._runner, self._used_robots, self._labels = runner, program.robots, program.labels
-        self._earlier_blocks, self._traced = self.ran_blocks, RunningBlocks()
         self._robots.start(runner, requested_actions, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
         self._fleet.moved.record_command((robot.name for robot in robots), "behaviour")
@@ -532,11 +551,13 @@ class Runs:
 
     def _show_start(self, title: str, tried_label: str) -> None:
         run, previous = RunState("running", title, is_started=False, tried_label=tried_label), self._run
-        self._run = replace(
-            run,
-            started_s=self._clock(),
-            last_stop_text=previous.last_stop_text,
-            last_stop_status=previous.last_stop_status,
+        self._begin_record(
+            replace(
+                run,
+                started_s=self._clock(),
+                last_stop_text=previous.last_stop_text,
+                last_stop_status=previous.last_stop_status,
+            )
         )
         text = _("trying “{block}”").format(block=tried_label) if tried_label else _("started")
         self._console.add("info", self._run.name, text)
@@ -549,10 +570,12 @@ class Runs:
             return program
         if request.stack is None or not problems:  # problems of a tried block are shown at the block
             previous = self._run
-            self._run = RunState(
-                unrunnable_program=program,
-                last_stop_text=previous.last_stop_text,
-                last_stop_status=previous.last_stop_status,
+            self._begin_record(
+                RunState(
+                    unrunnable_program=program,
+                    last_stop_text=previous.last_stop_text,
+                    last_stop_status=previous.last_stop_status,
+                )
             )
         self._set_errors(problems, prevents_start=True)
         return None
@@ -572,9 +595,9 @@ class Runs:
 
     def _on_error(self, event: ProgramFailed) -> None:
         self._console.add("error", self._run.name, event.text)
-        if event.block is not None:
+        if event.block is not None and not self._run.errors:  # it failed before its first block
             self._set_errors({event.block: event.text})
-        else:
+        elif event.block is None:
             self._alerts.raise_alert("program", "error", _("The behaviour was stopped."), event.text)
 
     def _on_end(self, event: ProgramEnded) -> None:

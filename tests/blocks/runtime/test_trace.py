@@ -130,11 +130,13 @@ def test_failed_block_ends_with_its_message_and_other_scripts_are_stopped() -> N
     saved = workspace(started(wait("w", 1000)), started(wait("x", 0.01), write(half) | {"id": "f"}))
     play = Play(compile_behaviour(saved, [])).start().end()
     records = traced(play, lambda records: sum(isinstance(each, BlockEnded) for each in records) == 2)
-    ended = {each.block: (each.cause, each.text) for each in records if isinstance(each, BlockEnded)}
-    assert ended == {"w": ("stopped", ""), "f": ("failed", "“÷” can't divide by 0.")}
+    w, f = sorted((each for each in records if isinstance(each, BlockEnded)), key=lambda each: each.script)
+    assert (w.block, w.cause, w.text, w.value_block) == ("w", "stopped", "", "")
+    assert (f.block, f.cause, f.text, f.value_block) == ("f", "failed", "“÷” can't divide by 0.", "v")
     running = RunningBlocks()
     running.apply(records)
     assert running.blocks == ("w", "f"), "they stopped there"
+    assert running.failure == f
 
 
 def test_trace_is_bounded_in_bytes_and_marks_losses() -> None:
@@ -187,7 +189,7 @@ def test_running_blocks_follow_the_trace() -> None:
 
 def test_every_record_is_encoded_as_an_array_and_decoded() -> None:
     records: tuple[AnyRecord, ...] = (
-        BlockBegan(0.5, 1, "a"), BlockEnded(0.5, 1, "a", "failed", "ouch"),
+        BlockBegan(0.5, 1, "a"), BlockEnded(0.5, 1, "a", "failed", "ouch", "b"),
         BlockWaiting(0.5, 1, "a", "robot"),
         BlockInterrupted(0.5, 1, "a", "replaced"), BlockResumed(0.5, 1, "a"),
         BlockSkipped(0.5, 1, "a", "unknown_remainder"), RecordsLost(0.5, 3, {1: "a"}),

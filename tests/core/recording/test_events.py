@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from app.blocks.runtime.trace import BlockBegan, BlockEnded
 from app.core.recording import events as events_module
 from app.core.recording.events import RecordedEvents
+from app.core.run.run_record import RunRecord
 from app.core.run.view import RunState
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -33,10 +35,11 @@ class Told:
         self.said.append((role, dict(value)))
         self.to.add(to)
 
-    def follow(self, *runs: RunState) -> list[dict[str, object]]:
+    def follow(self, run: RunRecord, *states: RunState) -> list[dict[str, object]]:
         """Return the events sent for these states of a run."""
         self.said.clear()
-        for run in runs:
+        for state in states:
+            run.state = state
             self.events.update_run(run)
         assert {role for role, _value in self.said} <= {"runs"}
         return [value for _role, value in self.said]
@@ -57,9 +60,10 @@ def test_run_is_recorded_at_start_and_end_and_again_with_its_confirmed_stop(told
     stopping = replace(begun, state="stopping", description="x")
     report = StopReport((RobotStop("Pepper", True, 41.0),), 41.2)
     proven = replace(stopping, state="proven", report=report)
-    first, *rest = told.follow(RunState(), RUNNING, begun, replace(begun, state="paused"), begun)
+    run = RunRecord(RunState())
+    first, *rest = told.follow(run, RunState(), RUNNING, begun, replace(begun, state="paused"), begun)
     assert (first["name"], first["since_ns"], first["until_ns"], rest) == ("Greeting", 1010, None, [])
-    ended, answered = told.follow(stopping, proven, replace(proven, last_stop_text="still proven"))
+    ended, answered = told.follow(run, stopping, proven, replace(proven, last_stop_text="still proven"))
     assert (ended["id"], ended["until_ns"], ended["result"], ended["words"]) == (
         first["id"], 1020, "stopped", "",
     )  # fmt: skip
@@ -75,19 +79,32 @@ def test_run_is_recorded_at_start_and_end_and_again_with_its_confirmed_stop(told
     ],
 )
 def test_run_result_is_recorded(told, changes, result, words):
-    *_begin, end = told.follow(RUNNING, replace(RUNNING, state="stopping", **changes))
+    *_begin, end = told.follow(RunRecord(RUNNING), RUNNING, replace(RUNNING, state="stopping", **changes))
     assert (end["result"], end["words"]) == (result, words)
 
 
+def test_failure_is_read_from_the_trace(told):
+    run = RunRecord(RUNNING)
+    told.follow(run, RUNNING)
+    run.blocks.apply([BlockBegan(0.0, 1, "b"), BlockEnded(1.0, 1, "b", "failed", "wave failed")])
+    (end,) = told.follow(run, replace(RUNNING, state="stopping"))
+    assert (end["result"], end["words"]) == ("failed", "wave failed")
+
+
 def test_second_run_in_same_tick_is_a_separate_event(told):
-    first, over, second = told.follow(RUNNING, replace(RUNNING, started_s=7.0, name="Tour"))
-    assert (over["id"], over["until_ns"], "result" in over) == (first["id"], 1020, False)
+    run = RunRecord(RUNNING)
+    (first,) = told.follow(run, RUNNING)
+    run.state = replace(RUNNING, state="proven", is_finished=True)
+    tour = replace(RUNNING, name="Tour")
+    over, second = told.follow(RunRecord(tour), tour)
+    assert (over["id"], over["until_ns"], over["result"]) == (first["id"], 1020, "ended")
     assert (second["name"], second["until_ns"]) == ("Tour", None)
     assert second["id"] != first["id"]
 
 
 def test_trial_of_stack_is_recorded_with_text_of_its_block(told):
-    (said,) = told.follow(replace(RUNNING, tried_label="wave"))
+    tried = replace(RUNNING, tried_label="wave")
+    (said,) = told.follow(RunRecord(tried), tried)
     assert said["name"] == "wave"
 
 
@@ -111,7 +128,7 @@ def test_alarm_about_node_has_no_topic(told):
 def test_only_ongoing_events_are_resent_to_the_flight_recorder(told):
     told.events.on_alarm(event("on", "/a"))
     told.events.on_alarm(event("on", "/b"))
-    told.events.update_run(RUNNING)
+    told.events.update_run(RunRecord(RUNNING))
     told.events.on_alarm(event("off", "/a"))
     assert told.to == {""}
     told.said.clear()

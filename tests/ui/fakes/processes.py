@@ -105,6 +105,8 @@ class Runner:
 
     def fails(self, block: str, sentence: str) -> None:
         """Report that a block failed, and end the program."""
+        failed = BlockEnded(0.0, 0, block, "failed", sentence)
+        self._on_event(BlocksTraced(run=self.run, records=(failed,)))
         self._on_event(ProgramFailed(run=self.run, block=block, text=sentence))
         self.ends(ok=False)
 
