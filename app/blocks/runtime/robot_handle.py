@@ -371,7 +371,7 @@ class RobotHandle:
         can_pause = action.cancellable and dialect.can_cancel
         time_limit_s = action.timeout_s or limits.DEFAULT_ACTION_TIMEOUT_S
         clock = scheduler.clock
-        deadline = clock.now() + time_limit_s + limits.PROGRAM_MARGIN_S
+        deadline = clock.now() + time_limit_s + limits.ACTION_MARGIN_S
         is_waiting = bool(call.waits_for) and call.state == "accepted"
         if is_waiting:
             self._runtime.status_text.set_text(_waiting_text(robot, call))
@@ -383,7 +383,7 @@ class RobotHandle:
             ready, min(limits.COMMAND_CHECK_INTERVAL_S, max(0.0, deadline - clock.now()))
         ):
             if is_waiting:  # the time limit starts with the action
-                deadline = clock.now() + time_limit_s + limits.PROGRAM_MARGIN_S
+                deadline = clock.now() + time_limit_s + limits.ACTION_MARGIN_S
                 is_waiting = not call.has_started
                 self._runtime.status_text.set_text(_waiting_text(robot, call) if is_waiting else activity)
             error_text = self._silence_error(robot, call)

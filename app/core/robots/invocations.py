@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from app.core.robots.robot_link import SENDER, Invocation, RobotLink
 from app.robots.client.dialects import dialect_of, new_id
-from app.robots.client.limits import FIRST_REPLY_TIMEOUT_S, FORM_MARGIN_S
+from app.robots.client.limits import ACTION_MARGIN_S, FIRST_REPLY_TIMEOUT_S
 from app.robots.client.reply import Payload, RobotReply
 from app.robots.client.task import is_silent
 from app.robots.description.description import Action
@@ -95,7 +95,7 @@ class ManualInvocations:
             self._mark_unresponsive(link, invocation, error)
             return
         remaining_s = invocation.remaining_s
-        if remaining_s is not None and remaining_s < -FORM_MARGIN_S:
+        if remaining_s is not None and remaining_s < -ACTION_MARGIN_S:
             link.is_unresponsive = True  # until it replies
             self._send_cancel(link, invocation)
             self._end(

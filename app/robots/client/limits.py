@@ -13,8 +13,11 @@ FIRST_REPLY_TIMEOUT_S = 3.0
 MAX_MISSED_HEARTBEATS, MIN_SILENCE_S = 4, 2.0
 DEFAULT_ACTION_TIMEOUT_S = 60.0
 """Time limit in seconds of a program's action whose description has none."""
-FORM_MARGIN_S, PROGRAM_MARGIN_S = 0.5, 2.0
-"""Time in seconds beyond an action's time limit, in which the robot should report the end itself."""
+ACTION_MARGIN_S = 2.0
+"""Time in seconds beyond an action's time limit, in which the robot should report the end itself.
+
+Drivers report it up to 1 s after the limit (`_GRACE_S` in `app.robots.driver.tasks`).
+"""
 PAUSE_TIMEOUT_S = 3.0
 """Timeout in seconds for an action cancelled by a pause; robots built with the kit reply within 1 s."""
 COMMAND_CHECK_INTERVAL_S = 0.25

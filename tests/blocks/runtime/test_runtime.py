@@ -97,7 +97,7 @@ def test_robot_that_does_not_reply_is_named(monkeypatch):
 
 
 def test_action_that_never_ends_is_canceled(monkeypatch):
-    monkeypatch.setattr("app.robots.client.limits.PROGRAM_MARGIN_S", -29.95)
+    monkeypatch.setattr("app.robots.client.limits.ACTION_MARGIN_S", -29.95)
     link = FakeLink()
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)

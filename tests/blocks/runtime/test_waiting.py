@@ -27,7 +27,7 @@ class Queued(FakeLink):
 
 
 def test_queued_action_shows_the_awaited_action_and_then_its_own_activity(monkeypatch) -> None:
-    monkeypatch.setattr("app.robots.client.limits.PROGRAM_MARGIN_S", -29.5)  # time limit of 0.5 s
+    monkeypatch.setattr("app.robots.client.limits.ACTION_MARGIN_S", -29.5)  # time limit of 0.5 s
     link = Queued()
     run = begin(link)
     until(lambda: bool(link.calls))

@@ -8,7 +8,7 @@ import pytest
 
 from app.core.robots.invocations import ManualInvocations
 from app.core.robots.robot_link import MAX_PAST_INVOCATIONS, Invocation, RobotLink
-from app.robots.client.limits import FIRST_REPLY_TIMEOUT_S, FORM_MARGIN_S
+from app.robots.client.limits import ACTION_MARGIN_S, FIRST_REPLY_TIMEOUT_S
 from app.robots.client.reply import Payload, parse_reply
 from app.robots.description.description import Action, Robot, parse, thing_description
 from app.robots.turtle import ROBOT
@@ -117,9 +117,9 @@ def test_invocation_of_robot_without_heartbeat_waits_until_the_time_limit(bench)
     bench.answer(made, "running")
     bench.pass_time(59.0)
     assert made.is_running
-    bench.pass_time(1.0 + FORM_MARGIN_S / 2)
+    bench.pass_time(1.0 + ACTION_MARGIN_S / 2)
     assert made.is_running  # grace period in which the robot may report the timeout itself
-    bench.pass_time(FORM_MARGIN_S)
+    bench.pass_time(ACTION_MARGIN_S)
     assert (made.state, made.error) == ("failed", "move took longer than 60 s")
     assert bench.sent[-1]["op"] == "cancel"
     bench.answer(made, "succeeded")
