@@ -148,6 +148,18 @@ class TimelineLane:
     figures: Sequence[LaneFigure] = ()
     is_code: bool = False
 
+    def bars(self) -> Iterator[Mark]:
+        """Yield the marks of its layers of bars."""
+        for layer in self.layers:
+            if isinstance(layer, BarLayer):
+                yield from layer.marks
+
+    def flags(self) -> Iterator[Mark]:
+        """Yield the marks of its layers of flags."""
+        for layer in self.layers:
+            if isinstance(layer, FlagLayer):
+                yield from layer.marks
+
 
 @dataclass(frozen=True, slots=True)
 class TimelineContent:

@@ -95,20 +95,10 @@ class LanePainter:
             painter.restore()
         return painted_marks
 
-    def paint_current_bars(self, layers: Iterable[LaneLayer], at_ns: int) -> None:
-        """Paint the bars that contain a time highlighted.
-
-        Args:
-            layers: Layers of the lane.
-            at_ns: Time, such as that of the playhead.
-        """
-        self._painter.save()
-        self._painter.setClipRect(self._box)
-        for layer in layers:
-            for mark in layer.marks if isinstance(layer, BarLayer) else ():
-                if mark.start_ns <= at_ns < mark.end_ns:
-                    self._paint_bar(mark, "changedTint", "running")
-        self._painter.restore()
+    def paint_current_bars(self, marks: Iterable[Mark]) -> None:
+        """Paint bars highlighted, for the playhead in them."""
+        for mark in marks:
+            self._paint_bar(mark, "changedTint", "running")
 
     def _spaced(self, marks: Iterable[Mark]) -> Iterator[Mark]:
         return spaced_marks(marks, self._x_of, self._box.left(), self._box.right(), MIN_MARK_WIDTH)

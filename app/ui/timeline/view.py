@@ -25,7 +25,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
 
-from app.core.timeline.lanes import FlagLayer, Mark, NotchLayer, TimelineContent, TimelineLane
+from app.core.timeline.lanes import Mark, NotchLayer, TimelineContent, TimelineLane
 from app.core.timeline.ruler import Ruler
 from app.core.timeline.scale import TimeScale
 from app.core.timeline.selection import RangeEdge, TimelineSelection
@@ -219,12 +219,9 @@ class TimelineView(QAbstractScrollArea):
 
     def flag_at_playhead(self) -> Mark | None:
         """Return the flag at the time of the playhead, or None."""
-        for lane in (*self._content.pinned, *self._content.lanes):
-            for layer in lane.layers:
-                for mark in layer.marks if isinstance(layer, FlagLayer) else ():
-                    if mark.start_ns == self.selection.position_ns:
-                        return mark
-        return None
+        at_ns = self.selection.position_ns
+        lanes = (*self._content.pinned, *self._content.lanes)
+        return next((flag for lane in lanes for flag in lane.flags() if flag.start_ns == at_ns), None)
 
     # -- painting -----------------------------------------------------------------------------------------
 
@@ -237,7 +234,7 @@ class TimelineView(QAbstractScrollArea):
                 self._lanes_pixmap = self._render_lanes(geometry, self.scale)
             painter.drawPixmap(0, 0, self._lanes_pixmap)
             self._paint_current_bars(painter, geometry, self.scale)
-            self._paint_range(painter, geometry)
+            self._paint_range(painter, geometry, self.scale)
             self._paint_playhead(painter, geometry, self.scale)
         painter.end()
 
@@ -353,24 +350,25 @@ class TimelineView(QAbstractScrollArea):
                 paint_icon(painter, icon_rect, figure.icon, theme.colour(role))
 
     def _paint_current_bars(self, painter: QPainter, geometry: TimelineGeometry, scale: TimeScale) -> None:
-        plot, x_of = geometry.plot, geometry.x_mapper(scale)
         lanes, pinned = self._content.lanes, self._content.pinned
         places = [(lane, geometry.pinned_rect(index), 0.0) for index, lane in enumerate(pinned)]
         top = geometry.lanes_top
         places += [(lanes[index], geometry.lane_rect(index), top) for index in geometry.visible_lanes]
+        plot, x_of, at_ns = geometry.plot, geometry.x_mapper(scale), self.selection.position_ns
         for lane, rect, clip_top in places:
-            painter.save()
-            painter.setClipRect(QRectF(QPointF(0, clip_top), geometry.size))
-            box = QRectF(plot.left(), rect.top(), plot.width(), rect.height())
-            lane_painter = LanePainter(self._theme, painter, box, x_of)
-            lane_painter.paint_current_bars(lane.layers, self.selection.position_ns)
-            painter.restore()
+            bars = [mark for mark in lane.bars() if mark.start_ns <= at_ns < mark.end_ns]
+            if bars:
+                painter.save()
+                painter.setClipRect(QRectF(plot.left(), clip_top, plot.width(), geometry.size.height()))
+                box = QRectF(plot.left(), rect.top(), plot.width(), rect.height())
+                LanePainter(self._theme, painter, box, x_of).paint_current_bars(bars)
+                painter.restore()
 
-    def _paint_range(self, painter: QPainter, geometry: TimelineGeometry) -> None:
+    def _paint_range(self, painter: QPainter, geometry: TimelineGeometry, scale: TimeScale) -> None:
         if self.selection.range_ns is None:
             return
         plot, accent = geometry.plot, self._theme.colour("accent")
-        left, right = (self.x_of(each) for each in self.selection.range_ns)
+        left, right = map(geometry.x_mapper(scale), self.selection.range_ns)
         painter.save()
         painter.setClipRect(plot)
         tint = QColor(accent)
@@ -384,7 +382,7 @@ class TimelineView(QAbstractScrollArea):
 
     def _paint_playhead(self, painter: QPainter, geometry: TimelineGeometry, scale: TimeScale) -> None:
         plot, theme = geometry.plot, self._theme
-        x = self.x_of(self.selection.position_ns)
+        x = geometry.x_mapper(scale)(self.selection.position_ns)
         if not plot.left() - 1 <= x <= plot.right() + 1:
             return
         painter.fillRect(QRectF(x - 0.75, 0, 1.5, plot.height()), theme.colour("text"))

@@ -10,7 +10,7 @@ from functools import partial
 
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.replay import Replay
-from app.core.recording.replay.spans import RecordedSpan
+from app.core.recording.replay.spans import RecordedSpan, RecordedSpans
 from app.core.timeline.lanes import (
     BarLayer,
     CountLayer,
@@ -42,31 +42,54 @@ _ALARM_STATUS: Mapping[bool, Status] = {True: "error", False: "warn"}
 TOPIC_ICONS = {"image": "image", "json": "braces", "string": "type", "msgpack": "braces"}
 
 
-def replay_content(replay: Replay) -> TimelineContent:
-    """Return the lanes of an open recording. Lanes of runs and alarms exist if it contains any."""
-    densities = replay.densities
-    pinned = [_bookmark_lane(replay.bookmarks)]
-    alarms_by_topic: dict[str, list[Mark]] = {}
-    if densities is not None:
-        if runs := [_run_mark(span, replay.start_ns) for span in densities.spans.runs]:
-            pinned.append(TimelineLane(RUNS, _("Behaviours"), "blocks", (BarLayer(runs),)))
-        alarms = [_alarm_mark(span, replay.start_ns) for span in densities.spans.alarms]
-        if alarms:
-            pinned.append(TimelineLane(ALARMS, _("Alarms"), "bell", (SpanLayer(alarms),)))
-        for span, mark in zip(densities.spans.alarms, alarms, strict=True):
-            alarms_by_topic.setdefault(span.topic, []).append(mark)
-    lanes = [
-        TimelineLane(
-            topic,
-            topic,
-            TOPIC_ICONS.get(recorded.codec, "binary"),
-            _topic_layers(topic, densities, alarms_by_topic.get(topic, ())) if densities is not None else (),
-            _figures(replay, topic, recorded.message_count),
-            is_code=True,
+class ReplayLanes:
+    """Lanes of an open recording. Parts that don't change are made once.
+
+    Args:
+        replay: Open recording.
+    """
+
+    def __init__(self, replay: Replay) -> None:
+        self._replay = replay
+        self._figures = {
+            topic: _figures(replay, topic, recorded.message_count)
+            for topic, recorded in replay.recorded_topics.items()
+        }
+        self._spans: RecordedSpans | None = None
+        self._span_lanes: tuple[TimelineLane, ...] = ()
+        self._alarms_by_topic: dict[str, list[Mark]] = {}
+
+    def content(self) -> TimelineContent:
+        """Return the lanes. Lanes of runs and alarms exist if the recording contains any."""
+        replay, densities = self._replay, self._replay.densities
+        if densities is not None and densities.spans is not self._spans:
+            self._set_spans(densities.spans)
+        lanes = [
+            TimelineLane(
+                topic,
+                topic,
+                TOPIC_ICONS.get(recorded.codec, "binary"),
+                _topic_layers(topic, densities, self._alarms_by_topic.get(topic, ())) if densities else (),
+                self._figures[topic],
+                is_code=True,
+            )
+            for topic, recorded in replay.recorded_topics.items()
+        ]
+        pinned = (_bookmark_lane(replay.bookmarks), *self._span_lanes)
+        return TimelineContent(pinned, lanes, (_("Messages"), _("Lost")))
+
+    def _set_spans(self, spans: RecordedSpans) -> None:
+        self._spans, start_ns = spans, self._replay.start_ns
+        runs = [_run_mark(span, start_ns) for span in spans.runs]
+        alarms = [_alarm_mark(span, start_ns) for span in spans.alarms]
+        lanes = (
+            TimelineLane(RUNS, _("Behaviours"), "blocks", (BarLayer(runs),)),
+            TimelineLane(ALARMS, _("Alarms"), "bell", (SpanLayer(alarms),)),
         )
-        for topic, recorded in replay.recorded_topics.items()
-    ]
-    return TimelineContent(pinned, lanes, (_("Messages"), _("Lost")))
+        self._span_lanes = tuple(lane for lane, marks in zip(lanes, (runs, alarms), strict=True) if marks)
+        self._alarms_by_topic = {}
+        for span, mark in zip(spans.alarms, alarms, strict=True):
+            self._alarms_by_topic.setdefault(span.topic, []).append(mark)
 
 
 def _bookmark_lane(bookmarks: Sequence[Bookmark]) -> TimelineLane:

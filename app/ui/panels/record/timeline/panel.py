@@ -16,7 +16,7 @@ from app.core.timeline.lanes import Mark
 from app.core.timeline.selection import TimelineSelection
 from app.ui.panels.act.armed_strip import ArmDurationMenu
 from app.ui.panels.base import PanelContext, PanelWidget
-from app.ui.panels.record.timeline.lanes import BOOKMARKS, replay_content
+from app.ui.panels.record.timeline.lanes import BOOKMARKS, ReplayLanes
 from app.ui.panels.record.timeline.sending import ReplayStrip, SendChooser
 from app.ui.panels.record.timeline.transport import TransportRow
 from app.ui.panels.row_actions import RowAction, fill_menu
@@ -40,6 +40,7 @@ class TimelinePanel(PanelWidget):
         super().__init__(context, _("Timeline"))
         theme = self.theme
         self._shown_replay: Replay | None = None
+        self._lanes: ReplayLanes | None = None
         self._state: tuple[object, ...] = ()
         self.transport, self.canvas = TransportRow(theme), TimelineView(theme, _("Timeline"))
         self.ruler = Segments(
@@ -97,14 +98,15 @@ class TimelinePanel(PanelWidget):
             self._shown_replay, self._state = replay, ()
             self.set_title(_("Timeline"), replay.name)
             self.chip.set(pgettext("message", "recorded"), "info", "")
+            self._lanes = ReplayLanes(replay)
             self.canvas.show_range(replay.start_ns, replay.end_ns)
             self.pages.setCurrentIndex(1)
             self.ruler.setVisible(True)
         is_new = replay.densities is not None and replay.densities.collect_results()
         state = (tuple(replay.bookmarks),)
-        if is_new or state != self._state:
+        if self._lanes is not None and (is_new or state != self._state):
             self._state = state
-            self.canvas.set_content(replay_content(replay))
+            self.canvas.set_content(self._lanes.content())
         self.transport.show_replay(replay, player)
         self.strip.refresh()
         self.transport.set_armed(is_armed=self.strip.isVisibleTo(self))
