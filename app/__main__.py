@@ -139,11 +139,13 @@ def _main(arguments: Sequence[str]) -> int:
         return run_child_module("app.blocks.runtime.child", arguments[1:])
     if arguments[:1] == ["--module"] and len(arguments) > 1:
         return run_child_module(arguments[1], arguments[2:])
-    from app.core.storage.settings import saved_language  # noqa: PLC0415  not needed by child processes of a frozen build
+    # not needed by child processes of a frozen build
+    from app.core.storage.settings import Settings  # noqa: PLC0415
+    from app.core.storage.settings_file import read_setting  # noqa: PLC0415
 
     # a self-test leaves the user's settings unchanged
     is_self_test = any(argument.startswith("--selft") for argument in arguments)
-    set_initial_language("" if is_self_test else saved_language())
+    set_initial_language("" if is_self_test else read_setting(Settings.language))
     if arguments[:1] == ["run"]:
         return run_behaviour(arguments[1:])
     parser = window_parser()

@@ -29,7 +29,8 @@ from app.core.reports.not_installed import alert_missing, missing_libraries
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
-from app.core.storage.settings import home
+from app.core.storage.folders import home
+from app.core.storage.settings import Settings
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
@@ -41,7 +42,7 @@ from app.ui.startup.deferred import DeferredSteps
 from app.ui.startup.file_open import Application, FileDropFilter
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
-from app.ui.theme.theme import MODES, Theme
+from app.ui.theme.theme import Theme
 from nep.i18n import ENGLISH, _, format_list, language
 from nep.system.lazy_import import lazy_module
 
@@ -53,7 +54,6 @@ else:
 LOG_INTERVAL_MS = 500
 RESTART_EXIT_CODE = -1
 """Result of `run` when the user requested a restart."""
-FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW_MODULE = "app.ui.blockly.view"
 PRELOADED_MODULES = (
     "app.blocks.compiler.compiler",
@@ -173,11 +173,10 @@ def import_web_view(alerts: Alerts) -> None:
 def make_window(session: Session, options: Options) -> MainWindow:
     """Create the window and restore its last state. Called before the event loop runs."""
     theme = Theme("light")
+    if options.theme is not None:
+        session.settings.override(Settings.theme, Settings.theme.parse(options.theme))
     # must come first: before the event loop runs, Qt doesn't notify widgets of a changed font
     WindowState(session.settings, _log.warning).apply_theme(theme)
-    theme_mode = next((mode for mode in MODES if mode == options.theme), None)
-    if theme_mode is not None:
-        theme.set_mode(theme_mode)
     window = MainWindow(session, theme, PanelRegistry(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
     if not window.state.restore_geometry(window):
@@ -222,9 +221,9 @@ def save_version(window: MainWindow, now_s: float) -> None:
         now_s: Current Unix time in s.
     """
     settings = window.session.settings
-    versions = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
+    versions = studio_versions.add_this_version(settings.studio_versions, now_s, is_first=settings.are_new)
     if versions is not None:
-        window.state.save(studio_versions.SETTING_KEY, versions)
+        window.state.save(Settings.studio_versions, versions)
 
 
 def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
@@ -290,7 +289,7 @@ def offer_first_steps(window: MainWindow, *, has_request: bool) -> None:
     """
     if not window.session.settings.are_new:
         return
-    window.state.save(FIRST_START_KEY, True)
+    window.state.save(Settings.is_started_before, True)
     if (
         not has_request
         and not window.banner.has_offer

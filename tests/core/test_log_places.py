@@ -12,7 +12,7 @@ from platformdirs.unix import Unix
 from platformdirs.windows import Windows
 
 from app.core.faults import log_folder
-from app.core.storage.settings import data_home, home, state_home
+from app.core.storage.folders import data_home, home, state_home
 
 VARIABLES = ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME", "NEP_STUDIO_HOME")
 

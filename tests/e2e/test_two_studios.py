@@ -66,7 +66,7 @@ def test_two_studios_share_a_robot_and_the_second_survives_the_first(
     assert second.process.wait(10) == 0
     until(lambda: not second.children("nep", "master"), "the master ends with the last Studio", 20)
     homes = [first.home, second.home if same_home else tmp_path / "other"]
-    assert Settings(homes[1]).get("theme", "") == "dark"
+    assert Settings(homes[1]).theme == "dark"
     for home in homes:
         assert isinstance(json.loads((home / "settings.json").read_text()), dict)
         assert not (home / "settings.damaged.json").exists()

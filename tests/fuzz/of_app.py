@@ -113,10 +113,10 @@ if IS_THERE:  # optional: not dependencies of the library
             path = Path(folder) / "settings.json"
             path.write_bytes(data)
             settings = Settings(Path(folder))
-            assert isinstance(settings.get("theme", ""), str)
+            assert isinstance(settings.theme, str)
             assert all(isinstance(each.opened_s, float) for each in settings.all_recent_files)
-            settings.set("theme", "light")
-            assert Settings(Path(folder)).get("theme", "") == "light"
+            settings.theme = "light"
+            assert Settings(Path(folder)).theme == "light"
 
     NEIGHBOUR = {
         "robot": "a",

@@ -2,36 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from pathlib import Path
 
-import platformdirs
-
 from app.core.messages.picture import encode_png
-from app.core.storage.settings import Settings, home
+from app.core.storage.folders import default_pictures_folder
 from nep.i18n import _
 from nep.messages.message import Message
-
-FOLDER_NAME = "NEP Studio"
-
-
-FOLDER_SETTING = "pictures_folder"
-
-
-def folder(settings: Settings | None = None) -> Path:
-    """Return the folder for snapshots.
-
-    This is the folder chosen in the settings. The default is ``NEP Studio`` in the system's picture
-    folder, or ``Pictures`` in ``$NEP_STUDIO_HOME`` if that is set.
-    """
-    configured = settings.get(FOLDER_SETTING, "") if settings is not None else ""
-    if configured:
-        return Path(configured)
-    if os.environ.get("NEP_STUDIO_HOME"):
-        return home() / "Pictures"
-    return platformdirs.user_pictures_path() / FOLDER_NAME
 
 
 def save(message: Message, target_folder: Path | None = None) -> Path:
@@ -42,10 +20,10 @@ def save(message: Message, target_folder: Path | None = None) -> Path:
 
     Args:
         message: Message with an image.
-        target_folder: Folder; default: `folder`.
+        target_folder: Folder; default: `default_pictures_folder`.
     """
     data = encode_png(message)
-    folder_path = target_folder if target_folder is not None else folder()
+    folder_path = target_folder if target_folder is not None else default_pictures_folder()
     folder_path.mkdir(parents=True, exist_ok=True)
     stem = file_stem(message)
     for number in range(1, 1000):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import AllowOtherComputers
-from app.core.storage.settings import ListSettings
+from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from nep.errors import NepError
 from nep.i18n import _
@@ -16,7 +16,6 @@ from nep.masters.process import listen
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 
-SETTING_KEY = "listen_at"
 ALERT, NOT_SAVED_ALERT = "reach", "reach:kept"
 
 
@@ -42,7 +41,7 @@ class RemoteAccess:
     def __init__(
         self,
         address: str,
-        settings: ListSettings,
+        settings: Settings,
         alerts: Alerts,
         post_event: Callable[[object], None],
         *,
@@ -92,7 +91,7 @@ class RemoteAccess:
         """
         self._request(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
-            self._settings.set(SETTING_KEY, list(hosts))
+            self._settings.listen_hosts = tuple(hosts)
         except SettingsError as error:
             template = (
                 _(
@@ -126,8 +125,7 @@ class RemoteAccess:
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
-            hosts: list[object] = self._settings.get(SETTING_KEY, [])
-            saved_hosts = tuple(map(str, hosts))
+            saved_hosts = self._settings.listen_hosts
             if saved_hosts and self.is_local and set(saved_hosts) - set(self.hosts):
                 self._request(saved_hosts)
 

@@ -19,8 +19,6 @@ from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _
 
-SETTING_KEY = "networks"
-"""Name of the setting that stores the address of each shown network."""
 COUNT_INTERVAL_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
@@ -218,7 +216,7 @@ class Networks(NetworkList):
 
     def start(self) -> None:
         """Join the saved networks; invalid saved addresses are skipped."""
-        for name, address in self._saved_addresses().items():
+        for name, address in self._settings.networks.items():
             network = self._networks.get(name)
             if network is not None and isinstance(address, str):
                 try:
@@ -238,18 +236,13 @@ class Networks(NetworkList):
         if not network.is_selected or valid_address != network.address:
             self._stop(network)
             self._start(network, valid_address)
-        self._save({**self._saved_addresses(), name: valid_address})
+        self._settings.networks = {**self._settings.networks, name: valid_address}
 
     def deselect(self, name: str) -> None:
         """Stop showing a network. Raises `SettingsError` if the choice can't be saved."""
         self._stop(self._networks[name])
-        self._save({kind: address for kind, address in self._saved_addresses().items() if kind != name})
-
-    def _saved_addresses(self) -> dict[str, object]:
-        return self._settings.get(SETTING_KEY, {})
-
-    def _save(self, selected: dict[str, object]) -> None:
-        self._settings.set(SETTING_KEY, selected)
+        addresses = self._settings.networks
+        self._settings.networks = {kind: address for kind, address in addresses.items() if kind != name}
 
     def _start(self, network: OtherNetwork, address: str) -> None:
         number, kind = next(self._numbers), network.kind

@@ -18,7 +18,7 @@ from uuid import uuid4
 from app.blocks.model import deep_json
 from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
 from app.core.storage.file_lock import locked
-from app.core.storage.settings import home
+from app.core.storage.folders import home
 from app.errors import BackpackError
 from nep.i18n import _, lazy, ngettext, number
 from nep.system.replace_file import replace_file

@@ -27,7 +27,7 @@ from app.core.projects.file_format import (
     parse_project,
 )
 from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
-from app.core.storage.settings import home
+from app.core.storage.folders import home
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from app.core.projects.open_project import OpenProject, SaveResult
 from app.core.projects.open_projects import OpenProjects
 from app.core.projects.saved_tabs import SavedTabs
 from app.core.projects.versions import SavedVersion, Stamp, free_path, stamp_of
-from app.core.storage.settings import Settings, closed_tabs_folder
+from app.core.storage.folders import closed_tabs_folder
+from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from nep.i18n import _
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import OpenProject
 from app.core.projects.open_projects import OpenProjects
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-
-SETTING_KEY = "tabs"
 
 
 class SavedTabs:
@@ -23,7 +21,7 @@ class SavedTabs:
         self._settings, self._documents, self._report_error = settings, documents, report_error
         self.is_active = False
         """True if the tabs of this window are saved; False in a second window."""
-        self._last_session: dict[str, object] = {}
+        self._last_session: Mapping[str, object] = {}
         self._saved_revision = -1
 
     def restore(self, unsaved_work: Sequence[UnsavedWork]) -> list[UnsavedWork]:
@@ -36,8 +34,7 @@ class SavedTabs:
             Unsaved work that was not restored, because the user must be asked first.
         """
         self.is_active = True
-        tabs_state: dict[str, object] = self._settings.get(SETTING_KEY, {})
-        self._last_session = tabs_state
+        tabs_state = self._last_session = self._settings.tabs
         restored = self._documents.restore_tabs(
             tabs_state, unsaved_work, has_ended_normally=tabs_state.get("ended_well") is True
         )
@@ -79,8 +76,6 @@ class SavedTabs:
             return
         self._saved_revision = self._documents.revision
         try:
-            self._settings.set(
-                SETTING_KEY, {**self._documents.tabs_state(), "ended_well": has_ended_normally}
-            )
+            self._settings.tabs = {**self._documents.tabs_state(), "ended_well": has_ended_normally}
         except SettingsError as error:
             self._report_error(str(error))

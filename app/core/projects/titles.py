@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from app.core.storage.settings import RecentFile, closed_tabs_folder
+from app.core.storage.folders import closed_tabs_folder
+from app.core.storage.settings import RecentFile
 from nep.i18n import _
 
 

@@ -23,7 +23,7 @@ from app.core.storage.atomic_file import (
     read_regular_file,
     write_atomically,
 )
-from app.core.storage.settings import data_home, home
+from app.core.storage.folders import data_home, home
 from app.errors import DocumentError
 from nep.i18n import _
 from nep.system.replace_file import replace_file

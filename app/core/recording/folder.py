@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
-import platformdirs
-
 from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.storage.background_worker import BackgroundWorker
@@ -80,16 +78,6 @@ class FolderScan:
     problem: str = ""
     omitted_count: int = 0
     is_complete: bool = True
-
-
-def default_folder() -> Path:
-    """Return the default folder of recordings.
-
-    This is ``Recordings`` (translated) in the documents folder of the user, or in ``$NEP_STUDIO_HOME``
-    if that is set.
-    """
-    home = os.environ.get("NEP_STUDIO_HOME")
-    return Path(home or platformdirs.user_documents_dir()) / _("Recordings")
 
 
 def new_path(folder: Path, now: datetime, prefix: str = "recording") -> Path:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import ChooseRecordingsFolder
@@ -31,7 +31,9 @@ from app.core.recording.topic_choice import (
     parse_ring_settings,
     ring_settings_to_json,
 )
-from app.core.storage.settings import Settings, data_home
+from app.core.storage.folders import data_home
+from app.core.storage.setting import Setting
+from app.core.storage.settings import Settings
 from app.core.world.part import SessionPart
 from app.errors import SettingsError
 from nep.i18n import _, lazy
@@ -47,7 +49,8 @@ else:  # they import the reading of recordings, which no start should wait for
     folders = lazy_module("app.core.recording.folder")
     openers = lazy_module("app.core.recording.opener")
 
-FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
+T = TypeVar("T")
+
 NO_FOLDER_ALERT = "recorder:folder"
 _GB = 1_000_000_000
 _SAVED_FILE_PATTERN = re.compile(r"[\w.-]+\.mcap\b")
@@ -83,8 +86,8 @@ class SessionRecordings(SessionPart):
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
         self.events = RecordedEvents(self.client.add_event)
-        self.choice = parse_choice(settings.get(CHOICE_KEY, {}))
-        self.ring_settings = parse_ring_settings(settings.get(RING_KEY, {}))
+        self.choice = parse_choice(settings.recording)
+        self.ring_settings = parse_ring_settings(settings.flight_recorder)
         self.on_created: Callable[[Path, str], object] = _ignore_created
         self.active_choice = self.choice
         """Selection of the recording in progress."""
@@ -96,12 +99,11 @@ class SessionRecordings(SessionPart):
     @property
     def folder(self) -> Path:
         """Folder of recordings."""
-        configured = self._settings.get(FOLDER_KEY, "")
-        return Path(configured) if configured else folders.default_folder()
+        return self._settings.recordings_folder
 
     def set_folder(self, folder: Path) -> None:
         """Set and save the folder of recordings."""
-        self._save_setting(FOLDER_KEY, str(folder))
+        self._save_setting(Settings.recordings_folder, folder)
         self._alerts.resolve(NO_FOLDER_ALERT)
 
     def _prepare_folder(self) -> Path | None:
@@ -110,7 +112,7 @@ class SessionRecordings(SessionPart):
         folder = self.folder
         problem = ""
         try:
-            if not self._settings.get(FOLDER_KEY, ""):
+            if not self._settings.is_stored(Settings.recordings_folder):
                 folder.mkdir(parents=True, exist_ok=True)
             if not folder.is_dir():
                 problem = _("{folder} doesn't exist.").format(folder=folder)
@@ -149,7 +151,7 @@ class SessionRecordings(SessionPart):
     def set_choice(self, choice: RecordingChoice) -> None:
         """Set and save the topic selection for the next recordings."""
         self.choice = choice
-        self._save_setting(CHOICE_KEY, choice_to_json(choice))
+        self._save_setting(Settings.recording, choice_to_json(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
         """Start a recording; return the reason if it can't start, else "".
@@ -201,7 +203,7 @@ class SessionRecordings(SessionPart):
         content.
         """
         self.ring_settings = ring_settings
-        self._save_setting(RING_KEY, ring_settings_to_json(ring_settings))
+        self._save_setting(Settings.flight_recorder, ring_settings_to_json(ring_settings))
         self._apply_ring_settings()
 
     def _apply_ring_settings(self) -> None:
@@ -302,9 +304,9 @@ class SessionRecordings(SessionPart):
         """Close the recorder. Its process finishes a recording in progress, even after Studio has exited."""
         self.client.close()
 
-    def _save_setting(self, key: str, value: object) -> None:
+    def _save_setting(self, setting: Setting[T], value: T) -> None:
         with suppress(SettingsError):  # an alert reports that settings can't be saved
-            self._settings.set(key, value)
+            self._settings.set_value(setting, value)
 
 
 def saved_file_name(text: str) -> str:

@@ -8,14 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import quote
 
-PUBLIC_SETTINGS = frozenset({
-    "begun", "first_steps", "format", "high_contrast", "language", "layout", "less_motion", "robots_heard",
-    "shortcuts", "text_percent", "theme", "toolbox_pinned", "virtual_robots_come_back", "window",
-})  # fmt: skip
-"""Names of settings whose values are included in a report.
+from app.core.storage.settings import Settings
 
-For all other settings, only the name is included. Future settings, such as network keys and access
-codes, thus stay private until they are added here.
+PUBLIC_SETTINGS = frozenset({"format", *(each.key for each in Settings.described() if each.is_public)})
+"""Keys of settings whose values are included in a report.
+
+For all other settings, only the key is included. Future settings, such as network keys and access
+codes, thus stay private unless their description says otherwise.
 """
 OMITTED_TEXT = "(left out)"
 _PATH_END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""

@@ -28,6 +28,7 @@ from app.core.reports.crash_reports import CrashReports, read_reports
 from app.core.reports.privacy import reportable_settings, without_home
 from app.core.reports.studio_versions import format_versions
 from app.core.storage.atomic_file import read_regular_file, write_atomically
+from app.core.storage.settings import Settings
 from app.errors import ReportError
 from nep.i18n import _, format_list, language, ngettext, number
 from nep.system.lazy_import import lazy_module
@@ -75,7 +76,7 @@ class ReportParts:
 
     Attributes:
         info: Information that only the window has, such as the version of Qt and the screen.
-        settings: Current settings.
+        settings: Values in the file of the settings, by key.
         doctor: Returns the findings of the connection doctor; may take some seconds.
         log: Folder of the log files.
         crashes: Stored crash reports.
@@ -219,7 +220,7 @@ def _encode_work(documents: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
 
 
 def _format_versions(parts: ReportParts) -> str:
-    versions = ("versions used here", format_versions(parts.settings))
+    versions = ("versions used here", format_versions(Settings.studio_versions.value_in(parts.settings)))
     lines = [f"{name}: {value}" for name, value in (*_system_info(), versions, *parts.info)]
     return "\n".join([*lines, "", "packages:", *_list_packages()]) + "\n"
 

@@ -25,7 +25,7 @@ from app.core.reports.crash_reports import CrashReports
 from app.core.reports.studio_versions import parse_version
 from app.core.storage.atomic_file import create_private_folder, read_regular_file, write_atomically
 from app.core.storage.file_lock import FileLock
-from app.core.storage.settings import state_home
+from app.core.storage.folders import state_home
 from nep.system.lazy_import import lazy_module
 from nep.version import __version__
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from nep.version import __version__
 
-SETTING_KEY = "studio_versions"
-"""Name of the setting that stores the versions and the times of their first start, newest last."""
 MAX_VERSIONS = 10
 VERSION_PATTERN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
 """Pattern of a valid version; anything else in a file is ignored."""
@@ -21,7 +19,8 @@ _MAX_TIME_S = 1e10
 A damaged file may contain a time that the calendar doesn't support.
 """
 
-VersionEntries = list[dict[str, object]]
+VersionEntries = Sequence[Mapping[str, object]]
+"""Versions and the times of their first start, newest last, as stored in the settings."""
 
 
 def parse_version(value: object) -> str:
@@ -29,16 +28,10 @@ def parse_version(value: object) -> str:
     return value if isinstance(value, str) and VERSION_PATTERN.fullmatch(value) else ""
 
 
-def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
-    """Return the valid versions in the settings and the times of their first start, newest last.
-
-    Times are in seconds since 1970.
-    """
-    entries = values.get(SETTING_KEY)
+def known_versions(entries: VersionEntries) -> list[tuple[str, float]]:
+    """Return the valid versions and the times of their first start in seconds since 1970, newest last."""
     versions = []
-    for entry in entries if isinstance(entries, list) else ():
-        if not isinstance(entry, Mapping):
-            continue
+    for entry in entries:
         version, since_s = parse_version(entry.get("version")), entry.get("since_s")
         if (
             isinstance(since_s, int | float)
@@ -51,17 +44,17 @@ def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
 
 
 def add_this_version(
-    values: Mapping[str, object], now_s: float, *, is_first: bool, version: str = __version__
+    entries: VersionEntries, now_s: float, *, is_first: bool, version: str = __version__
 ) -> VersionEntries | None:
     """Return the updated setting that includes this version; None if this version is already the newest.
 
     Args:
-        values: Current settings.
+        entries: Current setting.
         now_s: Current time in seconds since 1970.
         is_first: True if Studio was never started on this computer before.
         version: Version to add.
     """
-    earlier_versions = known_versions(values) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
+    earlier_versions = known_versions(entries) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
     if earlier_versions and earlier_versions[-1][0] == version:
         return None
     return [
@@ -70,10 +63,10 @@ def add_this_version(
     ]
 
 
-def format_versions(values: Mapping[str, object]) -> str:
+def format_versions(entries: VersionEntries) -> str:
     """Format the versions for developers, such as "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
     versions = [
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
-        for version, since_s in known_versions(values)
+        for version, since_s in known_versions(entries)
     ]
     return ", ".join(versions) or "unknown"

@@ -44,8 +44,6 @@ from nep.i18n import _
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.graph_view import GraphView
 
-RESET_SETTING = "runs_begin_at_start"
-
 
 class Fleet:
     """All robots, in order of discovery. Not thread-safe; use it from the main thread."""
@@ -222,7 +220,7 @@ class Fleet:
     @property
     def resets_at_start(self) -> bool:
         """True if virtual robots move to their start position when a behaviour starts."""
-        return self._settings is None or self._settings.get(RESET_SETTING, True)
+        return self._settings is None or self._settings.resets_robots
 
     def set_resets_at_start(self, *, is_enabled: bool) -> None:
         """Set and save `resets_at_start`; without settings, do nothing.
@@ -230,7 +228,7 @@ class Fleet:
         Raises SettingsError if the settings can't be written.
         """
         if self._settings is not None:
-            self._settings.set(RESET_SETTING, is_enabled)
+            self._settings.resets_robots = is_enabled
 
     def return_to_start(self, names: Iterable[str]) -> None:
         """If `resets_at_start` is set, move the virtual robots among ``names`` to their start position."""

@@ -7,14 +7,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.storage.settings import ListSettings
+from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from app.robots.description.description import Robot
 
-SETTING_KEY = "robots.known"
 MAX_ROBOTS = 24
-
-Entry = Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +32,13 @@ class KnownRobots:
     Virtual robots are not stored, because the user can start them at any time.
     """
 
-    def __init__(self, settings: ListSettings | None = None, clock: Callable[[], float] = time.time) -> None:
+    def __init__(self, settings: Settings | None = None, clock: Callable[[], float] = time.time) -> None:
         self._settings, self._clock = settings, clock
 
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
         """All known robots, most recently connected first; invalid entries are skipped."""
-        entries: list[Entry] = self._settings.get(SETTING_KEY, []) if self._settings is not None else []
+        entries = self._settings.known_robots if self._settings is not None else ()
         robots_by_name = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
         return tuple(sorted(robots_by_name.values(), key=lambda robot: -robot.last_connected_s))
 
@@ -64,12 +61,10 @@ class KnownRobots:
         # At most an entry of this list is lost. Problems with the file are reported when other settings are
         # saved.
         with contextlib.suppress(SettingsError):
-            self._settings.set(SETTING_KEY, entries)
+            self._settings.known_robots = entries
 
 
-def _parse_robot(entry: object) -> KnownRobot | None:
-    if not isinstance(entry, Mapping):
-        return None
+def _parse_robot(entry: Mapping[str, object]) -> KnownRobot | None:
     name, last_seen_s = entry.get("name"), entry.get("seen_s")
     if (
         not isinstance(name, str)

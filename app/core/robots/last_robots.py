@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from typing import Protocol
 
@@ -10,7 +9,6 @@ from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 
-ROBOTS_SETTING, RESTART_SETTING = "virtual_robots", "virtual_robots_come_back"
 MAX_ROBOTS = 8
 
 
@@ -30,24 +28,14 @@ class LastRobots:
         self._settings = settings
         self._saved_models: dict[str, str] = {}
 
-    @property
-    def is_restart_enabled(self) -> bool:
-        """True if running virtual robots are started again at the next start of Studio."""
-        return self._settings.get(RESTART_SETTING, True)
-
-    def set_restart_enabled(self, is_enabled: bool) -> None:
-        """Set and save `is_restart_enabled`. Raises SettingsError if the settings can't be written."""
-        self._settings.set(RESTART_SETTING, is_enabled)
-
     def start(self, launcher: RobotStarter) -> None:
-        """Start the robots of the last session if `is_restart_enabled` is set.
+        """Start the robots of the last session if the setting `restarts_robots` is on.
 
         At most `MAX_ROBOTS` robots are started. Returns immediately; starting a robot does not move it.
         """
-        if not self.is_restart_enabled:
+        if not self._settings.restarts_robots:
             return
-        models_by_name: Mapping[str, object] = self._settings.get(ROBOTS_SETTING, {})
-        for name, model in list(models_by_name.items())[:MAX_ROBOTS]:
+        for name, model in list(self._settings.virtual_robots.items())[:MAX_ROBOTS]:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOT_MODULES:
                 launcher.start_virtual_robot(name, model)
 
@@ -60,4 +48,4 @@ class LastRobots:
         if launcher.models_by_name != self._saved_models:
             self._saved_models = dict(launcher.models_by_name)
             with suppress(SettingsError):
-                self._settings.set(ROBOTS_SETTING, dict(self._saved_models))
+                self._settings.virtual_robots = dict(self._saved_models)

@@ -19,7 +19,6 @@ from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import GraphView
 
-SETTING_KEY = "room"
 SAVE_DELAY_S = 1.0
 """Time in seconds without changes after which the room is saved."""
 SHARING_FAILED_MESSAGE = lazy("can't share the room of the virtual robots: {error}")
@@ -41,7 +40,7 @@ class SessionRoom:
     ) -> None:
         self._settings, self._watches, self._submit, self._clock = settings, watches, submit, clock
         self._map = RoomMap(clock_ns=clock_ns)
-        self._map.merge(settings.get(SETTING_KEY, {}))
+        self._map.merge(settings.room)
         self._watch: Watch | None = None
         self._publisher: Publisher | None = None
         self._is_opening = False
@@ -144,7 +143,7 @@ class SessionRoom:
         if self._map.revision != self._saved_revision:
             self._saved_revision = self._map.revision
             with suppress(SettingsError):
-                self._settings.set(SETTING_KEY, self._map.message())
+                self._settings.room = self._map.message()
 
     def close(self) -> None:
         """Save the room and close the publisher."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
+from app.core.storage.settings import Settings
 from app.core.world.part import SessionPart
 from nep.i18n import _, lazy
 
@@ -15,10 +16,7 @@ if TYPE_CHECKING:
     from app.core.network.watches import Watch
     from app.core.robots.fleet import Fleet
     from app.core.robots.robot_link import RobotLink
-    from app.core.storage.settings import Settings
 
-SOUND_SETTING = "robots_heard"
-"""Name of the setting that is True if robots are audible."""
 FINISHED_RATIO = 0.9
 """Progress (0 to 1) of a text above which a robot's speech counts as finished.
 
@@ -151,22 +149,16 @@ class RobotVoices(SessionPart):
         self._voice_deadline_s = 0.0
         self._playing_robot = ""
         self._known_stop_count = fleet.stop_count
+        settings.on_change(Settings.is_robot_sound_on, self._on_sound_changed)
 
     @property
     def is_on(self) -> bool:
         """True if robots are audible."""
-        return bool(self._settings.get(SOUND_SETTING, True))
+        return self._settings.is_robot_sound_on
 
-    def set_on(self, *, on: bool) -> None:
-        """Make robots audible or silent, and save the choice.
-
-        Raises SettingsError if the choice can't be saved; it applies to this session nevertheless.
-        """
-        try:
-            self._settings.set(SOUND_SETTING, on)
-        finally:
-            if not on:
-                self.silence()
+    def _on_sound_changed(self, is_on: bool) -> None:
+        if not is_on:
+            self.silence()
 
     @property
     def problem(self) -> str:

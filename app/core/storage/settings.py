@@ -1,97 +1,50 @@
-"""User settings, stored in one JSON file in the configuration folder."""
+"""All settings of Studio, with their recent files.
+
+A new setting is one attribute of `Settings`. From its description follow the typed access
+(``settings.text_percent``), the validation of the file, the row in the settings sheet (`SheetRow`), and
+whether problem reports include the value.
+"""
 
 from __future__ import annotations
 
-import json
-import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Literal
 
-import platformdirs
+from app.core.storage.folders import closed_tabs_folder, default_pictures_folder, default_recordings_folder
+from app.core.storage.setting import (
+    ChoiceOption,
+    ChoiceSetting,
+    EntriesSetting,
+    FlagSetting,
+    FolderSetting,
+    LanguageSetting,
+    MappingSetting,
+    NumberSetting,
+    OptionalFlagSetting,
+    SheetRow,
+    TextSetting,
+    TextsSetting,
+)
+from app.core.storage.settings_file import SettingsFile
+from nep.i18n import lazy, plazy
 
-from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
-from app.core.storage.file_lock import locked
-from app.errors import SettingsError
-from nep.i18n import _
-from nep.system.replace_file import replace_file
-
-FORMAT_VERSION = 1
-"""Format version, increased when older versions of Studio can't read newer settings.
-
-New keys need no new version. The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are
-part of the format.
-"""
-_OWN_FILE_NAME = f"settings.format-{FORMAT_VERSION}.json"
 MAX_RECENT_FILES = 12
 _MAX_TIME_S = 1e12
 """Latest valid time in seconds since 1970.
 
 A damaged file may contain a time that the calendar doesn't support.
 """
-T = TypeVar("T")
 
-
-def home() -> Path:
-    """Return Studio's folder: ``$NEP_STUDIO_HOME``, else the system's configuration folder."""
-    configured = os.environ.get("NEP_STUDIO_HOME")
-    return (
-        Path(configured) if configured else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
-    )
-
-
-def _is_file(path: Path) -> bool:
-    # False for names that no file can have.
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def data_home() -> Path:
-    """Return the folder for large data: ``$NEP_STUDIO_HOME``, else the system's data folder."""
-    configured = os.environ.get("NEP_STUDIO_HOME")
-    return Path(configured) if configured else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
-
-
-def state_home() -> Path:
-    """Return the folder for runtime state: ``$NEP_STUDIO_HOME``, else the system's state folder."""
-    configured = os.environ.get("NEP_STUDIO_HOME")
-    return (
-        Path(configured) if configured else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
-    )
-
-
-def closed_tabs_folder() -> Path:
-    """Return the folder for behaviours whose tabs were closed before they were saved to a file."""
-    return home() / "kept"
-
-
-def saved_language(folder: Path | None = None) -> str:
-    """Return the language chosen in the settings, or "". Usable before translations are loaded.
-
-    No file is created or moved.
-
-    Args:
-        folder: Folder of the settings; default: `home`.
-    """
-    settings_folder = folder if folder is not None else home()
-    values = _read_values(settings_folder / "settings.json")
-    if _format_version(values) > FORMAT_VERSION:
-        values = _read_values(settings_folder / _OWN_FILE_NAME) or values
-    language = values.get("language")
-    return language if isinstance(language, str) else ""
-
-
-def _read_values(path: Path) -> dict[str, object]:
-    # Empty if the file can't be read.
-    try:
-        values = json.loads(read_regular_file(path))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return values if isinstance(values, dict) else {}
+Mode = Literal["light", "dark", "system"]
+Preference = Literal["system", "on", "off"]
+_PREFERENCES: tuple[ChoiceOption[Preference], ...] = (
+    ChoiceOption("system", lazy("Match system")),
+    ChoiceOption("on", lazy("On")),
+    ChoiceOption("off", lazy("Off")),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,74 +64,81 @@ class RecentFile:
     exists: bool = True
 
 
-class ListSettings(Protocol):
-    """Part of the interface of `Settings` for storing lists."""
+class Settings(SettingsFile):
+    """Settings of Studio. The settings sheet shows those that have a row, in this order.
 
-    def get(self, key: str, default: list[T]) -> list[T]:
-        """Return a stored list, or ``default`` if there is none."""
-
-    def set(self, key: str, value: object) -> None:
-        """Store a list."""
-
-
-class Settings:
-    """User settings, by key. A damaged file is renamed to ``settings.damaged.json``.
-
-    A file of a newer Studio in an unknown format is not changed: its readable values are used, and
-    changes are stored in ``settings.format-1.json`` next to it.
+    See `SettingsFile` for reading, writing, and notifications of changes.
     """
+
+    language = LanguageSetting("language", row=SheetRow(lazy("Language")), is_public=True)
+    theme = ChoiceSetting[Mode](
+        "theme",
+        "system",
+        (
+            ChoiceOption("light", lazy("Light"), "sun"),
+            ChoiceOption("dark", lazy("Dark"), "moon"),
+            ChoiceOption("system", lazy("Match system"), "monitor"),
+        ),
+        row=SheetRow(plazy("colours of the window", "Appearance")),
+        is_public=True,
+    )
+    text_percent = NumberSetting(
+        "text_percent", 100, 100, 200, "%", (100, 125, 150, 175, 200),
+        row=SheetRow(lazy("Text size")), is_public=True,
+    )  # fmt: skip
+    contrast = ChoiceSetting[Preference](
+        "high_contrast", "system", _PREFERENCES,
+        row=SheetRow(lazy("High contrast")), is_public=True, flag=("system", "on"),
+    )  # fmt: skip
+    motion = ChoiceSetting[Preference](
+        "less_motion", "system", _PREFERENCES,
+        row=SheetRow(lazy("Reduce motion")), is_public=True, flag=("system", "on"),
+    )  # fmt: skip
+    restarts_robots = FlagSetting(
+        "virtual_robots_come_back", True,
+        row=SheetRow(lazy("Virtual robots"), lazy("Reopen at startup")), is_public=True,
+    )  # fmt: skip
+    is_robot_sound_on = FlagSetting("robots_heard", True, row=SheetRow(lazy("Robot voice")), is_public=True)
+    shortcuts = MappingSetting(
+        "shortcuts", row=SheetRow(lazy("Keyboard"), lazy("Change shortcuts"), "keyboard"), is_public=True
+    )
+    pictures_folder = FolderSetting("pictures_folder", default_pictures_folder, row=SheetRow(lazy("Images")))
+
+    # -- choices made elsewhere in the window ----------------------------------------------------------
+
+    resets_robots = FlagSetting("runs_begin_at_start", True)
+    """True if virtual robots move to their start position when a behaviour starts."""
+    toolbox_pinned = OptionalFlagSetting("toolbox_pinned", is_public=True)
+    recordings_folder = FolderSetting("recordings_folder", default_recordings_folder)
+    recording = MappingSetting("recording")
+    flight_recorder = MappingSetting("flight_recorder")
+    networks = MappingSetting("networks")
+    """Address of each network that is shown in addition to the native one, by kind."""
+    listen_hosts = TextsSetting("listen_at")
+    """Addresses on which the master listens for other computers."""
+    motion_permissions = TextsSetting("robots.may_move")
+
+    # -- state of the window and of the robots ---------------------------------------------------------
+
+    is_started_before = FlagSetting("begun", False, is_public=True)
+    studio_versions = EntriesSetting("studio_versions")
+    completed_steps = TextsSetting("first_steps", is_public=True)
+    window_geometry = TextSetting("window", is_public=True)
+    layout = TextSetting("layout", "start", is_public=True)
+    layouts = MappingSetting("layouts")
+    selected_layouts = MappingSetting("chosen_layouts")
+    palette_entries = TextsSetting("palette_last")
+    tabs = MappingSetting("tabs")
+    recent_entries = EntriesSetting("recent")
+    known_robots = EntriesSetting("robots.known")
+    virtual_robots = MappingSetting("virtual_robots")
+    """Models of the running virtual robots, by name."""
+    room = MappingSetting("room")
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         # Reads `settings.json` in `folder` (default: `home`), if it exists.
-        self.path = (folder if folder is not None else home()) / "settings.json"
-        self.damaged_path: Path | None = None
-        self.notice = ""
-        """Message for the user about the file that was found, or ""."""
-        self.are_new = False
-        """True if no settings existed, which means that Studio was started for the first time."""
-        self.write_error: str | None = None
-        """Reason why the last write failed; None if it succeeded."""
-        self._unwritten: dict[str, object] = {}
+        super().__init__(folder)
         self._clock = clock
-        make_private(self.path.parent, "settings*.json")
-        self._values: dict[str, object] = self._read()
-
-    def get(self, key: str, default: T) -> T:
-        """Return the value of a key, or ``default`` if the value is missing or has another type.
-
-        With the default None, a value of any type is returned.
-        """
-        value = self._values.get(key, default)
-        if default is None or isinstance(value, type(default)):
-            return value  # type: ignore[return-value]  # checked on the line above
-        return default
-
-    def set(self, key: str, value: object) -> None:
-        """Set a value and write the file.
-
-        Values of other keys that another instance has written in the meantime are preserved. A value
-        that could not be written stays in memory and is written together with the next one.
-
-        Args:
-            key: Name of the setting.
-            value: Value that can be converted to JSON.
-
-        Raises:
-            SettingsError: The file can't be written.
-            TypeError: The value can't be converted to JSON. Nothing is changed.
-            ValueError: The value can't be converted to JSON. Nothing is changed.
-        """
-        if key in self._values and self._values[key] == value and self.write_error is None:
-            return
-        json.dumps(value)
-        self._values[key] = self._unwritten[key] = value
-        with locked(self.path):
-            self._values = self._merged_values()
-            self._write()
-
-    def all(self) -> dict[str, object]:
-        """Return all values, by key."""
-        return dict(self._values)
 
     @property
     def recent_files(self) -> list[RecentFile]:
@@ -189,12 +149,13 @@ class Settings:
     def all_recent_files(self) -> list[RecentFile]:
         """Recent files, newest first, including files that are missing."""
         recent_files = []
-        entries: list[object] = self.get("recent", [])
-        for entry in entries:
-            if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
-                path, opened, name = Path(entry["path"]), entry.get("opened_s", 0), entry.get("name")
-                is_time = isinstance(opened, int | float) and abs(opened) <= _MAX_TIME_S
-                opened_s = float(opened) if is_time else 0.0
+        for entry in self.recent_entries:
+            stored_path, opened, name = entry.get("path"), entry.get("opened_s", 0), entry.get("name")
+            if isinstance(stored_path, str):
+                path = Path(stored_path)
+                opened_s = 0.0
+                if isinstance(opened, int | float) and abs(opened) <= _MAX_TIME_S:
+                    opened_s = float(opened)
                 if not isinstance(name, str) or path.parent != closed_tabs_folder():
                     name = path.stem
                 recent_files.append(RecentFile(path, name, opened_s, _is_file(path)))
@@ -211,7 +172,7 @@ class Settings:
             SettingsError: The settings can't be written.
         """
         path = path.resolve()
-        self._values = self._merged_values()
+        self._reload()
         other_files = [file for file in self.all_recent_files if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *other_files])
 
@@ -221,7 +182,7 @@ class Settings:
         Raises SettingsError if the settings can't be written.
         """
         old, new = old.resolve(), new.resolve()
-        self._values = self._merged_values()
+        self._reload()
         other_files = [file for file in self.all_recent_files if file.path != new]
         renamed = [
             replace(file, path=new, name=new.stem) if file.path == old else file for file in other_files
@@ -233,92 +194,15 @@ class Settings:
 
         Raises SettingsError if the settings can't be written.
         """
-        recent = [
+        self.recent_entries = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:MAX_RECENT_FILES]
         ]
-        self.set("recent", recent)
-
-    def _read(self) -> dict[str, object]:
-        try:
-            text = read_regular_file(self.path).decode("utf-8-sig")
-        except FileNotFoundError:
-            self.are_new = True
-            return {}
-        except NotADirectoryError:
-            return {}
-        except (OSError, UnicodeDecodeError):
-            return self._rename_damaged_file()
-        try:
-            values = json.loads(text)
-        except (ValueError, RecursionError):
-            return self._rename_damaged_file()
-        if not isinstance(values, dict):
-            return self._rename_damaged_file()
-        if _format_version(values) <= FORMAT_VERSION:
-            return values
-        return (
-            self._rename_damaged_file() if self.path == self._own_path() else self._switch_to_own_file(values)
-        )
-
-    def _own_path(self) -> Path:
-        # Used while a newer Studio has its settings in the usual place.
-        return self.path.with_name(_OWN_FILE_NAME)
-
-    def _switch_to_own_file(self, newer_values: dict[str, object]) -> dict[str, object]:
-        # The file of a newer Studio stays unchanged; a file of this version is used in addition.
-        newer_name = self.path.name
-        self.path = self._own_path()
-        if self.path.exists():
-            return self._read()
-        self.notice = _(
-            "The settings in “{file}” belong to a newer NEP Studio (format {format}) and are "
-            "unchanged. Settings you change here are saved separately."
-        ).format(file=newer_name, format=_format_version(newer_values))
-        return {name: value for name, value in newer_values.items() if name != "format"}
-
-    def _merged_values(self) -> dict[str, object]:
-        # Current file content with unwritten values; the known values if it can't be read.
-        try:
-            values = json.loads(read_regular_file(self.path))
-        except (OSError, ValueError, RecursionError):
-            return self._values
-        if not isinstance(values, dict):
-            return self._values
-        if _format_version(values) > FORMAT_VERSION:  # a newer Studio also runs on this computer
-            self._switch_to_own_file(values)
-            return self._values
-        return {**values, **self._unwritten}
-
-    def _rename_damaged_file(self) -> dict[str, object]:
-        self.damaged_path = self.path.with_name(f"{self.path.stem}.damaged.json")
-        try:
-            replace_file(self.path, self.damaged_path)
-        except OSError:
-            self.damaged_path = None
-            return {}
-        self.notice = _(
-            "The settings couldn't be read, so Studio uses defaults. The old file was kept as “{file}”."
-        ).format(file=self.damaged_path.name)
-        return {}
-
-    def _write(self) -> None:
-        values = {**self._values, "format": FORMAT_VERSION}
-        text = json.dumps(values, indent=1, ensure_ascii=False, sort_keys=True)
-        # A file name that is not UTF-8 has lone surrogates, which JSON represents by backslash, u and four
-        # digits.
-        data = text.encode("utf-8", "backslashreplace")
-        try:
-            write_atomically(self.path, data, durable=False, private=True)
-        except OSError as error:
-            settings_error = SettingsError(self.path, error.strerror or str(error))
-            self.write_error = str(settings_error)
-            raise settings_error from error
-        self.write_error = None
-        self._unwritten.clear()
 
 
-def _format_version(values: Mapping[str, object]) -> int:
-    # 1 for settings from before there were versions.
-    version = values.get("format", 1)
-    return version if isinstance(version, int) and not isinstance(version, bool) else 1
+def _is_file(path: Path) -> bool:
+    # False for names that no file can have.
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

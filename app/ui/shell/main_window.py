@@ -92,6 +92,7 @@ class MainWindow(QMainWindow):
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
         self.state = WindowState(session.settings, self.log_problem)
+        self.state.keep_theme_updated(theme)
         self.saved_layouts = SavedLayouts(self.state, self.log_problem)
         self.on_closed: Callable[[], object] = lambda: None
         self.can_restart = self.wants_restart = False
@@ -612,7 +613,6 @@ class MainWindow(QMainWindow):
         self.state.save_geometry(self)
         for name, bench in self.benches.items():
             self.saved_layouts.save(bench, name)
-        self.state.save_theme(self.theme)
 
 
 class Placeholder(QWidget):

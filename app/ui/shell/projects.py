@@ -17,7 +17,7 @@ from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import OpenProject
 from app.core.projects.project_files import ClosedProject
 from app.core.session import Session
-from app.core.storage.settings import closed_tabs_folder
+from app.core.storage.folders import closed_tabs_folder
 from app.errors import AppError, DocumentError
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext

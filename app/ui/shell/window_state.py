@@ -5,16 +5,17 @@ from __future__ import annotations
 import base64
 import binascii
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from PySide6.QtCore import QByteArray, QSize, Qt
 from PySide6.QtWidgets import QMainWindow
 
+from app.core.storage.setting import Setting
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-from app.ui.theme.system import parse_preference
-from app.ui.theme.theme import MODES, Mode, Theme
+from app.ui.theme.theme import Theme
 
-SettingsDict = dict[str, object]
+T = TypeVar("T")
 FRAME_SIZE = QSize(16, 48)  # approximate size of a window manager's frame
 
 
@@ -42,26 +43,19 @@ class WindowState:
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the saved mode, text size, motion and contrast to the theme in one update."""
-        saved_mode = self._settings.get("theme", "system")
-        mode: Mode = next((mode for mode in MODES if mode == saved_mode), "system")
-        motion = parse_preference(self._settings.get("less_motion", None))
-        contrast = parse_preference(self._settings.get("high_contrast", None))
-        theme.apply_settings(mode, self._settings.get("text_percent", 100), motion, contrast)
+        settings = self._settings
+        theme.apply_settings(settings.theme, settings.text_percent, settings.motion, settings.contrast)
 
-    def save_theme(self, theme: Theme) -> None:
-        """Save the mode, text size, motion and contrast of the theme."""
-        self._set("theme", theme.mode)
-        self._set("text_percent", theme.text_percent)
-        self._set("less_motion", theme.motion)
-        self._set("high_contrast", theme.contrast)
-
-    def save(self, key: str, value: object) -> None:
-        """Save a setting, whose value must be JSON-serializable."""
-        self._set(key, value)
+    def keep_theme_updated(self, theme: Theme) -> None:
+        """Apply later changes of mode, text size, motion and contrast to the theme."""
+        self._settings.on_change(Settings.theme, theme.set_mode)
+        self._settings.on_change(Settings.text_percent, theme.set_text_percent)
+        self._settings.on_change(Settings.motion, theme.set_motion)
+        self._settings.on_change(Settings.contrast, theme.set_contrast)
 
     def restore_geometry(self, window: QMainWindow) -> bool:
         """Restore position and size of the window; return False if none are saved or they are invalid."""
-        text = self._settings.get("window", "")
+        text = self._settings.window_geometry
         try:
             data = base64.b64decode(text, validate=True)
         except (binascii.Error, ValueError):
@@ -73,21 +67,20 @@ class WindowState:
 
     def save_geometry(self, window: QMainWindow) -> None:
         """Save position and size of the window."""
-        self._set("window", base64.b64encode(window.saveGeometry().data()).decode("ascii"))
+        self.save(Settings.window_geometry, base64.b64encode(window.saveGeometry().data()).decode("ascii"))
 
     @property
     def layout(self) -> str:
         """Name of the last layout; "start" for the start page and before the first start."""
-        return self._settings.get("layout", "start")
+        return self._settings.layout
 
     def save_layout(self, name: str) -> None:
         """Save the name of the current layout."""
-        self._set("layout", name)
+        self.save(Settings.layout, name)
 
     def layouts(self) -> Mapping[str, object]:
         """Return the saved arrangements of all layouts, by name."""
-        layouts: SettingsDict = self._settings.get("layouts", {})
-        return layouts
+        return self._settings.layouts
 
     def layout_state(self, name: str) -> Mapping[str, object]:
         """Return the saved arrangement of a layout; empty if there is none."""
@@ -96,7 +89,9 @@ class WindowState:
 
     def delete_layout(self, name: str) -> bool:
         """Delete the saved arrangement of a layout; return False if the settings can't be saved."""
-        return self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
+        return self.save(
+            Settings.layouts, {key: value for key, value in self.layouts().items() if key != name}
+        )
 
     def selected_layout(self, base: str) -> str:
         """Return the name of the custom layout that a workbench showed last, or "" for the built-in one.
@@ -104,8 +99,7 @@ class WindowState:
         Args:
             base: Name of the workbench's built-in layout.
         """
-        names_by_base: SettingsDict = self._settings.get("chosen_layouts", {})
-        name = names_by_base.get(base)
+        name = self._settings.selected_layouts.get(base)
         return name if isinstance(name, str) else ""
 
     def save_selected_layout(self, base: str, name: str) -> None:
@@ -115,16 +109,16 @@ class WindowState:
             base: Name of the workbench's built-in layout.
             name: Name of the custom layout, or "" for the built-in one.
         """
-        names_by_base: SettingsDict = self._settings.get("chosen_layouts", {})
-        self._set("chosen_layouts", {**names_by_base, base: name})
+        self.save(Settings.selected_layouts, {**self._settings.selected_layouts, base: name})
 
     def save_layouts(self, layouts: Mapping[str, Mapping[str, object]]) -> bool:
         """Save arrangements of layouts, by name; return False if the settings can't be saved."""
-        return self._set("layouts", {**self.layouts(), **layouts})
+        return self.save(Settings.layouts, {**self.layouts(), **layouts})
 
-    def _set(self, key: str, value: object) -> bool:
+    def save(self, setting: Setting[T], value: T) -> bool:
+        """Save a setting; report an error once and return False if it can't be saved."""
         try:
-            self._settings.set(key, value)
+            self._settings.set_value(setting, value)
         except SettingsError as error:
             if (
                 str(error) != self._reported_error

@@ -5,24 +5,11 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
-from typing import Literal
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QStyleHints
 
-Preference = Literal["system", "on", "off"]
-PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
 SPI_GETCLIENTAREAANIMATION = 0x1042  # action of SystemParametersInfoW on Windows
-
-
-def parse_preference(value: object) -> Preference:
-    """Parse a preference from the settings; "system" for an unknown value.
-
-    Older versions stored a boolean.
-    """
-    if isinstance(value, bool):
-        return "on" if value else "system"
-    return next((preference for preference in PREFERENCES if preference == value), "system")
 
 
 def prefers_contrast(hints: QStyleHints) -> bool:

@@ -9,20 +9,18 @@ immediately.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Literal, get_args
+from typing import Literal
 
 from PySide6.QtCore import QObject, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QGuiApplication, QIcon, QPalette, QStyleHints
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
+from app.core.storage.settings import Mode, Preference
 from app.ui.theme import fonts, style_sheet, system
 from app.ui.theme import tokens as theme_tokens
 from app.ui.theme.icons import IconEngine
-from app.ui.theme.system import Preference
 from app.ui.theme.tokens import Status, Tokens
 
-Mode = Literal["light", "dark", "system"]
-MODES: tuple[Mode, ...] = get_args(Mode)
 MONO_KINDS = frozenset({"code", "mono"})
 DISPLAY_SPACING_EM = -0.02
 TEXT_PERCENT_RANGE = (100, 200)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.core.messages import snapshots
+from app.core.storage.folders import default_pictures_folder
 from nep.errors import DecodeError
 from nep.messages.message import Message
 
@@ -46,6 +47,6 @@ def test_invalid_image_leaves_no_file(tmp_path) -> None:
 
 def test_snapshots_are_saved_in_studio_home_if_set(monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
-    assert snapshots.folder() == tmp_path / "Pictures"
+    assert default_pictures_folder() == tmp_path / "Pictures"
     monkeypatch.delenv("NEP_STUDIO_HOME")
-    assert snapshots.folder().name == "NEP Studio"
+    assert default_pictures_folder().name == "NEP Studio"

@@ -14,7 +14,7 @@ from app.core.network.mailbox import Batch
 from app.core.network.source import GraphReceived, MasterFound, MasterLost, WatchFailed
 from app.core.network.topics import Topic, Topics, key_of, split_key
 from app.core.networks.kinds import KINDS, find_kind
-from app.core.networks.networks import SETTING_KEY, lost_message, split_by_network
+from app.core.networks.networks import lost_message, split_by_network
 from app.core.networks.source import OtherSource
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -71,7 +71,7 @@ def test_network_is_observed_only_when_selected_and_again_at_next_start(world: W
     "kept", [[], {"ros2": "999"}, {"ros2": 5}, {"roz": "1"}, {"zenoh": "nowhere at all"}, {"ros": None}]
 )
 def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> None:
-    (tmp_path / "settings.json").write_text(json.dumps({SETTING_KEY: kept}))
+    (tmp_path / "settings.json").write_text(json.dumps({Settings.networks.key: kept}))
     world = World(Settings(tmp_path))
     world.networks.start()
     assert world.made == []
@@ -103,10 +103,10 @@ def test_invalid_address_is_rejected_with_reason_and_selection_is_unchanged(
 def test_network_is_observed_even_if_selection_cannot_be_saved(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_key: str, _value: object) -> None:
+    def refuse(_setting: object, _value: object) -> None:
         raise SettingsError(Path("settings.json"), "no space left on device")
 
-    monkeypatch.setattr(world.settings, "set", refuse)
+    monkeypatch.setattr(world.settings, "set_value", refuse)
     with pytest.raises(SettingsError):
         world.networks.select("zenoh", "")
     assert [network.kind.name for network in world.networks.selected_networks] == ["zenoh"]

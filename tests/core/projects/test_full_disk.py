@@ -38,7 +38,7 @@ path = disk / "Mine.nepb"
 write_file(path, Project.of_blocks("Mine", blocks("old"), {}))
 old = path.read_bytes()
 settings = Settings(disk / "home")
-settings.set("theme", "dark")
+settings.theme = "dark"
 document = OpenProject(lambda: Journal(disk / "journal"))
 document.open(path)
 document.apply_edit(blocks("first"))
@@ -58,13 +58,13 @@ told = {"full": full}
 document.apply_edit(blocks("y" * 50_000))
 told["edit"] = document.journal_error
 told["save"] = said(document.save)
-told["setting"] = said(lambda: settings.set("theme", "x" * 20_000))
+told["setting"] = said(lambda: setattr(settings, "shortcuts", {"x": ["x" * 20_000]}))
 told["earlier"] = said(lambda: save_version(path, disk / "earlier"))
 told["snapshot"] = said(lambda: snapshots.save(picture, disk / "pictures"))
 told["dirty"] = document.dirty
 told["old"] = path.read_bytes() == old
 told["journal"] = [each.read_bytes() for each in (disk / "journal").glob("*.json")] == kept
-told["settings"] = Settings(disk / "home").get("theme", "")
+told["settings"] = Settings(disk / "home").theme
 told["parts"] = parts()
 told["pictures"] = [each.name for each in (disk / "pictures").iterdir()]
 
@@ -75,8 +75,8 @@ told["save then"] = said(document.save)
 again = OpenProject(lambda: Journal(disk / "journal"))
 again.open(path)
 told["read then"] = again.workspace == blocks("z" * 50_000)
-told["setting then"] = said(lambda: settings.set("theme", "light"))
-told["theme then"] = Settings(disk / "home").get("theme", "")
+told["setting then"] = said(lambda: setattr(settings, "theme", "light"))
+told["theme then"] = Settings(disk / "home").theme
 told["snapshot then"] = said(lambda: snapshots.save(picture, disk / "pictures"))
 told["parts then"] = parts()
 print(json.dumps(told))

@@ -82,7 +82,7 @@ def test_clean_exit_flag_applies_to_one_start_only(start, tmp_path: Path) -> Non
     first.work()
     first.tabs.save(has_ended_normally=True)
     start().work()
-    assert Settings(tmp_path).get("tabs", {})["ended_well"] is False
+    assert Settings(tmp_path).tabs["ended_well"] is False
 
 
 def test_second_window_does_not_overwrite_saved_tabs(start, tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_second_window_does_not_overwrite_saved_tabs(start, tmp_path: Path) -> N
     second.documents.new()
     second.documents.current.apply_edit(STARTED)
     second.tabs.save(has_ended_normally=True)
-    kept = Settings(tmp_path).get("tabs", {})
+    kept = Settings(tmp_path).tabs
     assert [Path(each["path"]).name for each in kept["tabs"]] == ["A.nepb"]
     assert kept["ended_well"] is False
 
@@ -137,7 +137,7 @@ def test_tab_of_new_behaviour_is_saved_from_first_edit(start) -> None:
     first.tabs.save_if_changed()
     blank.apply_edit(OTHER)
     first.tabs.on_edited(blank, was_blank=True)
-    kept = Settings(first.folder).get("tabs", {})
+    kept = Settings(first.folder).tabs
     assert [tab["journal"] for tab in kept["tabs"]] == [blank.journal_name]
 
 
@@ -147,9 +147,9 @@ def test_switching_tabs_does_not_write_settings_at_once(start) -> None:
     made = first.documents.new()
     made.apply_edit(OTHER)
     first.tabs.save_if_changed()
-    before = Settings(first.folder).get("tabs", {})
+    before = Settings(first.folder).tabs
     assert before["current"] == 1
     first.documents.show(first.documents.neighbour(-1))
-    assert Settings(first.folder).get("tabs", {}) == before
+    assert Settings(first.folder).tabs == before
     first.tabs.save_if_changed()
-    assert Settings(first.folder).get("tabs", {})["current"] == 0
+    assert Settings(first.folder).tabs["current"] == 0

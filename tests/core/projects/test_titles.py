@@ -13,7 +13,8 @@ from app.core.projects.journal import Journal
 from app.core.projects.open_project import OpenProject
 from app.core.projects.open_projects import OpenProjects
 from app.core.projects.titles import recent_titles, unique_titles
-from app.core.storage.settings import RecentFile, Settings, closed_tabs_folder
+from app.core.storage.folders import closed_tabs_folder
+from app.core.storage.settings import RecentFile, Settings
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,7 @@ from app.core.projects.versions import (
     stamp_of,
     versions_of,
 )
-from app.core.storage.settings import data_home, home
+from app.core.storage.folders import data_home, home
 from app.errors import DocumentError
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.core.recording import folder as folder_module
-from app.core.recording.folder import FolderScan, RecordingFolder, default_folder, new_path
+from app.core.recording.folder import FolderScan, RecordingFolder, new_path
+from app.core.storage.folders import default_recordings_folder
 from nep.recordings.repair import repair
 from tests.nep.programs import eventually
 from tests.nep.recordings.messages import json_message, record
@@ -83,4 +84,4 @@ def test_new_recording_names_are_unique(tmp_path, monkeypatch):
     first.touch()
     assert new_path(tmp_path, now).name == "recording-2026-11-26-22-01-05-2.mcap"
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
-    assert default_folder() == tmp_path / "Recordings"
+    assert default_recordings_folder() == tmp_path / "Recordings"

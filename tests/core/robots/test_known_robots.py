@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.known_robots import MAX_ROBOTS, SETTING_KEY, KnownRobot, KnownRobots
+from app.core.robots.known_robots import MAX_ROBOTS, KnownRobot, KnownRobots
 from app.core.storage.settings import Settings
 from app.robots.client import rize
 
@@ -49,11 +50,9 @@ def test_removed_known_robot_is_added_again_when_it_returns(settings) -> None:
 
 
 def test_invalid_entries_of_known_robots_are_ignored(settings) -> None:
-    settings.set(
-        SETTING_KEY,
-        ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}],
-    )
-    assert KnownRobots(settings).robots == (KnownRobot("B", 2.0),)
+    entries = ["NAO", {"name": 3, "seen_s": 1}, {"name": "A", "seen_s": True}, {"name": "B", "seen_s": 2}]
+    settings.path.write_text(json.dumps({Settings.known_robots.key: entries}))
+    assert KnownRobots(Settings(settings.path.parent)).robots == (KnownRobot("B", 2.0),)
 
 
 def test_number_of_known_robots_is_limited(settings) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-from app.core.robots.last_robots import MAX_ROBOTS, ROBOTS_SETTING, LastRobots
+from app.core.robots.last_robots import MAX_ROBOTS, LastRobots
 from app.core.storage.settings import Settings
 
 
@@ -43,18 +44,18 @@ def test_running_virtual_robots_are_restored_and_stopped_ones_are_not(tmp_path: 
 
 
 def test_start_without_restoring_robots_keeps_the_saved_list(tmp_path: Path) -> None:
-    Settings(tmp_path).set(ROBOTS_SETTING, {"Pepper": "pepper"})
+    Settings(tmp_path).virtual_robots = {"Pepper": "pepper"}
     LastRobots(Settings(tmp_path)).save(Launcher())
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 
 def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
-    Settings(tmp_path).set(ROBOTS_SETTING, {"Pepper": "pepper"})
-    robots = LastRobots(Settings(tmp_path))
-    assert robots.is_restart_enabled
-    robots.set_restart_enabled(False)
+    Settings(tmp_path).virtual_robots = {"Pepper": "pepper"}
+    settings = Settings(tmp_path)
+    assert settings.restarts_robots
+    settings.restarts_robots = False
     assert next_start(tmp_path) == {}
-    robots.set_restart_enabled(True)
+    settings.restarts_robots = True
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 
@@ -62,10 +63,10 @@ def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
     "kept", [None, [], {"": "pepper"}, {"Pepper": "toaster"}, {"Pepper": 3}, {"Pepper": ["pepper"]}]
 )
 def test_damaged_list_of_last_robots_starts_no_robot(tmp_path: Path, kept: object) -> None:
-    Settings(tmp_path).set(ROBOTS_SETTING, kept)
+    (tmp_path / "settings.json").write_text(json.dumps({Settings.virtual_robots.key: kept}))
     assert next_start(tmp_path) == {}
 
 
 def test_number_of_restored_robots_is_limited(tmp_path: Path) -> None:
-    Settings(tmp_path).set(ROBOTS_SETTING, {f"Pepper {number}": "pepper" for number in range(500)})
+    Settings(tmp_path).virtual_robots = {f"Pepper {number}": "pepper" for number in range(500)}
     assert len(next_start(tmp_path)) == MAX_ROBOTS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -116,7 +117,7 @@ def test_furniture_and_people_cannot_be_placed_on_a_robot(studio: Studio) -> Non
 
 @pytest.mark.parametrize("kept", [None, [], {"things": 3}, {"things": [{"name": "ball"}]}])
 def test_damaged_room_settings_give_the_default_room(tmp_path: Path, kept: object) -> None:
-    Settings(tmp_path).set("room", kept)
+    (tmp_path / "settings.json").write_text(json.dumps({"room": kept}))
     studio = Studio(tmp_path)
     assert studio.room.room == Room()
     studio.close()

@@ -7,7 +7,6 @@ import pytest
 from app.core.robots.voices import (
     MAX_NOTES_S,
     MAX_QUEUED,
-    SOUND_SETTING,
     Notes,
     RobotSound,
     RobotVoices,
@@ -89,10 +88,10 @@ def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
 
 def test_robot_state_is_not_watched_when_sound_is_off(case) -> None:
     assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.live.source.wanted
-    case.session.voices.set_on(on=False)
+    case.session.settings.is_robot_sound_on = False
     case.session.tick()
     assert STATE.format("Pepper") not in case.session.live.source.wanted
-    case.session.voices.set_on(on=True)
+    case.session.settings.is_robot_sound_on = True
     case.session.tick()
     assert STATE.format("Pepper") in case.session.live.source.wanted
 
@@ -163,10 +162,10 @@ def test_stop_silences_all_speech_including_queued(case) -> None:
 
 def test_disabling_sound_silences_at_once_and_enabling_waits_for_next_utterance(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
-    case.session.voices.set_on(on=False)
+    case.session.settings.is_robot_sound_on = False
     assert case.speaker.did[-1] == "stop"
-    assert case.session.settings.get(SOUND_SETTING, True) is False
-    case.session.voices.set_on(on=True)
+    assert not case.session.voices.is_on
+    case.session.settings.is_robot_sound_on = True
     case.session.tick()
     case.tell("Pepper", "The end")
     assert case.said[-1] == "The end"

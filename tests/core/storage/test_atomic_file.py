@@ -146,16 +146,16 @@ def test_non_regular_file_is_rejected_with_reason(tmp_path: Path, kind: str) -> 
         read_file(path)
     assert save_version(path, tmp_path / "earlier") is None
     assert unsaved_work(tmp_path) == []
-    assert Settings(tmp_path).get("a", 1) == 1
-    Settings(tmp_path).set("a", 2)
-    assert Settings(tmp_path).get("a", 1) == 2
+    assert Settings(tmp_path).text_percent == 100
+    Settings(tmp_path).text_percent = 150
+    assert Settings(tmp_path).text_percent == 150
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pipes that look like files")
 def test_pipe_in_place_of_a_file_does_not_block(tmp_path: Path) -> None:
     for name in ("settings.json", "Round.nepb"):
         os.mkfifo(tmp_path / name)
-    assert Settings(tmp_path).get("a", 1) == 1
+    assert Settings(tmp_path).text_percent == 100
     with pytest.raises(DocumentError):
         read_file(tmp_path / "Round.nepb")
 
@@ -179,7 +179,7 @@ def modes(folder: Path) -> dict[str, int]:
 @pytest.mark.usefixtures("open_umask")
 def test_user_data_files_are_private_regardless_of_umask(tmp_path: Path) -> None:
     home = tmp_path / "home"
-    Settings(home).set("a", 1)
+    Settings(home).text_percent = 150
     Journal(home / "journal").write(Project.of_blocks("x", {}), None)
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"{}")

@@ -11,7 +11,8 @@ from app.blocks.model.project import Project
 from app.core.projects.backpack import Backpack
 from app.core.projects.file_format import read_file, write_file
 from app.core.projects.journal import newer_work_names, unsaved_work
-from app.core.storage.settings import FORMAT_VERSION, Settings
+from app.core.storage.settings import Settings
+from app.core.storage.settings_file import FORMAT_VERSION
 from app.errors import DocumentError
 from app.ui.shell.docking.workbench import STATE_VERSION
 
@@ -39,11 +40,11 @@ def write(path: Path, content: object) -> bytes:
 def test_settings_of_a_newer_version_are_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "settings.json", NEWER)
     settings = Settings(tmp_path)
-    assert settings.get("theme", "light") == "dark", "what can be read of them is taken"
+    assert settings.theme == "dark", "what can be read of them is taken"
     assert settings.recent_files == []
     assert "newer NEP Studio (format 2)" in settings.notice
     assert settings.notice.count(".") == 2 + settings.notice.count(".json")
-    settings.set("theme", "light")
+    settings.theme = "light"
     settings.add_recent(tmp_path / "a.nepb")
     assert (tmp_path / "settings.json").read_bytes() == before
     assert not settings.are_new
@@ -51,9 +52,9 @@ def test_settings_of_a_newer_version_are_not_modified(tmp_path: Path) -> None:
 
 def test_changes_to_newer_settings_go_to_a_separate_file_with_one_notice(tmp_path: Path) -> None:
     write(tmp_path / "settings.json", NEWER)
-    Settings(tmp_path).set("theme", "light")
+    Settings(tmp_path).theme = "light"
     again = Settings(tmp_path)
-    assert (again.get("theme", ""), again.get("language", "")) == ("light", "es")
+    assert (again.theme, again.language) == ("light", "es")
     assert again.notice == ""
     kept = json.loads((tmp_path / "settings.format-1.json").read_text())
     assert kept["format"] == FORMAT_VERSION
@@ -62,13 +63,13 @@ def test_changes_to_newer_settings_go_to_a_separate_file_with_one_notice(tmp_pat
 
 def test_settings_that_a_newer_version_writes_at_runtime_are_not_overwritten(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
-    settings.set("theme", "light")
+    settings.theme = "light"
     newer = write(tmp_path / "settings.json", NEWER)
-    settings.set("theme", "system")
-    settings.set("language", "en")
+    settings.theme = "system"
+    settings.language = "en"
     assert (tmp_path / "settings.json").read_bytes() == newer
     again = Settings(tmp_path)
-    assert (again.get("theme", ""), again.get("language", "")) == ("system", "en")
+    assert (again.theme, again.language) == ("system", "en")
 
 
 @pytest.mark.parametrize("said", [None, "2", 1.5, True, [], 1])
@@ -76,8 +77,8 @@ def test_settings_of_an_older_version_are_read_and_migrated_in_place(tmp_path: P
     old: dict[str, object] = {"theme": "dark", "of another plug-in": 7}
     write(tmp_path / "settings.json", old if said is None else {**old, "format": said})
     settings = Settings(tmp_path)
-    assert (settings.get("theme", ""), settings.notice) == ("dark", "")
-    settings.set("language", "es")
+    assert (settings.theme, settings.notice) == ("dark", "")
+    settings.language = "es"
     kept = json.loads((tmp_path / "settings.json").read_text())
     assert kept == {**old, "language": "es", "format": FORMAT_VERSION}, "what it does not know is kept"
     assert [path.name for path in tmp_path.glob("settings*.json")] == ["settings.json"]
@@ -89,8 +90,8 @@ def test_own_settings_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: 
     settings = Settings(tmp_path)
     assert settings.damaged_path is not None
     assert settings.damaged_path.read_bytes() == whole
-    settings.set("theme", "light")
-    assert Settings(tmp_path).get("theme", "") == "light"
+    settings.theme = "light"
+    assert Settings(tmp_path).theme == "light"
 
 
 def test_damaged_own_settings_file_next_to_a_newer_one_is_backed_up(tmp_path: Path) -> None:

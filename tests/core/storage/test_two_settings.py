@@ -8,39 +8,42 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.core.storage.settings import FORMAT_VERSION, Settings
+from app.core.storage.settings import Settings
+from app.core.storage.settings_file import FORMAT_VERSION
 
 WRITER = """
 import sys
 from pathlib import Path
+from app.core.storage.setting import MappingSetting
 from app.core.storage.settings import Settings
 settings = Settings(Path(sys.argv[1]))
 print("ready", flush=True)
 sys.stdin.readline()
 for number in range(50):
-    settings.set(f"{sys.argv[2]} {number}", number)
+    setting = MappingSetting(f"{sys.argv[2]} {number}")
+    settings.set_value(setting, {"number": number})
 """
 
 
 def test_each_instance_preserves_values_set_by_the_other(tmp_path: Path) -> None:
     first, second = Settings(tmp_path), Settings(tmp_path)
-    first.set("theme", "dark")
-    second.set("text_percent", 150)
-    first.set("layout", "developer")
+    first.theme = "dark"
+    second.text_percent = 150
+    first.layout = "developer"
     again = Settings(tmp_path)
-    assert (again.get("theme", ""), again.get("text_percent", 0), again.get("layout", "")) == (
+    assert (again.theme, again.text_percent, again.layout) == (
         "dark",
         150,
         "developer",
     )
-    assert first.get("text_percent", 0) == 150
+    assert first.text_percent == 150
 
 
 def test_last_write_wins_for_the_same_key(tmp_path: Path) -> None:
     first, second = Settings(tmp_path), Settings(tmp_path)
-    first.set("theme", "dark")
-    second.set("theme", "light")
-    assert Settings(tmp_path).get("theme", "") == "light"
+    first.theme = "dark"
+    second.theme = "light"
+    assert Settings(tmp_path).theme == "light"
 
 
 def test_recent_files_of_both_instances_are_merged(tmp_path: Path) -> None:
@@ -53,9 +56,9 @@ def test_recent_files_of_both_instances_are_merged(tmp_path: Path) -> None:
 
 def test_file_damaged_by_another_program_does_not_lose_values_in_memory(tmp_path: Path) -> None:
     settings = Settings(tmp_path)
-    settings.set("theme", "dark")
+    settings.theme = "dark"
     settings.path.write_text("{ half of")
-    settings.set("layout", "developer")
+    settings.layout = "developer"
     assert json.loads(settings.path.read_text()) == {
         "theme": "dark",
         "layout": "developer",
@@ -85,5 +88,7 @@ def test_concurrent_writes_of_two_processes_lose_nothing(tmp_path: Path) -> None
     for writer in writers:
         writer.communicate(timeout=30)
         assert writer.returncode == 0
-    kept = Settings(tmp_path)
-    assert [kept.get(f"{name} {number}", -1) for name in "ab" for number in range(50)] == [*range(50)] * 2
+    kept = Settings(tmp_path).stored_values()
+    assert [kept[f"{name} {number}"] for name in "ab" for number in range(50)] == [
+        {"number": number} for number in range(50)
+    ] * 2

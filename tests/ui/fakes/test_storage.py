@@ -31,23 +31,23 @@ def settings(is_real: bool, tmp_path: Path) -> Settings:
     return Settings(tmp_path / "home") if is_real else storage.Settings()
 
 
-def test_setting_is_saved_and_a_value_of_another_type_is_ignored(settings: Settings) -> None:
-    assert settings.get("theme", "light") == "light"
-    settings.set("theme", "dark")
-    assert settings.get("theme", "light") == "dark"
-    assert settings.get("theme", 5) == 5
-    settings.set("theme", "dark")
-    settings.set("theme", ["a", {"b": None}])
-    assert settings.get("theme", []) == ["a", {"b": None}]
+def test_setting_is_saved_and_its_change_is_noticed(settings: Settings) -> None:
+    noticed: list[str] = []
+    settings.on_change(Settings.theme, noticed.append)
+    assert settings.theme == "system"
+    settings.theme = "dark"
+    settings.theme = "dark"
+    settings.tabs = {"tabs": ["a", {"b": None}]}
+    assert (settings.theme, settings.tabs, noticed) == ("dark", {"tabs": ["a", {"b": None}]}, ["dark"])
     assert (settings.write_error, settings.damaged_path) == (None, None)
 
 
-@pytest.mark.parametrize("value", [object(), {"a": {1, 2}}, b"bytes"])
+@pytest.mark.parametrize("value", [object(), {1, 2}, b"bytes"])
 def test_value_that_json_cannot_encode_is_rejected_and_not_saved(settings: Settings, value: object) -> None:
-    settings.set("theme", "dark")
+    settings.tabs = {"tabs": 1}
     with pytest.raises(TypeError):
-        settings.set("theme", value)
-    assert settings.get("theme", "light") == "dark"
+        settings.tabs = {"tabs": value}
+    assert settings.tabs == {"tabs": 1}
 
 
 def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> None:

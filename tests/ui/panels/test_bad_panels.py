@@ -242,7 +242,7 @@ def test_panel_with_state_that_json_cannot_encode_does_not_prevent_saving_the_la
     with caplog.at_level(logging.ERROR):
         window.close()
     assert [record.getMessage() for record in caplog.records] == ["saving the state of panel 'bad' failed"]
-    layouts: dict[str, dict[str, object]] = Settings(home).get("layouts", {})
+    layouts: dict[str, dict[str, object]] = Settings(home).layouts
     assert "bad" in layouts["developer"]["open"]
 
 

@@ -307,7 +307,7 @@ def test_python_program_has_syntax_highlighting(qtbot, qapp) -> None:
 def test_toolbox_pinned_setting_is_saved(qtbot, panel, window) -> None:
     assert editor(panel).last("set_toolbox_pinned") is None
     editor(panel).toolbox_pinned.emit(False)
-    assert window.session.settings.get("toolbox_pinned", True) is False
+    assert window.session.settings.toolbox_pinned is False
     again = window.make(PANEL, (1032, 600))
     qtbot.addWidget(again)
     assert isinstance(again, BehaviourPanel)

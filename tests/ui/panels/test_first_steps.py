@@ -10,7 +10,7 @@ import pytest
 from app import resources
 from app.core.projects.file_format import read_file
 from app.ui.panels.base import Panel
-from app.ui.panels.build.first_steps.panel import HINT_DELAY_S, PROGRESS_SETTING, FirstStepsPanel
+from app.ui.panels.build.first_steps.panel import HINT_DELAY_S, FirstStepsPanel
 from app.ui.panels.build.first_steps.steps import (
     SAY,
     STEPS,
@@ -186,14 +186,14 @@ def test_hint_for_a_detached_block_says_where_to_attach_it(panel, window) -> Non
 def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
-    assert window.session.settings.get(PROGRESS_SETTING, []) == ["robot", "start"]
+    assert window.session.settings.completed_steps == ("robot", "start")
     again = window.make(Panel("first_steps", "", "", (), FirstStepsPanel))
     qtbot.addWidget(again)
     for widget in again.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(again, FirstStepsPanel)
     assert again.completed_ids == {"robot", "start"}
-    window.session.settings.set(PROGRESS_SETTING, "nonsense")
+    window.session.settings.completed_steps = ("nonsense",)
     assert FirstStepsPanel(window.context()).completed_ids == frozenset()
 
 

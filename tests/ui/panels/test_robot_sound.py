@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.voices import SOUND_SETTING, Utterance
+from app.core.robots.voices import Utterance
 from app.robots.virtual.body import Body
 from app.robots.virtual.simulation import drawing_state
 from app.ui.panels.robots.robot.panel import PANEL, RobotPanel
@@ -30,10 +30,10 @@ def panel(qtbot, window) -> RobotPanel:
 def test_mute_setting_is_saved(panel, window) -> None:
     assert panel.sound_button.accessibleName() == "Mute the robots"
     press(panel.sound_button)
-    heard = window.session.settings.get(SOUND_SETTING, True)
+    heard = window.session.settings.is_robot_sound_on
     assert (heard, panel.sound_button.accessibleName()) == (False, "Unmute the robots")
     press(panel.sound_button)
-    assert window.session.settings.get(SOUND_SETTING, False)
+    assert window.session.settings.is_robot_sound_on
 
 
 def test_mute_button_shows_the_reason_for_a_missing_voice(panel, window) -> None:

@@ -8,7 +8,6 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.robots.known_robots import SETTING_KEY
 from app.robots.description.model import DataField
 from app.ui.panels.robots.robots.invocations import feedback_text, progress_of
 from app.ui.panels.robots.robots.list import seen_text
@@ -172,7 +171,7 @@ def test_panel_without_a_robot_offers_the_virtual_robot(qtbot, qapp) -> None:
 def remember(window, name: str, seen_s: float) -> None:
     known = window.session.fleet.known_robots.robots
     told = [{"name": one.name, "seen_s": one.seen_s} for one in known]
-    window.session.fleet.known_robots._settings.set(SETTING_KEY, [*told, {"name": name, "seen_s": seen_s}])
+    window.session.settings.known_robots = [*told, {"name": name, "seen_s": seen_s}]
 
 
 def test_robot_of_an_earlier_session_is_listed_as_disconnected_and_can_be_removed(qtbot, window) -> None:

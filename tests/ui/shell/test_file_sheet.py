@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from app.core.projects.folder import entries_of, free_name, name_problem
 from app.core.session import Session
+from app.core.storage.settings import Settings
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.file_sheet import FileSheet, FolderLocation, known_locations
 from app.ui.shell.main_window import MainWindow
@@ -296,7 +297,7 @@ def test_settings_stay_open_below_the_file_sheet_and_regain_focus(
     commands.run("settings.open")
     settings = commands.view._settings_sheet
     assert settings is not None
-    settings.choose.setFocus()
+    settings.rows[Settings.pictures_folder].control.setFocus()
     sheet.ask_folder(folder, taken.append)
     QApplication.processEvents()
     assert settings.isVisible()
@@ -304,7 +305,7 @@ def test_settings_stay_open_below_the_file_sheet_and_regain_focus(
     QTest.keyClick(sheet.list, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
     assert settings.isVisible()
-    assert settings.choose.hasFocus()
+    assert settings.rows[Settings.pictures_folder].control.hasFocus()
     assert taken == []
 
 

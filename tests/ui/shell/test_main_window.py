@@ -434,9 +434,9 @@ def test_window_state_is_restored_after_restart(qtbot, theme: Theme, session: Se
 def test_damaged_layouts_fall_back_to_the_default_arrangement(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
-    window.session.settings.set(
-        "layouts", {"developer": {"open": ["topics", 5], "docks": "%%%", "panels": 3}}
-    )
+    window.session.settings.layouts = {
+        "developer": {"open": ["topics", 5], "docks": "%%%", "panels": 3},
+    }
     show(qtbot, window)
     assert "inspector" in window.show_layout("developer").open_names()
 

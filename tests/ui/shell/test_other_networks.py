@@ -111,7 +111,7 @@ def test_setting_that_cannot_be_saved_is_reported(
     def refuse(_key: str, _value: object) -> None:
         raise SettingsError(Path("settings.json"), "no space left on device")
 
-    monkeypatch.setattr(world.settings, "set", refuse)
+    monkeypatch.setattr(world.settings, "set_value", refuse)
     sheet.rows[2].switch.click()
     assert "no space left on device" in states(sheet)[2]
     assert sheet.rows[2].switch.isChecked(), "it is looked at until Studio ends"

@@ -230,7 +230,7 @@ def test_recently_used_commands_are_saved_in_the_settings(
 ) -> None:
     QTest.keyClicks(palette.field, "larger")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
-    assert window.session.settings.get("palette_last", []) == ["command:text.larger"]
+    assert window.session.settings.palette_entries == ("command:text.larger",)
 
 
 def test_results_are_selected_by_keyboard(palette: CommandPalette) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+import json
 
 import pytest
 from PySide6.QtCore import Qt
@@ -138,7 +138,7 @@ DAMAGED: tuple[object, ...] = (
 def test_damaged_layout_falls_back_to_its_default_and_is_logged_in_the_console(
     qtbot, session: Session, theme: Theme, damaged: object
 ) -> None:
-    session.settings.set("layouts", {"developer": damaged, "own:": 3, "own:Old": {"base": "gone"}})
+    session.settings.layouts = {"developer": damaged, "own:": 3, "own:Old": {"base": "gone"}}
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
     window.commands.run("layout.developer")
@@ -150,8 +150,9 @@ def test_damaged_layout_falls_back_to_its_default_and_is_logged_in_the_console(
 
 
 def test_settings_of_the_wrong_type_are_ignored(qtbot, session: Session, theme: Theme) -> None:
-    session.settings.set("layouts", cast("object", "none"))
-    session.settings.set("chosen_layouts", {"developer": 5})
+    stored = {"layouts": "none", "chosen_layouts": {"developer": 5}}
+    session.settings.path.parent.mkdir(exist_ok=True)
+    session.settings.path.write_text(json.dumps(stored))
     window = MainWindow(session, theme, PANELS, [])
     qtbot.addWidget(window)
     window.commands.run("layout.developer")

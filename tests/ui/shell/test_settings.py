@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QWidget
 
-from app.core.messages import snapshots
+from app.core.storage.setting import Setting
 from app.core.storage.settings import RecentFile, Settings
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.dialogs.settings import SettingsSheet
@@ -16,7 +18,7 @@ from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
-from app.ui.widgets import ComboBox
+from app.ui.widgets import Button, ComboBox, Segments
 from tests.ui.shell_parts import Answers, robots_in
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -34,17 +36,37 @@ def sheet(qtbot, window: MainWindow, commands: Commands) -> SettingsSheet:
     return made
 
 
-def press(segments, value: str) -> None:
+def press(sheet: SettingsSheet, setting: Setting[Any], value: str) -> None:
+    segments = sheet.rows[setting].control
+    assert isinstance(segments, Segments)
     QTest.mouseClick(segments._segments[value], Qt.MouseButton.LeftButton)
+
+
+def chosen(sheet: SettingsSheet, setting: Setting[Any]) -> str:
+    control = sheet.rows[setting].control
+    assert isinstance(control, Segments | ComboBox)
+    return control.value
+
+
+def restart_notice(sheet: SettingsSheet) -> QWidget:
+    notice = sheet.rows[Settings.language].notice
+    assert notice is not None
+    return notice
+
+
+def shown_text(sheet: SettingsSheet, setting: Setting[Any]) -> str:
+    display = sheet.rows[setting].display
+    assert display is not None
+    return display.text()
 
 
 def test_appearance_settings_apply_immediately_and_are_saved(
     sheet: SettingsSheet, window: MainWindow, home: Path
 ) -> None:
-    press(sheet.mode, "dark")
-    press(sheet.text, "150")
-    press(sheet.contrast, "on")
-    press(sheet.motion, "off")
+    press(sheet, Settings.theme, "dark")
+    press(sheet, Settings.text_percent, "150")
+    press(sheet, Settings.contrast, "on")
+    press(sheet, Settings.motion, "off")
     theme = window.theme
     assert (theme.is_dark, theme.text_percent) == (True, 150)
     assert (theme.is_high_contrast, theme.is_motion_reduced) == (True, False)
@@ -61,8 +83,12 @@ def test_changes_made_in_menus_are_shown_in_the_settings_sheet(
     commands.run("theme.dark")
     commands.run("text.larger")
     commands.run("theme.contrast")
-    assert (sheet.mode.value, sheet.text.value, sheet.contrast.value) == ("dark", "125", "on")
-    press(sheet.contrast, "off")
+    assert (
+        chosen(sheet, Settings.theme),
+        chosen(sheet, Settings.text_percent),
+        chosen(sheet, Settings.contrast),
+    ) == ("dark", "125", "on")
+    press(sheet, Settings.contrast, "off")
     assert not commands.actions["theme.contrast"].isChecked()
 
 
@@ -70,17 +96,19 @@ def test_snapshot_folder_is_saved(
     sheet: SettingsSheet, window: MainWindow, answers: Answers, tmp_path: Path
 ) -> None:
     settings = window.session.settings
-    before = snapshots.folder(settings)
-    assert sheet.folder.text() == str(before)
+    before = settings.pictures_folder
+    assert shown_text(sheet, Settings.pictures_folder) == str(before)
     answers.path = tmp_path
-    sheet.choose.click()
+    button = sheet.rows[Settings.pictures_folder].control
+    assert isinstance(button, Button)
+    button.click()
     assert answers.asked == [f"folder {before}"]
-    assert snapshots.folder(settings) == tmp_path
-    assert sheet.folder.text() == str(tmp_path)
+    assert settings.pictures_folder == tmp_path
+    assert shown_text(sheet, Settings.pictures_folder) == str(tmp_path)
 
 
 def test_settings_link_to_the_keyboard_shortcuts(sheet: SettingsSheet, window: MainWindow) -> None:
-    QTest.mouseClick(sheet.shortcuts, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(sheet.rows[Settings.shortcuts].control, Qt.MouseButton.LeftButton)
     assert not sheet.isVisible()
     shown = window.findChild(ShortcutSheet)
     assert shown is not None
@@ -88,12 +116,12 @@ def test_settings_link_to_the_keyboard_shortcuts(sheet: SettingsSheet, window: M
 
 
 def test_legacy_reduced_motion_setting_is_migrated(home: Path, theme: Theme) -> None:
-    settings = Settings(home)
-    settings.set("less_motion", True)
-    WindowState(settings, lambda _sentence: None).apply_theme(theme)
+    home.mkdir()
+    (home / "settings.json").write_text('{"less_motion": true}')
+    WindowState(Settings(home), lambda _sentence: None).apply_theme(theme)
     assert theme.is_motion_reduced
-    settings.set("less_motion", "nonsense")
-    WindowState(settings, lambda _sentence: None).apply_theme(theme)
+    (home / "settings.json").write_text('{"less_motion": "nonsense"}')
+    WindowState(Settings(home), lambda _sentence: None).apply_theme(theme)
     assert theme.motion == "system"
 
 
@@ -127,16 +155,16 @@ def test_failed_settings_write_is_reported_once_until_a_write_succeeds(tmp_path:
     told: list[str] = []
     state = WindowState(Settings(tmp_path / "home"), told.append)
     for number in range(3):
-        state.save(f"key{number}", number)
+        state.save(Settings.text_percent, 110 + number)
     assert len(told) == 1
     (tmp_path / "home").unlink()
-    state.save("key", 1)
+    state.save(Settings.text_percent, 120)
     assert len(told) == 1
     for file in (tmp_path / "home").iterdir():
         file.unlink()
     (tmp_path / "home").rmdir()
     (tmp_path / "home").write_text("no folder")
-    state.save("key", 2)
+    state.save(Settings.text_percent, 130)
     assert len(told) == 2
 
 
@@ -148,14 +176,14 @@ def test_language_is_saved_for_the_next_start(
     commands.run("settings.open")
     sheet = window.findChild(SettingsSheet)
     assert sheet is not None
-    assert sheet.language.value == "en"
-    assert not sheet.restart_hint.isVisible()
-    press(sheet.language, "es")
-    assert sheet.restart_hint.isVisible()
-    assert not sheet.restart.isVisible(), "a window of its own keeps no tabs"
-    assert Settings(home).get("language", "") == "es"
-    press(sheet.language, "en")
-    assert not sheet.restart_hint.isVisible()
+    assert chosen(sheet, Settings.language) == "en"
+    assert not restart_notice(sheet).isVisible()
+    press(sheet, Settings.language, "es")
+    assert restart_notice(sheet).isVisible()
+    assert isinstance(restart_notice(sheet), QLabel), "a window of its own keeps no tabs"
+    assert Settings(home).language == "es"
+    press(sheet, Settings.language, "en")
+    assert not restart_notice(sheet).isVisible()
 
 
 def test_many_languages_are_shown_in_a_drop_down_list(
@@ -167,14 +195,14 @@ def test_many_languages_are_shown_in_a_drop_down_list(
     commands.run("settings.open")
     sheet = window.findChild(SettingsSheet)
     assert sheet is not None
-    language = sheet.language
+    language = sheet.rows[Settings.language].control
     assert isinstance(language, ComboBox)
     assert [language.itemText(at) for at in range(language.count())] == [name for _code, name in names]
     assert language.value == "en"
     assert sheet.initial_focus() is language
     QTest.keyClick(language, Qt.Key.Key_Down)
-    assert Settings(home).get("language", "") == "es"
-    assert sheet.restart_hint.isVisible()
+    assert Settings(home).language == "es"
+    assert restart_notice(sheet).isVisible()
 
 
 def test_settings_show_whether_the_robot_voice_is_available(
@@ -187,11 +215,11 @@ def test_settings_show_whether_the_robot_voice_is_available(
         def stop(self) -> None:
             """Do nothing, as there is no voice to stop."""
 
-    assert sheet.voice.text()
+    assert shown_text(sheet, Settings.is_robot_sound_on)
     sheet.dismiss()
     window.session.voices.speaker = Silent()
     commands.run("settings.open")
-    assert sheet.voice.text().startswith("This computer has no voice for French. ")
+    assert shown_text(sheet, Settings.is_robot_sound_on).startswith("This computer has no voice for French. ")
 
 
 def test_language_change_offers_a_restart_that_waits_until_robots_stop(
@@ -203,17 +231,18 @@ def test_language_change_offers_a_restart_that_waits_until_robots_stop(
     commands.run("settings.open")
     sheet = window.findChild(SettingsSheet)
     assert sheet is not None
-    assert not sheet.restart.isVisible()
-    press(sheet.language, "es")
-    assert sheet.restart.isVisible()
-    assert not sheet.restart_hint.isVisible()
+    assert not restart_notice(sheet).isVisible()
+    press(sheet, Settings.language, "es")
+    assert restart_notice(sheet).isVisible()
+    restart = restart_notice(sheet)
+    assert isinstance(restart, Button)
     robots = window.session.fleet._links
     robots["Robot 1"] = robots_in("busy").fleet.links[0]
-    sheet.restart.click()
+    restart.click()
     assert window.isVisible()
     assert not window.wants_restart
     robots.clear()
-    sheet.restart.click()
+    restart.click()
     assert window.wants_restart
     assert not window.isVisible()
-    assert Settings(window.session.settings.path.parent).get("language", "") == "es"
+    assert Settings(window.session.settings.path.parent).language == "es"

@@ -140,7 +140,7 @@ def test_a_single_shortcut_or_all_shortcuts_can_be_reset(keys: Shortcuts, tmp_pa
     assert keys.shortcuts_of("file.new") == ("Ctrl+S",)
     keys.reset_all()
     assert keys.shortcuts_of("file.save") == ("Ctrl+S",)
-    assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}
+    assert Settings(tmp_path).shortcuts == {}
 
 
 def test_stop_keeps_f12_and_may_have_a_second_shortcut(keys: Shortcuts) -> None:
@@ -157,7 +157,7 @@ def test_stop_keeps_f12_and_may_have_a_second_shortcut(keys: Shortcuts) -> None:
 
 def test_default_second_shortcut_of_stop_yields_to_a_user_assignment(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
-    settings.set("shortcuts", {"run.step": ["Ctrl+."]})
+    settings.shortcuts = {"run.step": ["Ctrl+."]}
     keys = Shortcuts(settings, print, COMMANDS)
     assert keys.shortcuts_of("run.stop") == ("F12",)
     assert keys.command_for("Ctrl+.") == "run.step"
@@ -169,7 +169,7 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
     tmp_path: Path, qapp: object
 ) -> None:
     settings = Settings(tmp_path)
-    settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
+    settings.shortcuts = {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7}
     keys = Shortcuts(settings, lambda _sentence: None, COMMANDS)
     assert keys.shortcuts_of("run.run") == ()
     assert keys.shortcuts_of("run.stop") == ("F12",)

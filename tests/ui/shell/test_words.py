@@ -13,7 +13,6 @@ from PySide6.QtWidgets import QMenu, QWidget
 from app import resources
 from app.core.alerts.alerts import Alerts
 from app.core.alerts.intents import ShowAlarms
-from app.core.messages import snapshots
 from app.core.network.remote_access import RemoteAccess
 from app.core.robots.motion.permission import MotionPermission
 from app.core.run.view import RunState, RunView, view_of
@@ -179,7 +178,7 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
 
 def test_all_texts_of_the_window_are_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     found: set[str] = set()
-    paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
+    paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(whole.session.settings.pictures_folder))
     languages = [name for _code, name in i18n.selectable_languages()]  # each in its own language
     system = f"{platform.system()} {platform.release()} ({platform.machine()})"
 

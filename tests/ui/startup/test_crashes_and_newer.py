@@ -75,11 +75,11 @@ def test_no_alert_is_raised_without_data_of_a_newer_studio(session: Session) -> 
 
 
 def test_versions_are_recorded_with_the_time_of_their_first_start(window: MainWindow, home: Path) -> None:
-    window.state.save(studio_versions.SETTING_KEY, [{"version": "0.0.9", "since_s": 1000.0}])
+    window.state.save(Settings.studio_versions, [{"version": "0.0.9", "since_s": 1000.0}])
     save_version(window, 2000.0)
     save_version(window, 3000.0)
     told = [("0.0.9", 1000.0), (__version__, 2000.0)]
-    assert studio_versions.known_versions(Settings(home).all()) == told
+    assert studio_versions.known_versions(Settings(home).studio_versions) == told
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

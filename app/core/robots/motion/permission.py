@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.blocks.model.program import Program
-from app.core.storage.settings import ListSettings
+from app.core.storage.settings import Settings
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
 from nep.i18n import _, format_list, ngettext, pgettext
 from nep.programs.robots.moving import RIZE_COMMAND_TOPIC
 
-SETTING_KEY = "robots.may_move"
 MAX_NAMED_ACTIONS = 4
 
 
@@ -86,7 +85,7 @@ class MotionPermission:
 
     def __init__(
         self,
-        settings: ListSettings | None = None,
+        settings: Settings | None = None,
         identity_of: Callable[[str], Identity | None] = lambda _name: None,
     ) -> None:
         # `settings` store the *always* permissions; `identity_of` returns a robot's program.
@@ -159,10 +158,8 @@ class MotionPermission:
         self.allowed_unknown_robots |= set(question.unknown_robots)
         try:
             if is_permanent and self._settings is not None:
-                self._settings.set(
-                    SETTING_KEY,
-                    sorted({*self._always_allowed(), *(key for _program_key, key in self._question_keys)}),
-                )
+                keys = {*self._always_allowed(), *(key for _program_key, key in self._question_keys)}
+                self._settings.motion_permissions = tuple(sorted(keys))
         finally:
             question.on_allow()
 
@@ -182,7 +179,7 @@ class MotionPermission:
         self.allowed_unknown_robots = frozenset()
         self.revision += 1
         if self._settings is not None:
-            self._settings.set(SETTING_KEY, [])
+            self._settings.motion_permissions = ()
 
     def _key(self, robot: Robot) -> str:
         # Key of *always*: another program that announces this name doesn't match.
@@ -196,8 +193,8 @@ class MotionPermission:
         identity = self._identity_of(robot.name)
         return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
 
-    def _always_allowed(self) -> list[str]:
-        return self._settings.get(SETTING_KEY, []) if self._settings is not None else []
+    def _always_allowed(self) -> Sequence[str]:
+        return self._settings.motion_permissions if self._settings is not None else ()
 
 
 def _unknown_robot_label(name: str) -> str:

@@ -147,9 +147,8 @@ class Shortcuts(QObject):
         self._custom_shortcuts = self._read()
 
     def _read(self) -> dict[str, tuple[str, ...]]:
-        saved: dict[str, object] = self._settings.get("shortcuts", {})
         shortcuts: dict[str, tuple[str, ...]] = {}
-        for name, keys in saved.items():
+        for name, keys in self._settings.shortcuts.items():
             if name in self.commands and isinstance(keys, list):
                 valid_keys = tuple(
                     normalize_key(key) for key in keys if isinstance(key, str) and normalize_key(key)
@@ -275,9 +274,7 @@ class Shortcuts(QObject):
         for name in [name for name in self._custom_shortcuts if not self.is_customised(name)]:
             del self._custom_shortcuts[name]
         try:
-            self._settings.set(
-                "shortcuts", {name: list(keys) for name, keys in self._custom_shortcuts.items()}
-            )
+            self._settings.shortcuts = {name: list(keys) for name, keys in self._custom_shortcuts.items()}
         except SettingsError as error:
             self._report_error(str(error))
         self.changed.emit()

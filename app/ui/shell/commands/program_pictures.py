@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 from app.core.projects.open_project import OpenProject
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.settings import closed_tabs_folder
+from app.core.storage.folders import closed_tabs_folder
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, lazy

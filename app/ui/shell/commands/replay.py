@@ -8,18 +8,15 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QUrl
 
 from app.core.session import Session
+from app.core.storage.folders import default_recordings_folder
 from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from app.core.recording import folder
     from app.core.recording.replay.replay import Replay
-else:
-    folder = lazy_module("app.core.recording.folder")
 
 TIMELINE_PANEL = "timeline"
 
@@ -33,7 +30,7 @@ class ReplayCommands:
     def ask_open(self) -> None:
         """Ask for a recording and open it."""
         replay = self._session.replay
-        start_folder = replay.path.parent if replay is not None else folder.default_folder()
+        start_folder = replay.path.parent if replay is not None else default_recordings_folder()
         self._dialogs.open_recording(str(start_folder), self.open)
 
     def open(self, path: Path) -> None:

@@ -68,7 +68,9 @@ class ReportCommands:
                 shell.theme, shell.surface, self._dialogs, shell.show_toast, self._clock
             )
         parts = problem_report.ReportParts(
-            qt_info(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
+            qt_info(shell.surface),
+            session.settings.stored_values(),
+            lambda: session.doctor.report(DOCTOR_TIMEOUT_S),
         )
         documents = session.documents
         names = [documents.title(each) for each in documents if not each.is_blank]

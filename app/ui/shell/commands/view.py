@@ -19,6 +19,7 @@ from app.core.faults import log_folder
 from app.core.recording.topic_choice import file_stem
 from app.core.session import Session
 from app.core.storage.atomic_file import read_regular_file, write_atomically
+from app.core.storage.settings import Mode, Preference, Settings
 from app.ui.other_programs import open_externally
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
@@ -31,8 +32,6 @@ from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.hint_ring import HintRing
 from app.ui.shell.projects import ProjectController
 from app.ui.speaker import has_voice_engine, voice_text
-from app.ui.theme.system import Preference
-from app.ui.theme.theme import Mode
 from app.ui.widgets.file_dialogs import LAYOUT_FILTER, FileKind
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.errors import NepError
@@ -148,9 +147,10 @@ class ViewCommands:
             self._palette = command_palette.CommandPalette(
                 shell.theme, shell.surface, self._entries.all, self.run_entry, self._rebind
             )
-            saved_ids: list[object] = self._session.settings.get("palette_last", [])
-            self._palette.last_used_ids = [id for id in saved_ids if isinstance(id, str)]
-            self._palette.on_last_used_changed = lambda ids: shell.state.save("palette_last", list(ids))
+            self._palette.last_used_ids = list(self._session.settings.palette_entries)
+            self._palette.on_last_used_changed = lambda ids: shell.state.save(
+                Settings.palette_entries, tuple(ids)
+            )
         self._palette.open()
 
     def run_entry(self, entry: Entry) -> None:
@@ -259,10 +259,10 @@ class ViewCommands:
                 shell.state,
                 self._session.settings,
                 self._files.dialogs,
-                self._voice_text,
+                notes={Settings.is_robot_sound_on: self._voice_text},
+                editors={Settings.shortcuts: self.open_shortcuts},
                 restart=self._restart if shell.can_restart else None,
             )
-            self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
         self._settings_sheet.open()
 
     def _restart(self) -> None:
@@ -431,23 +431,19 @@ class ViewCommands:
 
     def set_theme(self, mode: Mode) -> None:
         """Set and save the theme mode: "light", "dark" or "system"."""
-        self._shell.theme.set_mode(mode)
-        self._shell.state.save_theme(self._shell.theme)
+        self._shell.state.save(Settings.theme, mode)
 
     def update_motion(self) -> None:
         """Set and save reduced motion according to the check mark of its action."""
-        self._shell.theme.set_motion(_preference(self._actions["theme.motion"]))
-        self._shell.state.save_theme(self._shell.theme)
+        self._shell.state.save(Settings.motion, _preference(self._actions["theme.motion"]))
 
     def update_contrast(self) -> None:
         """Set and save high contrast according to the check mark of its action."""
-        self._shell.theme.set_contrast(_preference(self._actions["theme.contrast"]))
-        self._shell.state.save_theme(self._shell.theme)
+        self._shell.state.save(Settings.contrast, _preference(self._actions["theme.contrast"]))
 
     def set_text_size(self, percent: int) -> None:
         """Set and save the text size in percent."""
-        self._shell.theme.set_text_percent(percent)
-        self._shell.state.save_theme(self._shell.theme)
+        self._shell.state.save(Settings.text_percent, percent)
 
     def show_first_steps(self) -> None:
         """Show the panel with the first steps next to the blocks."""

@@ -1,41 +1,61 @@
-"""Sheet with the settings of Studio."""
+"""Sheet with the settings of Studio, made from their descriptions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from app.core.messages import snapshots
-from app.core.robots.last_robots import RESTART_SETTING
+from app.core.storage.setting import (
+    ChoiceSetting,
+    FlagSetting,
+    FolderSetting,
+    NumberSetting,
+    Setting,
+    SheetRow,
+)
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.window_state import WindowState
-from app.ui.theme.system import PREFERENCES
-from app.ui.theme.theme import MODES, Theme
+from app.ui.text import plain
+from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, ElidedLabel, Segments, Switch, label
 from app.ui.widgets.file_dialogs import FileDialogs
-from nep import i18n
-from nep.i18n import _, lazy, pgettext
+from app.ui.widgets.inputs.fields import NumberEdit
+from nep.i18n import _
 
 WIDTH = 620
-MODE_LABELS = {
-    "light": (lazy("Light"), "sun"),
-    "dark": (lazy("Dark"), "moon"),
-    "system": (lazy("Match system"), "monitor"),
-}
-PREFERENCE_LABELS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
-TEXT_SIZES = ("100", "125", "150", "175", "200")
 MAX_SEGMENTS = 3
-"""Maximum number of languages in a segmented control; for more, a combo box is used."""
+"""Maximum number of options of a choice in a segmented control; for more, a combo box is used."""
+
+
+@dataclass(frozen=True, slots=True)
+class SettingControls:
+    """Controls of a setting in the sheet.
+
+    Attributes:
+        control: Control with which the user changes the setting.
+        content: Control, or layout of the control and other parts.
+        show: Shows the current value.
+        display: Label with the current value, or None if the control shows it.
+        notice: Button or hint for a restart that a changed value needs, or None.
+    """
+
+    control: QWidget
+    content: QWidget | QHBoxLayout
+    show: Callable[[], object]
+    display: QLabel | None = None
+    notice: QWidget | None = None
 
 
 class SettingsSheet(Overlay):
-    """Sheet with the settings of Studio.
+    """Sheet with all settings that have a row (`Setting.row`).
 
-    Changes are applied and saved immediately, except for the language, which requires a restart.
+    Changes are applied and saved immediately, except for settings that take effect after a restart.
     """
 
     top = 72
@@ -47,56 +67,132 @@ class SettingsSheet(Overlay):
         state: WindowState,
         settings: Settings,
         dialogs: FileDialogs,
-        get_voice_text: Callable[[], str],
         *,
+        notes: Mapping[Setting[Any], Callable[[], str]],
+        editors: Mapping[Setting[Any], Callable[[], object]],
         restart: Callable[[], object] | None = None,
     ) -> None:
-        # `get_voice_text` describes the speech output and is called whenever the sheet opens. `restart`
-        # restarts Studio and reopens all documents; None if that is impossible.
+        # `notes` return the texts of settings that are changed elsewhere, `editors` open sheets of their own.
+        # `restart` restarts Studio and reopens all documents; None if that is impossible.
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._dialogs = state, settings, dialogs
-        self._get_voice_text = get_voice_text
-        self.language = self._language_input()
-        self.restart_hint = label(_("Applies after restarting Studio"), "body", role="textSecondary")
-        self.restart = Button(theme, _("Restart now"), "rotate-ccw", size="form")
-        self._can_restart = restart is not None
-        if restart is not None:
-            self.restart.clicked.connect(restart)
-        modes = [(mode, _(MODE_LABELS[mode][0]), MODE_LABELS[mode][1]) for mode in MODES]
-        mode_name = pgettext("colours of the window", "Appearance")
-        self.mode = Segments(theme, modes, check=True, size="form", name=mode_name)
-        self.text = Segments(
-            theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
-        )
-        preferences = [(preference, _(PREFERENCE_LABELS[preference]), None) for preference in PREFERENCES]
-        self.contrast = Segments(theme, preferences, check=True, size="form", name=_("High contrast"))
-        self.motion = Segments(theme, preferences, check=True, size="form", name=_("Reduce motion"))
-        self.robots = Switch(theme, _("Reopen at startup"))
-        self.voice = label("", "body", role="textSecondary", wrap=True)
-        self.shortcuts = Button(theme, _("Change shortcuts"), "keyboard", size="form")
-        self.folder = ElidedLabel("bodyLarge", "textSecondary")
-        self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
-        self.mode.changed.connect(self._set_mode)
-        self.text.changed.connect(lambda percent: self._apply(lambda: theme.set_text_percent(int(percent))))
-        self.contrast.changed.connect(self._set_contrast)
-        self.motion.changed.connect(self._set_motion)
-        self.robots.clicked.connect(lambda on: state.save(RESTART_SETTING, on))
-        self.choose.clicked.connect(self._ask_folder)
+        self._notes, self._editors, self._restart = notes, editors, restart
+        self.rows = {
+            setting: self._create_controls(setting, setting.row)
+            for setting in settings.described()
+            if setting.row is not None
+        }
+        """Controls of each setting in the sheet, in order."""
         self._lay_out()
+        for setting in self.rows:
+            settings.on_change(setting, lambda _value: self._show())
         theme.changed.connect(self._show)
 
-    def _language_input(self) -> Segments | ComboBox:
-        offered = i18n.selectable_languages()
-        if len(offered) > MAX_SEGMENTS:
-            choice = ComboBox(self.theme, offered, name=_("Language"))
-            choice.activated.connect(lambda _index: self._set_language(choice.value))
-            return choice
-        segments = Segments(
-            self.theme, [(code, name, None) for code, name in offered],
-            check=True, size="form", name=_("Language"),
-        )  # fmt: skip
-        segments.changed.connect(self._set_language)
-        return segments
+    def _create_controls(self, setting: Setting[Any], row: SheetRow) -> SettingControls:
+        if setting in self._editors:
+            controls = self._create_editor_button(row, self._editors[setting])
+        elif setting in self._notes:
+            controls = self._create_note(self._notes[setting])
+        elif isinstance(setting, FlagSetting):
+            controls = self._create_switch(setting, row)
+        elif isinstance(setting, NumberSetting):
+            controls = self._create_number(setting, row)
+        elif isinstance(setting, ChoiceSetting):
+            controls = self._create_choice(setting, row)
+        elif isinstance(setting, FolderSetting):
+            controls = self._create_folder_chooser(setting)
+        else:
+            raise TypeError(f"no control for the setting {setting.key!r}")
+        if row.explanation:
+            controls.control.setToolTip(plain.tip(_(row.explanation)))
+            controls.control.setAccessibleDescription(_(row.explanation))
+        return controls
+
+    def _create_editor_button(self, row: SheetRow, open_editor: Callable[[], object]) -> SettingControls:
+        button = Button(self.theme, _(row.label), row.icon, size="form")
+        button.clicked.connect(open_editor)
+        return SettingControls(button, button, lambda: None)
+
+    def _create_note(self, text: Callable[[], str]) -> SettingControls:
+        note = label("", "body", role="textSecondary", wrap=True)
+        content = QHBoxLayout()
+        content.addWidget(note, 1)
+        return SettingControls(note, content, lambda: note.setText(text()), note)
+
+    def _create_switch(self, setting: FlagSetting, row: SheetRow) -> SettingControls:
+        switch = Switch(self.theme, _(row.label))
+        switch.clicked.connect(lambda is_on: self._state.save(setting, is_on))
+        return SettingControls(switch, switch, lambda: switch.setChecked(self._settings.value(setting)))
+
+    def _create_number(self, setting: NumberSetting, row: SheetRow) -> SettingControls:
+        if setting.choices:
+            options = [(str(each), f"{each} {setting.unit}".rstrip(), None) for each in setting.choices]
+            segments = self._create_segments(options, row)
+            segments.changed.connect(lambda number: self._state.save(setting, int(number)))
+            return SettingControls(
+                segments, segments, lambda: segments.set_value(str(self._settings.value(setting)))
+            )
+        field = NumberEdit(self.theme, setting.minimum, setting.maximum, setting.unit)
+        field.setAccessibleName(_(row.title))
+        field.number_entered.connect(lambda number: self._state.save(setting, round(number)))
+        return SettingControls(field, field, lambda: field.show_number(self._settings.value(setting)))
+
+    def _create_choice(self, setting: ChoiceSetting[Any], row: SheetRow) -> SettingControls:
+        options = [(option.value, option.label, option.icon) for option in setting.options()]
+        control: Segments | ComboBox
+        if len(options) > MAX_SEGMENTS:
+            box = control = ComboBox(
+                self.theme, [(value, text) for value, text, _icon in options], name=_(row.title)
+            )
+            box.activated.connect(lambda _index: self._state.save(setting, box.value))
+        else:
+            control = self._create_segments(options, row)
+            control.changed.connect(lambda value: self._state.save(setting, value))
+        if setting.active is None:
+            return SettingControls(control, control, lambda: control.set_value(self._settings.value(setting)))
+        return self._add_restart(setting, setting.active, control)
+
+    def _add_restart(
+        self, setting: ChoiceSetting[Any], active: Callable[[], str], control: Segments | ComboBox
+    ) -> SettingControls:
+        # Beside the control: the button or hint that a changed value needs a restart.
+        notice: QWidget
+        if self._restart is not None:
+            notice = Button(self.theme, _("Restart now"), "rotate-ccw", size="form")
+            notice.clicked.connect(self._restart)
+        else:
+            notice = label(_("Applies after restarting Studio"), "body", role="textSecondary")
+        content = QHBoxLayout()
+        content.addWidget(control)
+        content.addWidget(notice)
+        content.addStretch(1)
+
+        def show() -> None:
+            selected = self._settings.value(setting)
+            if all(option.value != selected for option in setting.options()):
+                selected = active()
+            control.set_value(selected)
+            notice.setVisible(selected != active())
+
+        return SettingControls(control, content, show, notice=notice)
+
+    def _create_segments(self, options: Sequence[tuple[str, str, str | None]], row: SheetRow) -> Segments:
+        return Segments(self.theme, options, check=True, size="form", name=_(row.title))
+
+    def _create_folder_chooser(self, setting: FolderSetting) -> SettingControls:
+        display = ElidedLabel("bodyLarge", "textSecondary")
+        button = Button(self.theme, _("Choose a folder"), "folder-open", size="form")
+
+        def save(folder: Path) -> None:
+            self._state.save(setting, folder)
+
+        button.clicked.connect(lambda: self._dialogs.select_folder(str(self._settings.value(setting)), save))
+        content = QHBoxLayout()
+        content.addWidget(display, 1)
+        content.addWidget(button)
+        return SettingControls(
+            button, content, lambda: display.setText(str(self._settings.value(setting))), display
+        )
 
     def _lay_out(self) -> None:
         header = self.create_header(label(_("Settings"), "heading"))
@@ -120,39 +216,20 @@ class SettingsSheet(Overlay):
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(12)
         grid.setColumnStretch(1, 1)
-        folder_row = QHBoxLayout()
-        folder_row.addWidget(self.folder, 1)
-        folder_row.addWidget(self.choose)
-        language_row = QHBoxLayout()
-        language_row.addWidget(self.language)
-        language_row.addWidget(self.restart_hint)
-        language_row.addWidget(self.restart)
-        language_row.addStretch(1)
-        voice_row = QHBoxLayout()
-        voice_row.addWidget(self.voice, 1)
-        rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
-            (_("Language"), language_row),
-            (pgettext("colours of the window", "Appearance"), self.mode),
-            (_("Text size"), self.text),
-            (_("High contrast"), self.contrast),
-            (_("Reduce motion"), self.motion),
-            (_("Virtual robots"), self.robots),
-            (_("Robot voice"), voice_row),
-            (_("Keyboard"), self.shortcuts),
-            (_("Images"), folder_row),
-        )
-        for row, (text, control) in enumerate(rows):
-            caption = label(text, "bodyLarge", role="textSecondary")
-            grid.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignVCenter)
-            if isinstance(control, QWidget):
-                grid.addWidget(control, row, 1, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        for index, (setting, controls) in enumerate(self.rows.items()):
+            title = _(setting.row.title) if setting.row is not None else ""
+            caption = label(title, "bodyLarge", role="textSecondary")
+            grid.addWidget(caption, index, 0, Qt.AlignmentFlag.AlignVCenter)
+            content = controls.content
+            if isinstance(content, QWidget):
+                alignment = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+                grid.addWidget(content, index, 1, alignment)
             else:
-                grid.addLayout(control, row, 1)
+                grid.addLayout(content, index, 1)
 
     def initial_focus(self) -> QWidget:
-        if isinstance(self.language, ComboBox):
-            return self.language
-        return self.language.selected_button() or self
+        first = next(iter(self.rows.values())).control
+        return (first.selected_button() or self) if isinstance(first, Segments) else first
 
     def preferred_size(self, room: QSize) -> QSize:
         content_size = self._content.sizeHint()
@@ -162,56 +239,11 @@ class SettingsSheet(Overlay):
 
     def open(self) -> None:
         """Update the sheet to the current settings and open it."""
-        self.voice.setText(self._get_voice_text())
         self._show()
         super().open()
 
     def _show(self) -> None:
-        theme = self.theme
-        language = self._selected_language()
-        self.language.set_value(language)
-        is_changed = language != i18n.language()
-        self.restart_hint.setVisible(is_changed and not self._can_restart)
-        self.restart.setVisible(is_changed and self._can_restart)
-        self.mode.set_value(theme.mode)
-        self.text.set_value(str(theme.text_percent))
-        self.contrast.set_value(theme.contrast)
-        self.motion.set_value(theme.motion)
-        self.robots.setChecked(self._settings.get(RESTART_SETTING, True))
-        self.folder.setText(str(snapshots.folder(self._settings)))
+        for controls in self.rows.values():
+            controls.show()
         if self.isVisible():
             self.place()
-
-    def _apply(self, change: Callable[[], object]) -> None:
-        change()
-        self._state.save_theme(self.theme)
-
-    def _selected_language(self) -> str:
-        # The language that was chosen here if it is available, else the current one.
-        language = self._settings.get("language", "")
-        return language if language in dict(i18n.selectable_languages()) else i18n.language()
-
-    def _set_language(self, language: str) -> None:
-        self._state.save("language", language)
-        self._show()
-
-    def _set_mode(self, selected: str) -> None:
-        mode = next(mode for mode in MODES if mode == selected)
-        self._apply(lambda: self.theme.set_mode(mode))
-
-    def _set_contrast(self, selected: str) -> None:
-        preference = next(preference for preference in PREFERENCES if preference == selected)
-        self._apply(lambda: self.theme.set_contrast(preference))
-
-    def _set_motion(self, selected: str) -> None:
-        preference = next(preference for preference in PREFERENCES if preference == selected)
-        self._apply(lambda: self.theme.set_motion(preference))
-
-    def _ask_folder(self) -> None:
-        before = str(snapshots.folder(self._settings))
-        self._dialogs.select_folder(before, self.save_folder)
-
-    def save_folder(self, folder: Path) -> None:
-        """Set and save the folder for images."""
-        self._state.save(snapshots.FOLDER_SETTING, str(folder))
-        self._show()

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.core.storage.settings import RecentFile, Settings, home
+from app.core.storage.folders import home
+from app.core.storage.settings import RecentFile, Settings
 from app.ui.shell.dialogs.file_sheet import FileQuestion, FileSheet, FolderLocation, known_locations
 from app.ui.theme.theme import Theme
 from app.ui.widgets.file_dialogs import LAYOUT_FILTER, FileKind, pictures_folder

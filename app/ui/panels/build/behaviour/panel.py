@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from app.core.run.control import Runs
 
 LIVE_UPDATE_TICKS = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
-PINNED_SETTING = "toolbox_pinned"
 ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
 LOADING_TEXT = lazy("Loading blocks…")
 LOADING_TEXT_DELAY_S = 0.5
@@ -269,8 +268,7 @@ class BehaviourPanel(PanelWidget):
         )
         backpack = Backpack(self.session.settings.path.parent)
         self._backpack = BackpackController(self.context, backpack, editor)
-        pinned: object = self.session.settings.get(PINNED_SETTING, None)
-        editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
+        editor.set_toolbox_pinned(self.session.settings.toolbox_pinned)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.is_dark)
         if isinstance(editor, QWidget):
             had_focus = self.hasFocus()
@@ -334,7 +332,7 @@ class BehaviourPanel(PanelWidget):
     def _save_pinned(self, is_pinned: bool) -> None:
         # Failed writes are shown by the status bar.
         with suppress(SettingsError):
-            self.session.settings.set(PINNED_SETTING, is_pinned)
+            self.session.settings.toolbox_pinned = is_pinned
 
     def _blocks_deleted(self, editor: Editor, count: int) -> None:
         message = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)

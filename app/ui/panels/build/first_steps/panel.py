@@ -28,7 +28,6 @@ from app.ui.widgets.labels import set_role
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, pgettext
 
-PROGRESS_SETTING = "first_steps"
 HINT_DELAY_S = 20.0
 MARK_SIZE = 22
 ALL_DONE_TEXT = lazy("First steps done")
@@ -145,9 +144,8 @@ class FirstStepsPanel(PanelWidget):
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(context, _("First steps"))
         self._clock = clock
-        saved: object = self.session.settings.get(PROGRESS_SETTING, [])
-        step_ids = {step.id for step in STEPS}
-        self.completed_ids: frozenset[str] = frozenset(saved if isinstance(saved, list) else ()) & step_ids
+        step_ids = frozenset(step.id for step in STEPS)
+        self.completed_ids: frozenset[str] = step_ids.intersection(self.session.settings.completed_steps)
         self._step_start: tuple[str, float] | None = None
         self._highlighted_step = ""
         self._last_activity: object = None
@@ -247,9 +245,10 @@ class FirstStepsPanel(PanelWidget):
             button.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _save_progress(self) -> None:
-        completed = [step.id for step in STEPS if step.id in self.completed_ids]
         try:
-            self.session.settings.set(PROGRESS_SETTING, completed)
+            self.session.settings.completed_steps = tuple(
+                step.id for step in STEPS if step.id in self.completed_ids
+            )
         except SettingsError as error:
             self.session.console.add("warn", "studio", str(error))
 

@@ -17,10 +17,10 @@ from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripPreview, read_preview
 from app.core.recording.folder import FolderScan, RecordingFolder, RecordingInfo, read_picture
 from app.core.recording.opener import RecordingOpener
-from app.core.recording.recordings import FOLDER_KEY
 from app.core.recording.topic_choice import file_stem
 from app.core.recording.topic_choice import free_path as free
 from app.core.storage.background_worker import BackgroundWorker
+from app.core.storage.settings import Settings
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Density, Panel, PanelContext
 from app.ui.panels.record.recordings.columns import THUMBNAIL_SIZE, columns, crop_to_thumbnail
@@ -183,7 +183,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
 
     def update_empty_state(self) -> None:
         folder = self._recordings.folder
-        is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
+        is_own = self.session.settings.is_stored(Settings.recordings_folder)
         if not self._has_scanned:
             text = _("Recordings in this folder appear here in a moment.")
             self.empty.set_texts(_("Reading the folder"), text, "folder-open")

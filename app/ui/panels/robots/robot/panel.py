@@ -213,7 +213,8 @@ class RobotPanel(OneRobotPanel):
     def _toggle_sound(self) -> None:
         # Speech bubbles are shown even if speech is off.
         with suppress(SettingsError):
-            self.session.voices.set_on(on=not self.session.voices.is_on)
+            settings = self.session.settings
+            settings.is_robot_sound_on = not settings.is_robot_sound_on
         self._update_sound_button()
 
     def _update_sound_button(self) -> None:

@@ -11,7 +11,6 @@ from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResiz
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.alerts.intents import ShowConsole
-from app.core.messages import snapshots
 from app.core.messages.image_style import PLAIN, PictureStyle, parse_style
 from app.core.networks.networks import topic_label
 from app.ui.other_programs import open_externally
@@ -106,7 +105,7 @@ class ImagePanel(PanelWidget):
         self._sequence_action.triggered.connect(self.save_sequence)
         self._separator = QAction(self)
         self._separator.setSeparator(True)
-        self.job = SnapshotJob(self, lambda: snapshots.folder(self.session.settings))
+        self.job = SnapshotJob(self, lambda: self.session.settings.pictures_folder)
         self.job.saved.connect(self._on_saved)
         self.job.copied.connect(self._on_copied)
         self.job.failed.connect(self._on_failed)

@@ -13,6 +13,7 @@ from PySide6.QtGui import QImage
 
 from app.core.messages import snapshots
 from app.core.messages.picture import encode_png
+from app.core.storage.folders import default_pictures_folder
 from nep.errors import NepError
 from nep.i18n import _
 
@@ -42,7 +43,7 @@ class SnapshotJob(QObject):
     copied = Signal(QImage)
     failed = Signal(str)  # error message
 
-    def __init__(self, parent: QObject, folder: Callable[[], Path] = snapshots.folder) -> None:
+    def __init__(self, parent: QObject, folder: Callable[[], Path] = default_pictures_folder) -> None:
         super().__init__(parent)
         self._folder = folder
         self._thread: threading.Thread | None = None
