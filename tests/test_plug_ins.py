@@ -14,14 +14,25 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.toolbox.catalogue import english_categories
+from app.blocks.compiler.program_names import reserved_names
+from app.blocks.model.program import Program
+from app.blocks.toolbox.catalogue import Catalogue, english_categories, function_modules
 from app.blocks.toolbox.definitions import editor_definitions
+from app.blocks.toolbox.help import help_of
 from app.robots.description.description import parse, thing_description
 from app.robots.kit import Driver
 from nep.masters.master import Master
 from nep.system.plugins import discover
+from tests.blocks import samples
+from tests.blocks.fakes import Play
+from tests.blocks.samples import block, started, workspace
 
 Write = Callable[[str, str, str], ModuleType]
+
+
+def forget_categories() -> None:
+    english_categories.cache_clear()
+    function_modules.cache_clear()
 
 
 @pytest.fixture
@@ -34,7 +45,7 @@ def write(tmp_path: Path) -> Iterator[Write]:
         home = importlib.import_module(package)
         home.__path__.append(str(tmp_path))
         added.append((home, f"{package}.{name}"))
-        english_categories.cache_clear()
+        forget_categories()
         return importlib.import_module(f"{package}.{name}")
 
     yield write_one
@@ -42,7 +53,7 @@ def write(tmp_path: Path) -> Iterator[Write]:
         home.__path__.remove(str(tmp_path))
         sys.modules.pop(module, None)
         delattr(home, module.rpartition(".")[2])
-    english_categories.cache_clear()
+    forget_categories()
 
 
 def test_back_end_plug_in_is_discovered(write: Write) -> None:
@@ -88,6 +99,66 @@ def test_category_plug_in_is_in_the_toolbox_and_its_block_compiles(write: Write)
     program = compile_behaviour({"blocks": {"languageVersion": 0, "blocks": [started]}}, [])
     assert "write('hello')" in program.source
     assert not program.problems
+
+
+MOON = """
+import math
+
+from app.blocks.model.block import Block
+from app.blocks.model.category import Category
+from app.blocks.model.fields import ValueInput
+from app.blocks.runtime.errors import BehaviourError
+from app.blocks.runtime.values import number
+
+
+def weight_on_moon(kilograms: object) -> float:
+    mass = number(kilograms, "weight")
+    if mass < 0:
+        raise BehaviourError("Nothing weighs less than 0 kg.")
+    return round(mass / 6, 2)
+
+
+CATEGORY = Category(
+    name="moon", title="Moon", style="values", icon="moon", order=99, functions=(weight_on_moon,),
+    blocks=(
+        Block(
+            type="moon_weight", text="weight on the moon of %KG kg", shape="value", style="values",
+            icon="moon", tooltip="What something weighs on the moon.",
+            example="For example: 60 kg weigh 10 kg.",
+            check="Number", arguments=(ValueInput("KG", "Number", 60),), python="weight_on_moon(%KG)",
+        ),
+    ),
+)
+"""
+
+
+def moon_program(kilograms: float) -> Program:
+    return compile_behaviour(
+        workspace(started(samples.write(block("moon_weight", KG=samples.number(kilograms))))), []
+    )
+
+
+def test_block_with_a_function_in_one_file_is_offered_compiled_and_run(write: Write) -> None:
+    module = write("app.blocks.categories", "moon", MOON)
+    definitions = editor_definitions([])
+    assert "weight on the moon of" in json.dumps(definitions["blocks"])
+    assert '"moon_weight"' in json.dumps(definitions["toolbox"])
+    assert help_of(Catalogue([]).blocks["moon_weight"])["example"] == "For example: 60 kg weigh 10 kg."
+    program = moon_program(90.0)
+    assert not program.problems
+    assert f"from {module.__name__} import weight_on_moon" in program.source
+    run = Play(program).start()
+    run.end()
+    assert (run.lines, run.runtime.error) == (["15"], None)
+    refused = Play(moon_program(-1.0)).start()
+    refused.end()
+    assert refused.runtime.error is not None
+    assert refused.runtime.error.sentence == "Nothing weighs less than 0 kg."
+
+
+def test_variable_cannot_have_the_name_of_a_function_of_a_category(write: Write) -> None:
+    write("app.blocks.categories", "moon", MOON)
+    assert "weight_on_moon" in reserved_names()
 
 
 def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, master: Master) -> None:

@@ -37,7 +37,7 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
     # imported here because builds compile catalogues with only the build requirements installed
     from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
     from app.blocks.toolbox.catalogue import english_categories, is_translatable  # noqa: PLC0415
-    from app.blocks.toolbox.help import EXAMPLES, english_slot_name  # noqa: PLC0415
+    from app.blocks.toolbox.help import english_slot_name  # noqa: PLC0415
 
     file_by_text: dict[tuple[str | None, str], str] = {}
     for category in english_categories():
@@ -54,8 +54,6 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
                 say("gap", english_slot_name(argument))
     for title in GROUPS:
         file_by_text.setdefault(("category", title), "app/blocks/categories/robot.py")
-    for example in EXAMPLES.values():
-        file_by_text.setdefault((None, example), "app/blocks/toolbox/help.py")
     for (context, english), file in file_by_text.items():
         yield context, english, file
 

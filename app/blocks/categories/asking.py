@@ -25,6 +25,7 @@ CATEGORY = Category(
             help="The typed text is stored in “answer”. Press Enter to answer; Esc leaves the answer "
             "empty. The question isn't spoken: use “say” of a robot for that. The other scripts continue; "
             "their questions are asked afterwards.",
+            example="For example: ask “What is your name?” and wait, then say join “Hello ” and answer.",
             python="ask(%QUESTION)",
             arguments=(ValueInput("QUESTION", None, "What is your name?"),),
             search_words="input, prompt, question, type, person, read, keyboard, user, form",
@@ -40,6 +41,7 @@ CATEGORY = Category(
             help="The choice is stored in “answer”. Choose with the arrow keys and Enter, or with the "
             "keys 1 to 9; Esc leaves the answer empty. The two buttons add and remove a choice; you can also "
             "insert another list. A question can have up to 12 choices.",
+            example="For example: ask “Which animal is this?” with choices “cat”, “dog” and “cow”.",
             python="ask_with_choices(%QUESTION, %CHOICES)",
             arguments=(
                 ValueInput("QUESTION", None, "Do you want to play?"),
@@ -57,6 +59,7 @@ CATEGORY = Category(
             tooltip="The answer to the last question, as typed or chosen.",
             help="If a number was typed, you can calculate with it. Before the first question, the "
             "answer is empty.",
+            example="For example: if “answer is 7”, say “Right!”.",
             python="answer()",
             can_fail=False,
             search_words="input, reply, response, typed, user",

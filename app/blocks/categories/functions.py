@@ -33,6 +33,7 @@ CATEGORY = Category(
             help="The new block appears in this category. The buttons add an input and remove the last "
             "one. To rename the function or an input, click its name; the blocks that use it are updated. "
             "A function can call itself, up to 200 levels deep.",
+            example="For example: to greet with “name”: say join “Hello ” and “name”.",
             python="",
             arguments=(_NAME, _INPUTS, _BODY),
             mutator="function",
@@ -45,6 +46,7 @@ CATEGORY = Category(
             icon="square-function",
             tooltip="Creates your own value block, which calculates a result.",
             help="For example, “double” with the input “number” returns number × 2.",  # noqa: RUF001
+            example="For example: to double with “number”: return number × 2.",  # noqa: RUF001
             python="",
             arguments=(TextField("NAME", "my result"), _INPUTS, _BODY, ValueInput("RESULT")),
             mutator="function",
@@ -57,6 +59,7 @@ CATEGORY = Category(
             icon="corner-down-left",
             tooltip="Ends the function with this result if the condition is true.",
             help="Works only inside a function that returns a result.",
+            example="For example: if number is below 2, return 1.",
             python="if %CONDITION:\n    return %VALUE",
             arguments=(ValueInput("CONDITION", "Boolean"), ValueInput("VALUE")),
             needs_function="result",
@@ -69,6 +72,7 @@ CATEGORY = Category(
             tooltip="Ends the function if the condition is true; the script continues after the block "
             "that called it.",
             help="Works only inside a function without a result.",
+            example="For example: if “greeted” is true, leave the function.",
             python="if %CONDITION:\n    return",
             arguments=(ValueInput("CONDITION", "Boolean"),),
             needs_function="plain",
@@ -79,6 +83,7 @@ CATEGORY = Category(
             "%INPUTS",
             icon="square-function",
             tooltip="Runs your function.",
+            example="For example: greet “Ada”.",
             python="",
             arguments=(_INPUTS,),
             mutator="call",
@@ -90,6 +95,7 @@ CATEGORY = Category(
             "%INPUTS",
             icon="square-function",
             tooltip="Runs your function and returns its result.",
+            example="For example: say double 21.",
             python="",
             arguments=(_INPUTS,),
             mutator="call",
@@ -101,6 +107,7 @@ CATEGORY = Category(
             "%INPUT",
             icon="",
             tooltip="The value of this input of the function.",
+            example="For example: say “name” inside the function “greet”.",
             python="%INPUT",
             arguments=(InputField("INPUT"),),
             can_fail=False,

@@ -54,6 +54,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="",
         tooltip="A number.",
+        example="For example: 2, 0.5 or −10.",  # noqa: RUF001
         python="%NUMBER",
         arguments=(NumberField("NUMBER", 0),),
         check="Number",
@@ -67,6 +68,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="",
         tooltip="Calculates with two numbers.",
+        example="For example: set “steps” to steps + 1.",
         python=_ARITHMETIC,
         arguments=(*_OPERANDS, ChoiceField("SIGN", _OPERATORS)),
         variant="SIGN",
@@ -83,6 +85,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="dices",
         tooltip="A random number; a whole number if both limits are whole.",
+        example="For example: turn by a random number from 10 to 90.",
         python="random_number(%LOW, %HIGH)",
         arguments=(ValueInput("LOW", "Number", 1), ValueInput("HIGH", "Number", 6)),
         check="Number",
@@ -95,6 +98,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="",
         tooltip="Rounds to a whole number; “round” rounds halves up.",
+        example="For example: round 2.5 gives 3, round down 2.5 gives 2.",
         python={
             "round": "rounded(%NUMBER)",
             "up": "rounded_up(%NUMBER)",
@@ -119,6 +123,7 @@ _FURTHER_BLOCKS = (
         help="sin, cos and tan take an angle in degrees; asin, acos and atan return an angle in degrees. "
         "“log” is the base-10 logarithm, “ln” the natural logarithm. The absolute value of −5 is 5; "  # noqa: RUF001
         "the sign is 1, 0 or −1.",  # noqa: RUF001
+        example="For example: square root of 9 gives 3, sin of 90 gives 1.",
         python={value: python for _words, value, python in _FUNCTIONS},
         arguments=(
             ChoiceField("FUNCTION", tuple((words, value) for words, value, _python in _FUNCTIONS)),
@@ -135,6 +140,7 @@ _FURTHER_BLOCKS = (
         icon="decimals-arrow-left",
         tooltip="Rounds to a number of decimal places; halves are rounded up.",
         help="With 0 places, the result is a whole number; with −1, it is rounded to tens.",  # noqa: RUF001
+        example="For example: round 3.14159 to 2 decimal places gives 3.14.",
         python="rounded_to(%NUMBER, %PLACES)",
         arguments=(ValueInput("NUMBER", "Number", 3.14159), ValueInput("PLACES", "Number", 2)),
         search_words="digits, decimals, precision, places",
@@ -144,6 +150,7 @@ _FURTHER_BLOCKS = (
         "%WHICH of %A and %B",
         icon="scale",
         tooltip="The smaller or the larger of two numbers.",
+        example="For example: set “points” to larger of “points” and 0, so that it is never negative.",
         python={"smaller": "smaller(%A, %B)", "larger": "larger(%A, %B)"},
         arguments=(
             ChoiceField("WHICH", (("smaller", "smaller"), ("larger", "larger"))),
@@ -160,6 +167,7 @@ _FURTHER_BLOCKS = (
         tooltip="Keeps a number between two limits, both included.",
         help="Useful for a speed or an angle: the number that the robot receives is never outside its "
         "limits.",
+        example="For example: limit 120 to between 0 and 100 gives 100.",
         python="limited(%NUMBER, %LOW, %HIGH)",
         arguments=(
             ValueInput("NUMBER", "Number", 120),
@@ -174,6 +182,7 @@ _FURTHER_BLOCKS = (
         icon="scaling",
         tooltip="Scales a number from one range to another.",
         help="A number outside the first range is also outside the second; use “limit” to prevent that.",
+        example="For example: map 50 from 0 – 100 to 0 – 1 gives 0.5.",  # noqa: RUF001
         python="mapped(%NUMBER, %LOW, %HIGH, %NEW_LOW, %NEW_HIGH)",
         arguments=(
             ValueInput("NUMBER", "Number", 50),
@@ -190,6 +199,7 @@ _FURTHER_BLOCKS = (
         icon="pi",
         tooltip="A mathematical constant.",
         help="π is the circumference of a circle divided by its diameter.",
+        example="For example: the circumference of a wheel is its diameter × π.",  # noqa: RUF001
         python={"pi": "3.141592653589793", "e": "2.718281828459045", "golden": "1.618033988749895"},
         arguments=(
             ChoiceField("CONSTANT", (("π (3.1416)", "pi"), ("e (2.7183)", "e"), ("φ (1.618)", "golden"))),
@@ -204,6 +214,7 @@ _FURTHER_BLOCKS = (
         icon="binary",
         tooltip="Checks if a number is even, odd, whole, positive or negative.",
         help="0 is even, and neither positive nor negative.",
+        example="For example: if “round is even”, turn left; else turn right.",
         python={
             "even": "is_even(%NUMBER)",
             "odd": "is_odd(%NUMBER)",
@@ -232,6 +243,7 @@ _FURTHER_BLOCKS = (
         "%NUMBER is divisible by %BY",
         icon="divide",
         tooltip="True if the division leaves no remainder.",
+        example="For example: if “points is divisible by 10”, play a sound.",
         python="is_divisible(%NUMBER, %BY)",
         arguments=(ValueInput("NUMBER", "Number", 12), ValueInput("BY", "Number", 3)),
         search_words="multiple, remainder, modulo, divided",

@@ -38,6 +38,7 @@ CATEGORY = Category(
             icon="timer",
             tooltip="Seconds since the run started or the timer was reset.",
             help="The timer stops while the behaviour is paused.",
+            example="For example: when timer is above 60, say “The minute is over”.",
             python="timer()",
             check="Number",
             search_words="stopwatch, seconds, since, time, elapsed, chronometer, clock",
@@ -49,6 +50,7 @@ CATEGORY = Category(
             style="values",
             icon="timer-reset",
             tooltip="Resets the timer to 0; it starts counting again immediately.",
+            example="For example: reset timer, wait for a touch, say timer.",
             python="reset_timer()",
             search_words="stopwatch, start, zero, seconds, restart, clear, chronometer",
         ),
@@ -59,6 +61,7 @@ CATEGORY = Category(
             tooltip="The date and time of this computer.",
             help="The day of the week is 1 for Monday. “date” has the format 2026-11-23, “time” the "
             "format 14:30.",
+            example="For example: if “hour now” is below 12, say “Good morning”.",
             python="now(%PART)",
             arguments=(ChoiceField("PART", _DATE_PARTS),),
             can_fail=False,
@@ -71,6 +74,7 @@ CATEGORY = Category(
             tooltip="Seconds since a time or date; negative if it is in the future.",
             help="Write a time as 14:30, a date as 2026-11-23, or both separated by a space. To measure "
             "how long something takes, first set a variable to “date and time now”.",
+            example="For example: if seconds since 14:30 is above 0, say “The lesson is over”.",
             python="seconds_since(%MOMENT)",
             arguments=(ValueInput("MOMENT", None, "14:30"),),
             check="Number",

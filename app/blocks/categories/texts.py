@@ -20,6 +20,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="",
         tooltip="A letter, word or line of text.",
+        example="For example: “Touch my head”.",
         python="%TEXT",
         arguments=(TextField("TEXT", "Hello"),),
         check="String",
@@ -33,6 +34,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="link",
         tooltip="Joins two texts; numbers are converted to text.",
+        example="For example: say join “Hello ” and the name that was heard.",
         python="join(%A, %B)",
         arguments=(ValueInput("A", None, "Hello "), ValueInput("B", None, "Pepper")),
         check="String",
@@ -46,6 +48,7 @@ _BASIC_BLOCKS = (
         style="values",
         icon="ruler",
         tooltip="Number of characters in a text, or of items in a list.",
+        example="For example: length of “Hello” gives 5.",
         python="length(%TEXT)",
         arguments=(ValueInput("TEXT", None, "Hello"),),
         check="Number",
@@ -61,6 +64,7 @@ _PART_BLOCKS = (
         tooltip="One letter of a text; the first is number 1.",
         help="If there is no such letter, the behaviour stops with an error. An emoji such as 👍 counts "
         "as one letter.",
+        example="For example: first letter of “Ada” gives “A”.",
         python={
             "number": "letter(%TEXT, %NUMBER)",
             "first": "letter(%TEXT, 'first')",
@@ -89,6 +93,7 @@ _PART_BLOCKS = (
         icon="scissors",
         tooltip="Part of a text, from one letter to another.",
         help="Positions beyond the end are ignored: letters 4 to 99 of “Hello” are “lo”.",
+        example="For example: letters 7 to 9 of “Hello Ada” gives “Ada”.",
         python="part_of_text(%TEXT, %FIRST, %LAST)",
         arguments=(
             ValueInput("FIRST", "Number", 1),
@@ -103,6 +108,7 @@ _PART_BLOCKS = (
         icon="text-search",
         tooltip="Position of the first occurrence of these characters in the text; 0 if the text doesn't "
         "contain them.",
+        example="For example: position of “l” in “Hello” gives 3.",
         python="position_in_text(%TEXT, %PIECE)",
         arguments=(ValueInput("PIECE", None, "l"), ValueInput("TEXT", None, "Hello")),
         search_words="index, find, where, search, place",
@@ -112,6 +118,7 @@ _PART_BLOCKS = (
         "%TEXT %CHANGE",
         icon="case-upper",
         tooltip="The text in capital letters, in small letters, without spaces around it, or backwards.",
+        example="For example: “Hello” in capital letters gives “HELLO”.",
         python={
             "capitals": "in_capitals(%TEXT)",
             "small": "in_small_letters(%TEXT)",
@@ -140,6 +147,7 @@ _PART_BLOCKS = (
         icon="replace",
         tooltip="Replaces all occurrences of some characters in a text.",
         help="If the second slot is empty, the characters are removed.",
+        example="For example: replace “Ada” with “Leo” in “Hello Ada” gives “Hello Leo”.",
         python="replaced(%TEXT, %OLD, %NEW)",
         arguments=(
             ValueInput("OLD", None, "Ada"),
@@ -155,6 +163,7 @@ _PART_BLOCKS = (
         tooltip="The first number in a text.",
         help="“I am 12 years old” gives 12. If there is no number, the behaviour stops with an error; "
         "check with “has a number” first.",
+        example="For example: repeat “number in answer” times.",
         python="number_in(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
         search_words="convert, parse, to number, int, value",
@@ -168,6 +177,7 @@ _CONDITION_BLOCKS = (
         icon="text-search",
         tooltip="Checks if a text contains, starts with or ends with these characters.",
         help="Capital and small letters are treated as different.",
+        example="For example: if “answer” contains “dance”, dance.",
         python={
             "contains": "has_in_it(%TEXT, %PIECE)",
             "starts": "starts_with(%TEXT, %PIECE)",
@@ -187,6 +197,7 @@ _CONDITION_BLOCKS = (
         icon="equal",
         tooltip="True if both texts are the same; capital letters and spaces at the ends are ignored.",
         help="Useful for answers that people type or say: “Yes”, “yes” and “YES ” count as the same.",
+        example="For example: if “answer” is “yes”, ignoring capitals, say “Great!”.",
         python="same_words(%A, %B)",
         arguments=(ValueInput("A", None, "Yes"), ValueInput("B", None, "yes")),
         search_words="equals, equal, same, compare, case, insensitive, uppercase",
@@ -196,6 +207,7 @@ _CONDITION_BLOCKS = (
         "%TEXT is empty",
         icon="circle-dashed",
         tooltip="True if the text is empty or contains only spaces.",
+        example="For example: if “answer” is empty, ask again.",
         python="is_empty(%TEXT)",
         arguments=(ValueInput("TEXT", None, ""),),
         search_words="nothing, blank, none, no text",
@@ -205,6 +217,7 @@ _CONDITION_BLOCKS = (
         "%TEXT has a number",
         icon="binary",
         tooltip="True if the text contains a number.",
+        example="For example: repeat until “answer” has a number: ask again.",
         python="has_number(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
         search_words="is a number, numeric, digit, check number",

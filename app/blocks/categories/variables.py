@@ -22,6 +22,7 @@ CATEGORY = Category(
             style="variables",
             icon="variable",
             tooltip="Sets the variable to this value. All scripts share the variable.",
+            example="For example: set “count” to 0 when started.",
             python="%VAR = %VALUE",
             arguments=(VariableField("VAR"), ValueInput("VALUE", None, 0)),
             search_words="variable, assign, store, save, put!, remember, initialize, let, make, equals, =",
@@ -33,6 +34,7 @@ CATEGORY = Category(
             style="variables",
             icon="diff",
             tooltip="Adds this number to the variable.",
+            example="For example: change “count” by 1 each time the head is touched.",
             python="%VAR += %BY",
             arguments=(VariableField("VAR"), ValueInput("BY", "Number", 1)),
             search_words="variable, increase, decrease, add!, sum!, increment, decrement, count up, "
@@ -46,6 +48,7 @@ CATEGORY = Category(
             style="variables",
             icon="variable",
             tooltip="The value of the variable.",
+            example="For example: say “count”.",
             python="%VAR",
             arguments=(VariableField("VAR"),),
             can_fail=False,

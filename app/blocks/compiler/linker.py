@@ -17,6 +17,7 @@ from app.blocks.compiler.render import render_source
 from app.blocks.compiler.unused_names import NameUsage
 from app.blocks.model.program import Problem, Program, Variable
 from app.blocks.model.template import literal, statements
+from app.blocks.toolbox.catalogue import function_modules
 from nep.system.syntax import parse_module
 
 
@@ -103,7 +104,8 @@ def _join_sources(
     linked_pages: Sequence[_LinkedPage], variables: Iterable[str], name: str
 ) -> tuple[str, dict[int, str]]:
     commands = {command for linked in linked_pages for command in linked.page.commands}
-    source, _lines = render_source([*_import_statements(commands), *_assignments(variables)], {})
+    imports = [*_command_imports(commands), *_category_imports(commands)]
+    source, _lines = render_source([*imports, *_assignments(variables)], {})
     lines: dict[int, str] = {}
     separator = "\n"
     for linked in linked_pages:
@@ -118,13 +120,28 @@ def _join_sources(
 
 
 def _join_runnables(linked_pages: Sequence[_LinkedPage], variables: Iterable[str]) -> str:
+    commands = {command for linked in linked_pages for command in linked.page.commands}
+    imports = "".join(f"{ast.unparse(each)}\n" for each in _category_imports(commands))
     assignments = "".join(f"{name} = 0\n" for name in variables)
-    parts = [assignments, *(linked.runnable for linked in linked_pages)]
+    parts = [imports, assignments, *(linked.runnable for linked in linked_pages)]
     return "\n".join(part for part in parts if part) or "\n"
 
 
-def _import_statements(commands: Iterable[str]) -> list[ast.stmt]:
-    return statements(f"from app.blocks.commands import {', '.join(sorted({*commands, 'run'}))}", {})
+def _command_imports(commands: Iterable[str]) -> list[ast.stmt]:
+    names = sorted({*commands, "run"} - function_modules().keys())
+    return statements(f"from app.blocks.commands import {', '.join(names)}", {})
+
+
+def _category_imports(commands: Iterable[str]) -> list[ast.stmt]:
+    names_by_module: dict[str, list[str]] = {}
+    for name in sorted(commands):
+        if module := function_modules().get(name):
+            names_by_module.setdefault(module, []).append(name)
+    return [
+        statement
+        for module, names in sorted(names_by_module.items())
+        for statement in statements(f"from {module} import {', '.join(names)}", {})
+    ]
 
 
 def _assignments(variables: Iterable[str]) -> list[ast.stmt]:

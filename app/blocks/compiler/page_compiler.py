@@ -11,7 +11,7 @@ from app.blocks.compiler.compiled_page import CompiledPage, UsedResources
 from app.blocks.compiler.conflicts import ConflictFinder
 from app.blocks.compiler.lowering import END_BLOCK, Function, Lowering, ModuleFunction, ModuleKey
 from app.blocks.compiler.problems import ProblemCollector
-from app.blocks.compiler.program_names import COMMANDS, PageNames
+from app.blocks.compiler.program_names import PageNames, callable_names
 from app.blocks.compiler.render import render_instrumented, render_source
 from app.blocks.compiler.unused_names import NameUsage
 from app.blocks.model.block import Block
@@ -463,4 +463,4 @@ def _first_argument_text(node: ast.expr) -> str | None:
 
 def _called_commands(body: Sequence[ast.stmt]) -> frozenset[str]:
     nodes = (node for statement in body for node in ast.walk(statement))
-    return frozenset(node.id for node in nodes if isinstance(node, ast.Name)) & COMMANDS
+    return frozenset(node.id for node in nodes if isinstance(node, ast.Name)) & callable_names()

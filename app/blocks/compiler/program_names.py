@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.blocks.model.names import PythonNames
 from app.blocks.runtime.pure import calculation, clock, lists, texts
+from app.blocks.toolbox.catalogue import function_modules
 
 COMMANDS = frozenset(
     {
@@ -16,12 +17,21 @@ COMMANDS = frozenset(
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
-"""Names of the functions that a program can call (`app.blocks.commands`); variables can't have such names."""
-
-RESERVED_NAMES = COMMANDS | {"step", "value", "number", "called", "message", "_"}
+"""Names of the functions in `app.blocks.commands` that a program can call."""
+_OTHER_NAMES = frozenset({"step", "value", "number", "called", "message", "_"})
 
 SharedKey = tuple[str, str]
 """Kind ("variable" or "function") and id of something that several pages can use."""
+
+
+def callable_names() -> frozenset[str]:
+    """Return the names of all functions that a program can call, including those of categories."""
+    return COMMANDS | function_modules().keys()
+
+
+def reserved_names() -> frozenset[str]:
+    """Return the names that variables and functions of the user can't have."""
+    return callable_names() | _OTHER_NAMES
 
 
 @dataclass(frozen=True)
@@ -49,7 +59,7 @@ class PageNames:
     """
 
     def __init__(self) -> None:
-        self._names = PythonNames(RESERVED_NAMES)
+        self._names = PythonNames(reserved_names())
         self.requests: list[NameRequest] = []
 
     def new_name(self, text: str, fallback: str, shared_key: SharedKey | None = None) -> str:
@@ -69,7 +79,7 @@ class ProgramNames:
     """Generator of the names in a program. The names of its first page are those in the page."""
 
     def __init__(self) -> None:
-        self._names = PythonNames(RESERVED_NAMES)
+        self._names = PythonNames(reserved_names())
         self._shared_names: dict[SharedKey, str] = {}
 
     def names_of(self, requests: tuple[NameRequest, ...]) -> dict[str, str]:

@@ -72,7 +72,8 @@ class Block:
     undefined_message: str = ""  # why it can't run: the function is undefined
     is_in_toolbox: bool = True
     slot_texts: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
-    help: str = ""  # longer description than the tooltip, with an example
+    help: str = ""  # longer description than the tooltip
+    example: str = ""  # example in the help, beginning with "For example: "
     search_words: str = ""  # search words separated by commas; those with ! rank first
     english_search_words: str = ""  # English search words, if the language differs
 
@@ -126,6 +127,7 @@ class Block:
             text=translate("block", self.text),
             tooltip=translate(None, self.tooltip),
             help=translate(None, self.help),
+            example=translate(None, self.example),
             arguments=tuple(argument.translated(translate) for argument in self.arguments),
             search_words=search_words,
             english_search_words=""

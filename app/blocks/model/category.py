@@ -40,6 +40,8 @@ class Category:
         button: Text and key of a button above the blocks.
         make_blocks: Returns the blocks of a robot, given its description and the descriptions of all robots.
         make_groups: Returns the groups under the heading of a robot; arguments as for `make_blocks`.
+        functions: Functions of the category's module that the Python of its blocks calls, by their names.
+            They can't wait or use a robot; an error for the user is a `BehaviourError`.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Category:
     headings: Mapping[str, str] = field(default_factory=dict)  # block type -> heading above it
     parent: str = ""  # category that includes these blocks, under their title
     make_groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
+    functions: tuple[Callable[..., object], ...] = ()
 
     def translated(self, translate: Translate) -> Category:
         """Return the category with translated texts; see `Block.translated`."""

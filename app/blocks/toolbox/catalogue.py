@@ -64,6 +64,16 @@ def english_categories() -> tuple[Category, ...]:
     return tuple(sorted(discovered.values(), key=lambda category: (category.order, category.name)))
 
 
+@lru_cache(maxsize=1)
+def function_modules() -> Mapping[str, str]:
+    """Return the modules of the functions that categories define (`Category.functions`), by function name."""
+    return {
+        function.__name__: function.__module__
+        for category in english_categories()
+        for function in category.functions
+    }
+
+
 def is_translatable(english: str) -> bool:
     """Return True if a text on a block contains words to translate; False for "+" or "%A %SIGN %B"."""
     return any(letter.isalpha() for letter in _PLACEHOLDER.sub("", english))
