@@ -30,7 +30,7 @@ from app.blocks.runtime.events import (
     RunnerEvent,
 )
 from app.core.projects.file_format import read_file
-from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, VirtualProcesses
+from app.core.robots.launcher import VirtualProcesses
 from app.core.robots.motion.permission import actions_by_robot, risky_action_titles
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
@@ -139,7 +139,7 @@ def _find_used_robots(
 
 def _with_trusted_virtual(discovered: FoundRobots) -> FoundRobots:
     # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
-    processes = VirtualProcesses(VIRTUAL_ROBOT_MODULES.values())
+    processes = VirtualProcesses()
     robots = (
         replace(
             robot, virtual=robot.virtual and processes.is_started_by_studio(discovered.owners[robot.name])

@@ -33,7 +33,7 @@ LAYERS = (
     ("app.clock", "app.errors", "app.resources", "app"),
     ("nep",),
 )
-PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND"}
+PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND", "FIGURE"}
 QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 NAMED_BY_ROS = {"nep.geometry", "nep.sensor"}
 """Modules whose classes have the names of ROS messages, such as `Header` and `Range`."""

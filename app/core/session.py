@@ -53,7 +53,7 @@ from app.core.reports.own_process import OwnProgram
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import Health
 from app.core.robots.last_robots import LastRobots
-from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES, Launcher, LaunchFailed, VirtualProcesses
+from app.core.robots.launcher import Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.room import SessionRoom
 from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopCompleted
 from app.core.robots.stop.stopper import RobotStopper
@@ -135,7 +135,7 @@ class Session:
 
     def _add_robots(self) -> None:
         live, clock, submit = self.live, self._clock, self.live.source.submit
-        processes = VirtualProcesses(VIRTUAL_ROBOT_MODULES.values(), lambda: self.launcher.process_ids)
+        processes = VirtualProcesses(lambda: self.launcher.process_ids)
         self.fleet = Fleet(live.watches, submit, clock, self.settings, processes)
         self.room = SessionRoom(self.settings, live.watches, submit, clock, self._clock_ns)
         self.voices = RobotVoices(self.settings, self.fleet, live.watch, self.console.add, clock)

@@ -25,6 +25,7 @@ from app.robots.virtual.room import Room
 from app.robots.virtual.sounds import SOUNDS, Notes, SoundName
 from nep.i18n import _, number
 
+VIRTUAL_ROBOT = ("pepper", "Pepper")
 SPEECH, FACE = "Speech", "Face and lights"
 Emotion: TypeAlias = Literal["happy", "surprised", "sad", "angry", "neutral"]
 Side: TypeAlias = Literal["left", "right"]

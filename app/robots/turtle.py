@@ -26,6 +26,7 @@ from app.robots.virtual.simulation import ROBOT_ITSELF, Ticker, is_valid_event, 
 from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 
+VIRTUAL_ROBOT = ("diffdrive", "Turtle")
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
 _STATE_PERIOD_STEPS, _SLOW_PERIOD_STEPS, _BATTERY_PERIOD_STEPS = 2, 6, 60
 _MAX_STEP_S = 0.25

@@ -21,7 +21,8 @@ NO_ROBOT = """
 import sys
 from app.core.robots import launcher
 from app.__main__ import main
-launcher.VIRTUAL_ROBOT_MODULES["pepper"] = "app.robots.nobody"
+from app.robots.virtual_models import VirtualModel
+launcher.virtual_models = lambda: {"pepper": VirtualModel("pepper", "Pepper", "app.robots.nobody")}
 sys.exit(main(sys.argv[1:]))
 """
 NO_WEB = """

@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Protocol
 
-from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
+from app.robots.virtual_models import virtual_models
 
 MAX_ROBOTS = 8
 
@@ -36,7 +36,7 @@ class LastRobots:
         if not self._settings.restarts_robots:
             return
         for name, model in list(self._settings.virtual_robots.items())[:MAX_ROBOTS]:
-            if name and isinstance(model, str) and model in VIRTUAL_ROBOT_MODULES:
+            if name and isinstance(model, str) and model in virtual_models():
                 launcher.start_virtual_robot(name, model)
 
     def save(self, launcher: RobotStarter) -> None:

@@ -19,13 +19,12 @@ from app.core.network.master import MasterStarter
 from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
 from app.core.reports.own_process import module_command
 from app.robots.identity import Identity
+from app.robots.virtual_models import virtual_models
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
 from nep.system.addresses import is_loopback
 
 EXIT_TIMEOUT_S = 2.0
-VIRTUAL_ROBOT_MODULES = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
-"""Name of the module that implements a virtual robot, by model."""
 TAIL_BYTES, TAIL_CHARS = 100_000, 2000
 FIRST_GRAPH_TIMEOUT_S = 3.0
 """Time in seconds that a start request waits for the first graph, which may already contain the robot."""
@@ -214,7 +213,7 @@ class Launcher:
                 return
             log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  open while the process writes
             command = [
-                *module_command(VIRTUAL_ROBOT_MODULES[model]),
+                *module_command(virtual_models()[model].module),
                 "--name",
                 name,
                 "--owner-pid",
@@ -325,8 +324,7 @@ def _read_tail(log: IO[bytes]) -> str:
 class VirtualProcesses:
     """Detection of the processes of virtual robots on this computer, with cached results. Not thread-safe."""
 
-    def __init__(self, modules: Collection[str], started_pids: Callable[[], Collection[int]] = tuple) -> None:
-        self._modules = frozenset(modules)
+    def __init__(self, started_pids: Callable[[], Collection[int]] = tuple) -> None:
         self._started_pids = started_pids
         self._result_cache: dict[Identity, bool] = {}
 
@@ -334,8 +332,8 @@ class VirtualProcesses:
         """Return True if a program is a virtual robot started by a Studio of this user.
 
         This applies to Studio's own process, to its child processes (or a child of one, as in a frozen
-        build), and to processes of the same user on this computer that run a module of
-        `VIRTUAL_ROBOT_MODULES`.
+        build), and to processes of the same user on this computer that run the module of a
+        virtual robot (`virtual_models`).
         """
         if identity.pid is None or identity.host != platform.node():
             return False
@@ -374,4 +372,5 @@ class VirtualProcesses:
 
     def _is_virtual(self, command: list[str]) -> bool:
         # Only the module option counts; later words of the command may be anything.
-        return len(command) > 2 and command[1] in MODULE_FLAGS and command[2] in self._modules
+        modules = (each.module for each in virtual_models().values())
+        return len(command) > 2 and command[1] in MODULE_FLAGS and command[2] in modules

@@ -1,4 +1,4 @@
 """Drawing of virtual robots in their room.
 
-`scene` paints the room with its objects and robots; `pepper` and `turtle` paint the robots.
+`scene` paints the room with its objects and robots; a plug-in for each kind of robot (`figure`) paints it.
 """

@@ -9,11 +9,13 @@ figure is 187 units high.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPath, QPen, QPolygonF
 
+from app.ui.robot_drawing.figure import RobotFigure
 from app.ui.robot_drawing.state import RobotState
 
 HEAD_CENTRE = QPointF(0.0, -152.2)
@@ -339,3 +341,19 @@ def _paint_mouth(p: QPainter, expression: Expression) -> None:
     else:
         p.setBrush(Qt.BrushStyle.NoBrush)
     p.drawPath(mouth)
+
+
+def _touchable_parts(state: RobotState) -> Mapping[str, tuple[QPointF, float]]:
+    hands = {f"{limb.side}_hand": (limb.hand, 11.0) for limb in project_arms(state)}
+    return {**hands, "head": (HEAD_CENTRE, 36.0)}
+
+
+FIGURE = RobotFigure(
+    "pepper",
+    paint_pepper,
+    QRectF(-42, -187, 84, 195),
+    bubble_at=HEAD_CENTRE,
+    body_at=QPointF(0, -50),
+    radius_m=0.27,
+    touchable_parts=_touchable_parts,
+)

@@ -10,13 +10,11 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPixmap
 
 from app.ui.robot_drawing.bubble import paint_bubble
+from app.ui.robot_drawing.figure import RobotFigure, figure_of
 from app.ui.robot_drawing.objects import paint_thing, thing_area
-from app.ui.robot_drawing.pepper import HEAD_CENTRE, paint_pepper, project_arms
 from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_drawing.state import RobotState, Thing
-from app.ui.robot_drawing.turtle import TOP_CENTRE, bumper_side_at, paint_turtle
 
-TURTLE_FIGURE = "turtle"
 OtherRobots: TypeAlias = Sequence[tuple[str, RobotState]]
 
 # Shown before any robot has published its state.
@@ -99,7 +97,7 @@ class RobotDrawing:
         bubbles: list[QRectF] = []
         for figure in figures:
             if figure.state.caption:
-                head_y = TOP_CENTRE.y() if figure.state.figure == TURTLE_FIGURE else HEAD_CENTRE.y()
+                head_y = figure.drawing.bubble_at.y()
                 head = replace(figure.spot, v=figure.spot.v + head_y * figure.spot.scale)
                 bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
                 bubbles.append(bubble)
@@ -120,7 +118,7 @@ class RobotDrawing:
         unit = stage.to_units(point)
         figures = sorted(_figures(stage, state, others), key=lambda figure: -figure.spot.v)
         for figure in figures:
-            part = _part_at(figure.to_own_units(unit), figure.state)
+            part = figure.touchable_part_at(unit)
             if part is not None:
                 return figure.part_name(part)
         for spot, thing in reversed(_placed_things(stage, state)):
@@ -142,7 +140,8 @@ class RobotDrawing:
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            if figure.part_name("body") == part and figure.state.figure == TURTLE_FIGURE:
+            bumper_side_at = figure.drawing.bumper_side_at
+            if figure.part_name("body") == part and bumper_side_at is not None:
                 return bumper_side_at(figure.to_own_units(stage.to_units(point)), figure.state.theta_deg)
         return None
 
@@ -162,14 +161,9 @@ class RobotDrawing:
         """Return the centre of a part (see `part_at`) in px, or None if there is no such part."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            is_turtle = figure.state.figure == TURTLE_FIGURE
-            part_positions = (
-                {} if is_turtle else {f"{limb.side}_hand": limb.hand for limb in project_arms(figure.state)}
-            )
-            part_positions |= (
-                {"body": TOP_CENTRE} if is_turtle else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
-            )
-            for name, position in part_positions.items():
+            parts = figure.drawing.touchable_parts(figure.state)
+            positions = {name: centre for name, (centre, _radius) in parts.items()}
+            for name, position in {**positions, "body": figure.drawing.body_at}.items():
                 if part == figure.part_name(name):
                     unit = QPointF(figure.spot.u, figure.spot.v) + position * figure.spot.scale
                     return stage.origin + unit * stage.scale
@@ -249,12 +243,20 @@ class Figure:
         return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
 
     @property
+    def drawing(self) -> RobotFigure:
+        """Drawing of the robot."""
+        return figure_of(self.state)
+
+    def touchable_part_at(self, unit: QPointF) -> str | None:
+        """Return the touchable part at a point in stage units, or None."""
+        point = self.to_own_units(unit)
+        parts = self.drawing.touchable_parts(self.state).items()
+        return next((name for name, (centre, radius) in parts if _is_near(point, centre, radius)), None)
+
+    @property
     def area(self) -> QRectF:
         """Bounding rectangle in stage units."""
-        bounds = (
-            QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE_FIGURE else QRectF(-42, -62, 84, 78)
-        )
-        scale = self.spot.scale
+        bounds, scale = self.drawing.bounds, self.spot.scale
         return QRectF(
             self.spot.u + bounds.x() * scale,
             self.spot.v + bounds.y() * scale,
@@ -273,7 +275,7 @@ def _paint_figure(p: QPainter, figure: Figure) -> None:
     lift_offset = 9.0 if figure.state.is_lifted else 0.0
     p.translate(figure.spot.u, figure.spot.v - lift_offset)
     p.scale(figure.spot.scale, figure.spot.scale)
-    (paint_turtle if figure.state.figure == TURTLE_FIGURE else paint_pepper)(p, figure.state)
+    figure.drawing.paint(p, figure.state)
     p.restore()
 
 
@@ -288,16 +290,6 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
     painter.setBrush(QColor(92, 88, 170, 46 if not state.is_moving else 78))
     painter.drawEllipse(QPointF(0, 0), 113, 21)
     painter.restore()
-
-
-def _part_at(point: QPointF, state: RobotState) -> str | None:
-    # Only Pepper has parts that can be touched.
-    if state.figure == TURTLE_FIGURE:
-        return None
-    for limb in project_arms(state):
-        if _is_near(point, limb.hand, 11.0):
-            return f"{limb.side}_hand"
-    return "head" if _is_near(point, HEAD_CENTRE, 36.0) else None
 
 
 def _is_near(point: QPointF, centre: QPointF, radius: float) -> bool:

@@ -11,6 +11,7 @@ import math
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPath, QPen, QRadialGradient
 
+from app.ui.robot_drawing.figure import RobotFigure
 from app.ui.robot_drawing.state import RobotState
 
 RADIUS, FLAT = 37.0, 0.36  # radius of the body, and ratio of height to width of a circle on the floor
@@ -187,3 +188,14 @@ def _paint_mast(p: QPainter, heading: float) -> None:
         p.drawEllipse(eye, radius_x * 0.5, 2.5)
         p.setBrush(QColor(255, 255, 255, 220))
         p.drawEllipse(eye + QPointF(-radius_x * 0.25, -1.6), radius_x * 0.22, 1.1)
+
+
+FIGURE = RobotFigure(
+    "turtle",
+    paint_turtle,
+    QRectF(-42, -62, 84, 78),
+    bubble_at=TOP_CENTRE,
+    body_at=TOP_CENTRE,
+    radius_m=0.17,
+    bumper_side_at=bumper_side_at,
+)

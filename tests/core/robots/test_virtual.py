@@ -15,6 +15,7 @@ import psutil
 import pytest
 
 from app.core.network.watches import Watches
+from app.core.robots import launcher
 from app.core.robots.fleet import Fleet
 from app.core.robots.launcher import VirtualProcesses
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
@@ -29,7 +30,7 @@ from tests.blocks.fakes import until
 from tests.core.waiting import tick_until
 
 HERE = platform.node()
-MODULES = ("app.robots.turtle",)
+MODULE = "app.robots.turtle"
 STRANGER = """
 import json, sys
 import nep
@@ -50,41 +51,42 @@ def waits(*more: str) -> subprocess.Popen[bytes]:
 
 @pytest.fixture
 def process() -> Iterator[subprocess.Popen[bytes]]:
-    made = waits("-m", MODULES[0])
+    made = waits("-m", MODULE)
     yield made
     made.kill()
     made.communicate()
 
 
 def test_process_started_by_this_studio_is_recognized(process: subprocess.Popen[bytes]) -> None:
-    known = VirtualProcesses(MODULES, lambda: [process.pid])
+    known = VirtualProcesses(lambda: [process.pid])
     assert known.is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
     assert known.is_started_by_studio(Identity("n", "Turtle", HERE, os.getpid()))
 
 
 def test_process_that_only_mentions_the_module_is_not_recognized(process: subprocess.Popen[bytes]) -> None:
-    assert not VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
+    assert not VirtualProcesses().is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
 
 
 def test_process_on_another_computer_or_unknown_process_is_not_recognized(
     process: subprocess.Popen[bytes],
 ) -> None:
-    known = VirtualProcesses(MODULES, lambda: [process.pid])
+    known = VirtualProcesses(lambda: [process.pid])
     assert not known.is_started_by_studio(Identity("n", "Turtle", "another-computer", process.pid))
     assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, None))
     assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, 2**31 - 1))
     assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, 1))
 
 
-def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(master: Master) -> None:
+def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(
+    master: Master, monkeypatch: pytest.MonkeyPatch
+) -> None:
     command = [sys.executable, "-m", "app.robots.turtle", "--name", "Turtle", "--owner-pid", str(os.getpid())]
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
         until(lambda: bool(psutil.Process(made.pid).cmdline()))  # empty until the process has called exec
-        assert VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
-        assert not VirtualProcesses(("app.robots.simulated",)).is_started_by_studio(
-            Identity("n", "Turtle", HERE, made.pid)
-        )
+        assert VirtualProcesses().is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
+        monkeypatch.setattr(launcher, "virtual_models", dict)
+        assert not VirtualProcesses().is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
     finally:
         made.terminate()
         made.wait(10)
@@ -93,7 +95,7 @@ def test_virtual_robot_started_by_another_studio_of_this_user_is_recognized(mast
 def test_process_end_is_detected_only_on_this_computer(
     process: subprocess.Popen[bytes],
 ) -> None:
-    known = VirtualProcesses(MODULES)
+    known = VirtualProcesses()
     identity = Identity("n", "Turtle", HERE, process.pid)
     assert not known.has_ended(identity)
     process.kill()
@@ -111,9 +113,7 @@ STRANGE = Identity("1", "rover driver", "lab-2", 7)
 @pytest.fixture
 def fleet(tmp_path: Path) -> Fleet:
     watches = Watches(lambda _topic: None, lambda _topic: None)
-    return Fleet(
-        watches, lambda _what, _job: None, settings=Settings(tmp_path), processes=VirtualProcesses(MODULES)
-    )
+    return Fleet(watches, lambda _what, _job: None, settings=Settings(tmp_path), processes=VirtualProcesses())
 
 
 def turtle(*, virtual: bool = True) -> Robot:

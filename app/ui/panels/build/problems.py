@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 from app.blocks.model.program import Problem
 from app.core.projects.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
-from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
+from app.robots.virtual_models import virtual_models
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -200,7 +200,7 @@ class ProblemsPanel(PanelWidget):
             document.project.pages if program.absent else (),  # parsed only if robots are missing
             self._missing_robots(document),
             [link.robot for link in self.session.fleet.connected],
-            VIRTUAL_ROBOT_MODULES,
+            virtual_models(),
             program.absent,
         )
         if editor_alert is not None:

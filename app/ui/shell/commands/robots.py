@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from app.core.robots.launcher import VIRTUAL_ROBOT_MODULES
 from app.core.session import Session
 from app.errors import SettingsError
+from app.robots.virtual_models import VirtualModel, virtual_models
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.projects import ProjectController
 from nep.i18n import _
@@ -79,13 +79,14 @@ class RobotCommands:
         if self._shell.current_layout != "behaviour":  # otherwise the focus stays where it is
             self._shell.show_layout("behaviour")
 
-    def use_virtual_turtle(self) -> None:
-        """Start the virtual Turtle; on the start page, show the Behaviour layout."""
-        self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
+    def use_virtual(self, robot: VirtualModel) -> None:
+        """Start a virtual robot; on the start page, show the Behaviour layout."""
+        self._session.launcher.start_virtual_robot(robot.name, robot.model)
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
         self._shell.show_toast(
-            _("Starting the virtual Turtle"), until=lambda: not self._is_starting("Turtle")
+            _("Starting the virtual {robot}").format(robot=robot.name),
+            until=lambda: not self._is_starting(robot.name),
         )
 
     def _is_starting(self, name: str) -> bool:
@@ -211,4 +212,4 @@ class RobotCommands:
 def _virtual_model(kind: object) -> str | None:
     # None if there is no virtual robot of the model.
     model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
-    return model if model in VIRTUAL_ROBOT_MODULES else None
+    return model if model in virtual_models() else None

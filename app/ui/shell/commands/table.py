@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from app.core.session import Session
+from app.robots.virtual_models import VirtualModel, virtual_models
 from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.acting import ActingCommands
 from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPosition, parse_stack
@@ -31,6 +32,8 @@ from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
+OWN_MODELS = frozenset({"pepper", "diffdrive"})
+"""Models of the virtual robots that have a row in the table."""
 APPEARANCE_MENU, RECORD_MENU = lazy("Appearance"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 RUN_DISABLED_REASONS = {
@@ -146,6 +149,22 @@ def _smaller_text_disabled_reason(handlers: Handlers) -> str:
 
 
 C = Command[Handlers]
+
+
+def added_robot_commands() -> tuple[Command[Handlers], ...]:
+    """Return the commands that start the virtual robots without a row in the table."""
+
+    def command(robot: VirtualModel) -> Command[Handlers]:
+        text = _("Use the virtual {robot}").format(robot=robot.name)
+        return C(
+            f"robots.virtual.{robot.model}",
+            text,
+            lambda do: do.robots.use_virtual(robot),
+            "Robots",
+            icon="bot",
+        )
+
+    return tuple(command(robot) for robot in virtual_models().values() if robot.model not in OWN_MODELS)
 
 
 def _panel_command(number: int) -> C:
@@ -321,8 +340,9 @@ COMMANDS: tuple[C, ...] = (
       in_shortcuts=False),
     C("robots.virtual", lazy("Use the virtual Pepper"), lambda do: do.robots.use_virtual_pepper(), "Robots",
       icon="bot"),
-    C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.use_virtual_turtle(), "Robots",
-      icon="bot"),
+    C("robots.turtle", lazy("Use the virtual Turtle"),
+      lambda do: do.robots.use_virtual(virtual_models()["diffdrive"]), "Robots", icon="bot"),
+    *added_robot_commands(),
     C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.stop_virtual(), "Robots",
       disabled_reason=_virtual_robot_disabled_reason),
     C("robots.room", lazy("Room in full screen"), lambda do: do.robots.toggle_room_full_screen(), "Robots",

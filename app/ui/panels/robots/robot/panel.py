@@ -21,6 +21,7 @@ from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.robot.large_room import LargeRoom
 from app.ui.panels.robots.robot.room_view import RoomView
 from app.ui.panels.robots.robot.say_bar import SayBar
+from app.ui.robot_drawing.figure import figure_of
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
@@ -63,7 +64,7 @@ def things_of(room: Room) -> tuple[Thing, ...]:
 
 def radius_of(robot: RobotState) -> float:
     """Return the radius of a robot's footprint in m."""
-    return 0.17 if robot.figure == "turtle" else 0.27
+    return figure_of(robot).radius_m
 
 
 class RobotPanel(OneRobotPanel):

@@ -18,7 +18,8 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.robot_drawing.bubble import paint_caption
-from app.ui.robot_drawing.scene import TURTLE_FIGURE, Marks, RobotDrawing
+from app.ui.robot_drawing.figure import figure_of
+from app.ui.robot_drawing.scene import Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -269,7 +270,7 @@ class RoomView(QWidget):
 
     def _has_bumper(self, part: str | None) -> bool:
         robot = self._robot(part)
-        return robot is not None and robot.figure == TURTLE_FIGURE
+        return robot is not None and figure_of(robot).bumper_side_at is not None
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         part = self._part_at(event.position())
