@@ -48,8 +48,10 @@ def virtual_models() -> Mapping[str, VirtualModel]:
 def _read_constant(module: str) -> tuple[str, str] | None:
     # From the compiled code, because frozen builds contain no source.
     spec = find_spec(module)
-    code = spec.loader.get_code(module) if spec is not None and hasattr(spec.loader, "get_code") else None
-    for value, store in pairwise(dis.get_instructions(code) if code is not None else ()):
+    get_code = getattr(spec.loader, "get_code", None) if spec is not None else None
+    if get_code is None:
+        return None
+    for value, store in pairwise(dis.get_instructions(get_code(module))):
         if (value.opname, store.opname, store.argval) == ("LOAD_CONST", "STORE_NAME", CONSTANT):
             model, name = value.argval
             return str(model), str(name)
