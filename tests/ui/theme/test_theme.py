@@ -158,7 +158,7 @@ def test_style_sheet_has_no_object_names_and_no_unfilled_placeholders(theme: The
 
 def test_colours_are_defined_only_in_the_tokens() -> None:
     # Colours of a robot's drawing, lamps and detection boxes are independent of the theme.
-    independent = ("robot_drawing", "pictures/boxes.py", "panels/robots/controls/colour.py")
+    independent = ("robot_drawing", "pictures/boxes.py", "panels/robots/robots/controls/colour.py")
     written = [
         f"{path.relative_to(UI)}: {found}"
         for path in UI.rglob("*.py")
