@@ -28,6 +28,7 @@ import psutil
 from studio_window import Studio, network, percentile, run_for, studio, until
 
 from app.core.session import Session
+from app.intents import Inspect
 from nep.recordings.reader import Recording
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -122,7 +123,7 @@ def hands(opened: Studio) -> Iterator[Callable[[], object]]:
 
     def inspect() -> object:
         live = sorted(topic.name for topic in session.live.topics.existing_topics())
-        return commands.run(f"inspect:{live[next(topics) * 5 % len(live)]}") if live else None
+        return commands.request(Inspect(live[next(topics) * 5 % len(live)])) if live else None
 
     def toggle() -> object:
         name, bench = next(panels), opened.window.bench

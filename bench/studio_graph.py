@@ -24,6 +24,7 @@ from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
 from app.core.network.source import GraphReceived
+from app.ui.intents import OpenPanel
 from app.ui.panels.watch.graph.panel import GraphPanel
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -138,7 +139,7 @@ def opened_graph(opened: Studio) -> GraphPanel:
     """Return the window's Graph panel, disconnected from the master so that only posted graphs are shown."""
     until(lambda: opened.session.live.master.kind == "connected", "the master is there")
     opened.session.live.source.close()  # its empty graphs would mix with the posted graphs
-    opened.commands.run("panel:graph")
+    opened.commands.request(OpenPanel("graph"))
     bench = opened.window.bench
     assert bench is not None
     return cast("GraphPanel", bench.docks["graph"].panel)

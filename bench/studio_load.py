@@ -19,6 +19,8 @@ from contextlib import ExitStack
 
 from studio_window import BARE, Child, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
+from app.intents import Inspect
+
 GUI_BEYOND, LATE_MS, MEMORY_MB, CLOSE_S = 0.10, 10.0, 40.0, 2.0
 PLAIN_HZ = 30
 SETTLE_S = 3.0
@@ -138,7 +140,7 @@ def main() -> int:
             each.answer()
         opened = stack.enter_context(studio(address))
         until(lambda: all(topic in opened.session.live.topics for topic in topics), "the topics are listed")
-        opened.commands.run(f"inspect:{topics[0]}")
+        opened.commands.request(Inspect(topics[0]))
         for topic in topics:
             opened.session.live.watch(topic)
         run_for(3.0)

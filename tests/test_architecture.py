@@ -30,7 +30,7 @@ LAYERS = (
     ("app.core",),
     ("app.blocks",),
     ("app.robots",),
-    ("app.clock", "app.errors", "app.resources", "app"),
+    ("app.clock", "app.errors", "app.intents", "app.resources", "app"),
     ("nep",),
 )
 PLUG_INS = {"PANEL", "CATEGORY", "ROBOT", "BACKEND", "FIGURE"}

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QWidget
 from app.core.session import Session
 from app.ui.application import Options, make_application, make_window
 from app.ui.blockly.view import BlocklyView
+from app.ui.intents import OpenPanel
 from app.ui.self_drive import SelfDrive, Step
 from app.ui.shell.dialogs.guide import IMAGE_PIXEL_RATIO
 from app.ui.shell.main_window import MainWindow
@@ -152,7 +153,7 @@ class GuidePictures(SelfDrive):
         super().__init__(window, folder)
 
     def _plan(self) -> list[Step]:
-        run, window = self._commands.run, self._window
+        run, request, window = self._commands.run, self._commands.request, self._window
         runs = window.session.runs
 
         def is_block_running(id: str) -> Callable[[], bool]:
@@ -171,14 +172,14 @@ class GuidePictures(SelfDrive):
             *self._drag_from_toolbox(),
             Step("resize the window", lambda: window.resize(WHOLE), lambda: True, settle_s=1.0),
             *self._open("Reaction to touch"),
-            Step("open the variables", lambda: run("panel:variables"), lambda: True),
+            Step("open the variables", lambda: request(OpenPanel("variables")), lambda: True),
             Step("watch", lambda: self._editor.edit_variable({"do": "watch", "id": "points"}), lambda: True),
             Step("show values", lambda: run("run.run"), lambda: bool(runs.values), 20, "variables", 3.0),
             *self._stop(),
             *self._open("A careful walk"),
             Step(
                 "show the problems",
-                lambda: run("panel:problems"),
+                lambda: request(OpenPanel("problems")),
                 self._is_page_ready,
                 picture="problems",
                 settle_s=2.5,
@@ -188,7 +189,7 @@ class GuidePictures(SelfDrive):
             Step(
                 "Developer", lambda: run("layout.developer"), lambda: len(window.session.shown.topics) > 3, 20
             ),
-            Step("open the topics", lambda: run("panel:topics"), lambda: True, 20, "developer", 3.0),
+            Step("open the topics", lambda: request(OpenPanel("topics")), lambda: True, 20, "developer", 3.0),
         ]
 
     def _open(self, name: str) -> list[Step]:
@@ -282,10 +283,15 @@ class GuidePictures(SelfDrive):
 
     @property
     def _editor(self) -> BlocklyView:
-        editor = getattr(self._window.editor(), "editor", None)
-        if not isinstance(editor, BlocklyView):
+        editor = self._opened_editor()
+        if editor is None:
             raise TypeError("the editor isn't loaded yet")
         return editor
+
+    def _opened_editor(self) -> BlocklyView | None:
+        dock = self._window.find_dock("behaviour")
+        editor = getattr(dock.panel, "editor", None) if dock is not None else None
+        return editor if isinstance(editor, BlocklyView) else None
 
     @property
     def _target(self) -> QWidget:
@@ -297,7 +303,8 @@ class GuidePictures(SelfDrive):
         return target
 
     def _is_page_ready(self) -> bool:
-        return getattr(getattr(self._window.editor(), "editor", None), "is_ready", False)
+        editor = self._opened_editor()
+        return editor is not None and editor.is_ready
 
     def _has_element(self, element: str) -> bool:
         # True if the page contains the element; each call queries its position again.

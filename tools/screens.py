@@ -15,6 +15,9 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from app.intents import Inspect
+from app.ui.intents import OpenPanel
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from PySide6.QtCore import QSize, QTimer
@@ -51,7 +54,7 @@ class Screens(SelfDrive):
         window.resize(size)
 
     def _plan(self) -> list[Step]:
-        session, run = self._window.session, self._commands.run
+        session, run, request = self._window.session, self._commands.run, self._commands.request
         return [
             self._picture("start", self._window.show_start),
             Step("start the virtual robot", self._start_demo, self._is_robot_ready, 40, settle_s=2.5),
@@ -60,11 +63,11 @@ class Screens(SelfDrive):
             self._picture("running", lambda: None, 1.0),
             Step("record", lambda: run("recording.toggle"), lambda: True, settle_s=3.0),
             self._picture("developer", lambda: run("layout.developer"), 2.0),
-            self._picture("inspector", lambda: run(f"inspect:{STATE_TOPIC}"), 1.5),
+            self._picture("inspector", lambda: request(Inspect(STATE_TOPIC)), 1.5),
             self._picture("image", lambda: self._window.open_topic(CAMERA_TOPIC), 1.5),
-            *(self._picture(f"panel-{name}", self._command(f"panel:{name}"), 1.0) for name in PANELS),
+            *(self._picture(f"panel-{name}", self._open_panel(name), 1.0) for name in PANELS),
             Step("stop recording", lambda: run("recording.toggle"), lambda: True, settle_s=1.5),
-            self._picture("recorded", self._command("panel:recordings"), 1.0),
+            self._picture("recorded", self._open_panel("recordings"), 1.0),
             Step("stop", lambda: run("run.stop"), lambda: session.runs.view().state == "proven", 30),
             self._picture("stopped", lambda: run("layout.behaviour"), 1.0),
             *(self._picture(f"sheet-{name.replace('.', '-')}", self._sheet(name), 1.0) for name in SHEETS),
@@ -74,12 +77,12 @@ class Screens(SelfDrive):
     def _picture(self, name: str, action: Callable[[], object], settle_s: float = 0.6) -> Step:
         return Step(name, action, lambda: True, picture=name, settle_s=settle_s)
 
-    def _command(self, command: str) -> Callable[[], object]:
-        def run() -> None:
+    def _open_panel(self, name: str) -> Callable[[], object]:
+        def open_panel() -> None:
             self._close_sheets()
-            self._commands.run(command)
+            self._commands.request(OpenPanel(name))
 
-        return run
+        return open_panel
 
     def _sheet(self, command: str) -> Callable[[], object]:
         # A modal dialog blocks the caller, so the command runs outside the step.

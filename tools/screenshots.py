@@ -20,7 +20,9 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 
 from app.core.session import Session
+from app.intents import Inspect
 from app.ui.application import Options, make_application, make_window
+from app.ui.intents import OpenPanel
 from app.ui.self_drive import SelfDrive, Step
 from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.main_window import MainWindow
@@ -204,11 +206,11 @@ class Pictures(SelfDrive):
     def _show_robots(self) -> None:
         self._reset()
         self._commands.run("layout.behaviour")
-        self._commands.run("panel:robots")
+        self._commands.request(OpenPanel("robots"))
 
     def _inspect(self) -> None:
         self._window.open_topic("/Pepper/camera")
-        self._commands.run("inspect:/Pepper/state")
+        self._commands.request(Inspect("/Pepper/state"))
 
 
 def take_screenshots(folder: Path) -> int:

@@ -22,7 +22,7 @@ from types import TracebackType
 import platformdirs
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ShowLog
+from app.intents import ShowLog
 from nep.i18n import _
 from nep.version import __version__
 

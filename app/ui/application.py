@@ -142,9 +142,9 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 
 
 def deferred_steps(window: MainWindow, *, loads_web_view: bool = True) -> list[Callable[[], object]]:
-    """Return the startup steps to run after the first paint.
+    """Return the startup steps to run after the first paint, before panels are created.
 
-    The steps create panels, import modules and load the block editor.
+    The steps import modules and load the block editor.
 
     Args:
         loads_web_view: True to load the block editor.
@@ -152,7 +152,7 @@ def deferred_steps(window: MainWindow, *, loads_web_view: bool = True) -> list[C
     panels = window.panels.import_steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in PRELOADED_MODULES)
     view = (partial(import_web_view, window.session.alerts),) if loads_web_view else ()
-    return [*panels, *modules, *view, *window.preload_steps()]
+    return [*panels, *modules, *view]
 
 
 def import_web_view(alerts: Alerts) -> None:
@@ -401,7 +401,8 @@ def _run_window(
     log_timer.timeout.connect(lambda: console_handler.drain(session.console.add))
     log_timer.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
-    deferred = DeferredSteps(window, deferred_steps(window, loads_web_view=options.loads_web_view))
+    steps = deferred_steps(window, loads_web_view=options.loads_web_view)
+    deferred = DeferredSteps(window, [*steps, lambda: deferred.prepend(window.preload_steps())])
     driver = options.make_driver(window) if options.make_driver is not None else None
     window.show()
     window.activateWindow()  # without a window manager the window would get no focus

@@ -16,6 +16,8 @@ from typing import Protocol
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
+from app.intents import Inspect
+from app.ui.intents import OpenPanel
 from app.ui.shell.main_window import DEFAULT_SIZE, MainWindow
 from nep.i18n import _, number
 from nep.messages.codecs import content_of
@@ -122,7 +124,7 @@ class SelfDrive(QObject):
 
     def _plan(self) -> list[Step]:
         window, session = self._window, self._window.session
-        run = self._commands.run
+        run, request = self._commands.run, self._commands.request
 
         def has_robot() -> bool:
             return any(link.state in {"ready", "busy"} for link in session.fleet.links)
@@ -162,7 +164,13 @@ class SelfDrive(QObject):
                 "the topics in light colours", lambda: run("theme.light"), lambda: True, 5, "developer-light"
             ),
             Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
-            Step("the robot's actions", lambda: run("panel:robots"), lambda: True, 5, "robots-light"),
+            Step(
+                "the robot's actions",
+                lambda: request(OpenPanel("robots")),
+                lambda: True,
+                5,
+                "robots-light",
+            ),
         ]
 
     def _show_start_page(self) -> None:
@@ -183,7 +191,7 @@ class SelfDrive(QObject):
         if cameras:
             self._window.open_topic(cameras[0])
         if poses:
-            self._commands.run(f"inspect:{poses[0]}")
+            self._commands.request(Inspect(poses[0]))
 
     def _start_next_step(self) -> None:
         self._step = next(self._steps, None)

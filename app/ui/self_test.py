@@ -21,8 +21,8 @@ from app.core.self_test import SelfTest, timeouts
 from app.core.self_test.environment import PICTURE
 from app.core.session import Session
 from app.ui.application import Options, run, startup_problem
+from app.ui.panels.build.behaviour.panel import BehaviourPanel
 from app.ui.self_drive import SelfDrive, Step
-from app.ui.shell.commands.program_pictures import SupportsPicture
 from app.ui.shell.main_window import MainWindow
 from nep.i18n import _
 
@@ -188,10 +188,10 @@ class WindowSteps:
         return program is not None and ROBOT in program.robots and program.starts > 0 and not program.errors
 
     def _has_blocks(self) -> bool:
-        editor = self._window.editor()
-        if not self._is_drawing_requested and isinstance(editor, SupportsPicture):
+        dock = self._window.find_dock("behaviour")
+        if not self._is_drawing_requested and dock is not None and isinstance(dock.panel, BehaviourPanel):
             self._is_drawing_requested = True
-            editor.render_picture("svg", True, self._on_drawing)
+            dock.panel.render_picture("svg", True, self._on_drawing)
         return bool(self._drawing)
 
     def _on_drawing(self, drawing: bytes) -> None:

@@ -7,6 +7,7 @@ import pytest
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.fixes.fixes import fix
 from app.blocks.fixes.replace_robot import block_types_by_robot, blocks_of, supports_blocks
+from app.intents import AddStartBlock, AddTimeLimit, DefineFunction
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
@@ -29,7 +30,7 @@ def test_fix_adds_time_limit_to_wait_until():
 
 def test_fix_adds_start_block_above_blocks_without_one():
     saved = workspace(say("Hi") | {"x": 100, "y": 50})
-    fixed = fix(saved, problems(saved)[0].fix_action or "")
+    fixed = fix(saved, problems(saved)[0].fix_action)
     assert fixed is not None
     assert problems(fixed) == ()
     top = fixed["blocks"]["blocks"][0]
@@ -38,7 +39,7 @@ def test_fix_adds_start_block_above_blocks_without_one():
 
 def test_fix_adds_no_start_block_above_value_block():
     saved = workspace(block("robot_pepper_get_battery", ROBOT="Pepper"), say("Hi"))
-    fixed = fix(saved, "add:events_started")
+    fixed = fix(saved, AddStartBlock("events_started"))
     assert fixed is not None
     assert [top["type"] for top in fixed["blocks"]["blocks"]] == [
         "robot_pepper_get_battery",
@@ -47,14 +48,13 @@ def test_fix_adds_no_start_block_above_value_block():
 
 
 def test_fix_adds_start_block_to_empty_workspace():
-    fixed = fix({}, "add:events_started")
+    fixed = fix({}, AddStartBlock("events_started"))
     assert fixed is not None
     assert compile_behaviour(fixed, []).starts == 1
 
 
 def test_fix_action_without_matching_block_changes_nothing():
-    assert fix(workspace(), "connect:NAO") is None
-    assert fix(workspace(), "limit:nobody") is None
+    assert fix(workspace(), AddTimeLimit("nobody")) is None
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_fix_action_without_matching_block_changes_nothing():
 )
 def test_fix_on_invalid_workspace_changes_nothing_and_does_not_raise(blocks):
     saved = {"blocks": blocks}
-    assert fix(saved, "limit:w") is None
-    assert fix(saved, "define:w") is None
+    assert fix(saved, AddTimeLimit("w")) is None
+    assert fix(saved, DefineFunction("w")) is None
     assert blocks_of(saved, "Pepper") == ()
     assert not supports_blocks(block_types_by_robot(saved).get("Pepper", ()), "pepper", robot())

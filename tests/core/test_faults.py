@@ -15,12 +15,12 @@ import pytest
 import nep
 from app.blocks.runtime.events import ProgramRunning
 from app.core import faults
-from app.core.alerts.intents import ShowLog
 from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_text
 from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound
 from app.core.robots.stop.report import StopCompleted
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.intents import ShowLog
 from app.robots.client.stop_report import StopReport
 from nep.masters.master import Master
 from nep.messages.message import Message

@@ -13,11 +13,11 @@ import psutil
 import pytest
 
 import nep
-from app.core.alerts.intents import ConnectRobot
 from app.core.network.source import JobFailed
 from app.core.parts.robots import MONITORING_FAILED_MESSAGE
 from app.core.session import Session
 from app.errors import RobotInputError, UnknownRobotError
+from app.intents import ConnectRobot
 from app.robots.description.description import thing_description
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until

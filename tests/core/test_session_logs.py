@@ -13,11 +13,11 @@ import pytest
 
 import nep
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import Intent, OpenDoctor
 from app.core.network.source import MasterFound, MasterLost
 from app.core.robots.launcher import LaunchFailed
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.intents import Intent, OpenDoctor
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC
 from tests.blocks.samples import block, number, stack, started, text, workspace, write
 from tests.core.waiting import tick_until

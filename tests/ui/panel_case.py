@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from app.intents import Intent
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.theme import fonts
 from app.ui.theme.theme import Theme
@@ -26,7 +27,8 @@ class Window:
     opened: list[str] = field(default_factory=list)
     toasts: list[str] = field(default_factory=list)
     toast_buttons: list[tuple[str, Callable[[], object] | None]] = field(default_factory=list)
-    commands: list[str] = field(default_factory=list)
+    commands: list[str | Intent] = field(default_factory=list)
+    """Ids of commands, and intents, in the order in which they were requested."""
     plotted: list[tuple[str, str]] = field(default_factory=list)
     beside: list[str] = field(default_factory=list)
     asked_why: list[tuple[PanelWidget, str]] = field(default_factory=list)
@@ -46,6 +48,7 @@ class Window:
             open_to_side=self.beside.append,
             open_doctor=lambda panel, topic: self.asked_why.append((panel, topic)),
             panels=lambda: self.panels,
+            request=self.commands.append,
         )
 
     def show_toast(self, words: str, button: str = "", run: Callable[[], object] | None = None) -> None:

@@ -14,6 +14,7 @@ from app.core.messages.picture import Picture
 from app.core.network import topics as topics_module
 from app.core.network.nodes import GATEWAY
 from app.core.robots import robot_link as link_module
+from app.intents import ConnectRobot
 from app.robots.description.description import topic_of
 from app.robots.description.inputs import Choice, Parameter
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
@@ -90,7 +91,7 @@ VALUES: Mapping[str, object] = {
 
 PROBLEMS = (
     Problem("warning", "b8", "robot", "wave", "NAO isn't connected, so wave will be skipped.",
-            "Show the robots", "connect:NAO", icon="hand"),
+            "Show the robots", ConnectRobot("NAO"), icon="hand"),
     Problem("info", "b3", "control", "wait until", "wait until waits forever if no one appears.",
             "Add a time limit", "add_time_limit", icon="hourglass"),
 )  # fmt: skip

@@ -5,10 +5,18 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.build.behaviour.printing import PrintCommands
+from app.ui.panels.build.behaviour.program_pictures import ImageCommands
+from app.ui.panels.build.behaviour.variable_commands import VariableCommands
+from app.ui.panels.command import Command
+from app.ui.panels.registry import PanelRegistry
+from app.ui.shell.actions.actions import merged
+from app.ui.shell.commands import table
 from app.ui.shell.start_page.page import Example
 from app.ui.widgets.file_dialogs import FileKind, resolve_kind
 from tests.blocks.fakes import until
@@ -45,6 +53,9 @@ class PlainPanel(PanelWidget):
         self.blocks: list[str] = []
         self.edited: list[Mapping[str, object]] = []
         self.explode = False
+        self.variables = VariableCommands(context, self.flush, self.edit_variable)
+        self.pictures = ImageCommands(context, lambda _kind, _white, done: done(b""))
+        self.printing = PrintCommands(context, lambda _title, _date, _layout, done: done(b""))
         self.filter = QLineEdit()
         column = QVBoxLayout(self)
         column.addWidget(self.filter)
@@ -86,12 +97,38 @@ class PlainPanel(PanelWidget):
     def show_block(self, block: str) -> None:
         self.blocks.append(block)
 
+    def find_blocks(self, *, to_add: bool) -> None:
+        self.undone.append("search" if to_add else "find")
+
+    def edit_blocks(self, edit: str) -> None:
+        self.undone.append(edit)
+
+    def edit_from_menu(self, edit: str) -> None:
+        self.undone.append(edit)
+
+    def rename_current(self) -> None:
+        self.undone.append("rename")
+
 
 def plain(name: str, title: str, accepts: tuple[str, ...]) -> Panel:
-    """Return the description of a panel whose widget is a `PlainPanel`."""
-    return Panel(name, title, "bot", accepts, lambda context: PlainPanel(context, title))
+    """Return a description with the contributions of the real panel and a `PlainPanel` as widget."""
+    real = PanelRegistry()[name]
+    return Panel(
+        name,
+        title,
+        "bot",
+        accepts,
+        lambda context: PlainPanel(context, title),
+        home=real.home,
+        commands=real.commands,
+        intents=real.intents,
+    )
 
 
+COMMANDS: list[Command[Any, Any]] = merged(
+    table.COMMANDS, [command for panel in PanelRegistry().values() for command in panel.commands]
+)
+"""Commands of the window and of all panels; tests that only need a command of the window can use them too."""
 PANELS = {name: plain(name, title, accepts) for name, (title, accepts) in NAMES.items()}
 
 

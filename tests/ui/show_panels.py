@@ -16,8 +16,7 @@ from pytestqt.qtbot import QtBot
 
 from app.ui.blockly.scheme import register_scheme
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.build import problems
-from app.ui.panels.build.behaviour import panel as behaviour
+from app.ui.panels.build import behaviour, problems
 from app.ui.panels.record.recordings import panel as recordings
 from app.ui.panels.robots import camera, health, robot, sensors
 from app.ui.panels.robots.robots import panel as robots

@@ -14,7 +14,7 @@ from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QAbstractItemView, QLabel, QMenu, QWidget
 
 import app.ui
-from app.core.alerts.intents import Inspect
+from app.intents import Inspect
 from app.ui.panels.base import PanelWidget
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.banner import AlertBanner

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from app.blocks.model.block import Block
 from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import PlacedBlock
+from app.intents import AddReceiver, AddStartBlock, Intent, SetAtStart
 from nep.i18n import _, pgettext
 
 _SEVERITY_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
@@ -41,7 +42,7 @@ class ProblemList:
         message: str,
         *,
         fix: str | None = None,
-        fix_action: str | None = None,
+        fix_action: Intent | None = None,
         style: str | None = None,
     ) -> None:
         """Add a problem.
@@ -71,7 +72,7 @@ class ProblemList:
             "warning", None, None, subject,
             _("No event block starts these blocks, so they don't run. Put “{start}” above "
               "them.").format(start=subject),
-            fix=_("Add “when started”"), fix_action=f"add:{_START_BLOCK}",
+            fix=_("Add “when started”"), fix_action=AddStartBlock(_START_BLOCK),
         )  # fmt: skip
 
     def add_never_set(
@@ -90,7 +91,7 @@ class ProblemList:
         self.add(
             "warning", placed_block, block, subject, _("{name} is used but never set.").format(name=subject),
             fix=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
-            fix_action=f"begin:{'list' if is_list else 'number'}:{id}",
+            fix_action=SetAtStart(id, is_list),
         )  # fmt: skip
 
     def add_never_received(self, placed_block: PlacedBlock, block: Block, name: str) -> None:
@@ -98,7 +99,7 @@ class ProblemList:
         subject = f"“{name}”"
         self.add(
             "warning", placed_block, block, subject, _("Nothing receives {name}.").format(name=subject),
-            fix=_("Add “when I receive”"), fix_action=f"receive:{name}",
+            fix=_("Add “when I receive”"), fix_action=AddReceiver(name),
         )  # fmt: skip
 
     def add_never_sent(self, placed_block: PlacedBlock, block: Block, name: str) -> None:

@@ -12,6 +12,7 @@ from app.blocks.model.block_text import block_text, label, label_of_unknown
 from app.blocks.model.fields import Argument, Field, FieldError, TextField, ValueInput, VariableField
 from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
+from app.intents import AddTimeLimit, ConnectRobot, DefineFunction, JoinScripts, PointAtBlock, RenameVariable
 from app.robots.description.description import Action
 from nep.i18n import _, format_list, lazy, pgettext
 
@@ -98,7 +99,7 @@ class ProblemCollector(ProblemList):
         """Report a call of an undefined function."""
         self.add(
             "error", placed_block, block, self.label(placed_block, block), block.undefined_message,
-            fix=_("Define the function"), fix_action=f"define:{placed_block.id}",
+            fix=_("Define the function"), fix_action=DefineFunction(placed_block.id),
         )  # fmt: skip
 
     def report_conflict(self, conflict: Conflict) -> None:
@@ -118,7 +119,7 @@ class ProblemCollector(ProblemList):
         self.add(
             "warning", placed_block, self._catalogue.blocks.get(placed_block.type), name, message,
             fix=_("Run one after the other") if conflict.reordering else None,
-            fix_action=f"after:{':'.join(conflict.reordering)}" if conflict.reordering else None,
+            fix_action=JoinScripts(*conflict.reordering) if conflict.reordering else None,
         )  # fmt: skip
 
     def report_invalid_field(self, placed_block: PlacedBlock, block: Block, error: FieldError) -> None:
@@ -156,7 +157,7 @@ class ProblemCollector(ProblemList):
             message = _("{robot} isn't connected, so {block} will be skipped.")
             self.add(
                 "warning", placed_block, block, name, message.format(robot=robot, block=skipped_blocks),
-                fix=_("Show the robots"), fix_action=f"connect:{robot}", style="robot",
+                fix=_("Show the robots"), fix_action=ConnectRobot(robot), style="robot",
             )  # fmt: skip
             return True
         if block is None:
@@ -186,7 +187,7 @@ class ProblemCollector(ProblemList):
             self.add(
                 "warning", placed_block, None, name, message.format(block=name, own_block=equivalent_label),
                 fix=_("Show “{block}”").format(block=equivalent_label),
-                fix_action=f"point.block:{equivalent.type}",
+                fix_action=PointAtBlock(equivalent.type),
             )  # fmt: skip
         elif placed_block.type.partition("_")[0] in prefixes:
             message = _(
@@ -235,7 +236,7 @@ class ProblemCollector(ProblemList):
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
                         "variable in the block."
                     ).format(block=name),
-                    fix=_("Name the variable"), fix_action=f"variable.rename:{id}",
+                    fix=_("Name the variable"), fix_action=RenameVariable(id),
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
@@ -284,7 +285,7 @@ class ProblemCollector(ProblemList):
             self.add(
                 "info", placed_block, block, self.label(placed_block, block),
                 self._wait_forever_message(placed_block, block),
-                fix=_("Add a time limit"), fix_action=f"limit:{placed_block.id}",
+                fix=_("Add a time limit"), fix_action=AddTimeLimit(placed_block.id),
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed_block.fields.get("ROBOT")))
         action = robot.action(block.robot.name) if robot and block.robot else None

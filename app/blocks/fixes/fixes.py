@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from dataclasses import replace
 
 from app.blocks.model.mutators import function_name, inputs_of
 from app.blocks.model.workspace import (
@@ -16,57 +17,71 @@ from app.blocks.model.workspace import (
     saved_blocks,
 )
 from app.blocks.toolbox.catalogue import categories
+from app.intents import (
+    AddReceiver,
+    AddStartBlock,
+    AddTimeLimit,
+    BlockFix,
+    DefineFunction,
+    JoinScripts,
+    SetAtStart,
+)
 
-BLOCK_FIXES = frozenset({"limit", "define", "after"})
-"""Verbs of the actions that name blocks; other actions name types, variables or broadcasts."""
 DEFAULT_TIME_LIMIT_S = 10
 LEFT_PX, TOP_PX = 40, 40
 SCRIPT_SPACING_PX = 420
 """Horizontal offset in px of a new script; most existing scripts are narrower."""
 
 
-def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """Return the workspace after applying a fix; None for other actions or if the fix isn't possible.
-
-    Actions:
-
-    - ``limit:<id>`` sets a time limit for a "wait until".
-    - ``add:<type>`` puts a block above the first script without a start, or alone if there is none.
-    - ``define:<id>`` creates the function that a block calls.
-    - ``begin:list:<id>`` and ``begin:number:<id>`` set a variable at the start of the behaviour.
-    - ``receive:<name>`` creates a script that receives a broadcast.
-    - ``after:<hat>:<hat>`` moves the script of the first start block to the end of the script of the
-      second one, and removes the first start block.
+def fix(workspace: Mapping[str, object], action: BlockFix) -> dict[str, object] | None:
+    """Return the workspace after applying a fix, or None if the fix isn't possible.
 
     Args:
         workspace: Saved workspace of Blockly; it is not modified.
-        action: `Problem.fix_action` of a problem.
+        action: Fix of a problem.
     """
-    verb, _, target = action.partition(":")
     result: dict[str, object] = copy.deepcopy(dict(workspace))
-    if verb == "limit":
-        for block in saved_blocks(result):
-            if block.get("id") == target and block.get("type") == "control_wait_until":
-                _add_time_limit(block)
-                return result
-    if verb == "define":
-        for block in saved_blocks(result):
-            if block.get("id") == target and block.get("type") in (PLAIN_CALL, RESULT_CALL):
-                return _with_definition(result, block)
-    return _fix_scripts(result, verb, target)
-
-
-def _fix_scripts(workspace: dict[str, object], verb: str, target: str) -> dict[str, object] | None:
-    if verb == "begin":
-        kind, _, variable = target.partition(":")
-        return _with_initial_value(workspace, variable, is_list=kind == "list")
-    if verb == "receive":
-        return _with_script(workspace, {"type": "events_received", "fields": {"NAME": target}})
-    if verb == "after":
-        return _join_scripts(workspace, target)
-    if verb == "add":
-        return _with_start(workspace, target)
+    match action:
+        case AddTimeLimit(id):
+            block = _find_block(result, id, "control_wait_until")
+            return _with_time_limit(result, block) if block is not None else None
+        case DefineFunction(id):
+            block = _find_block(result, id, PLAIN_CALL, RESULT_CALL)
+            return _with_definition(result, block) if block is not None else None
+        case SetAtStart(variable, is_list):
+            return _with_initial_value(result, variable, is_list=is_list)
+        case AddReceiver(broadcast):
+            return _with_script(result, {"type": "events_received", "fields": {"NAME": broadcast}})
+        case JoinScripts(moved, target):
+            return _join_scripts(result, moved, target)
+        case AddStartBlock(block_type):
+            return _with_start(result, block_type)
     return None
+
+
+def block_ids(action: BlockFix) -> tuple[str, ...]:
+    """Return the ids of the blocks that a fix names."""
+    match action:
+        case AddTimeLimit(id) | DefineFunction(id):
+            return (id,)
+        case JoinScripts(moved, target):
+            return (moved, target)
+    return ()
+
+
+def without_prefix(action: BlockFix, prefix: str) -> BlockFix:
+    """Return a fix with a prefix removed from the ids of its blocks."""
+    match action:
+        case AddTimeLimit(id) | DefineFunction(id):
+            return replace(action, block_id=id.removeprefix(prefix))
+        case JoinScripts(moved, target):
+            return JoinScripts(moved.removeprefix(prefix), target.removeprefix(prefix))
+    return action
+
+
+def _find_block(workspace: Mapping[str, object], id: str, *types: str) -> dict[str, object] | None:
+    blocks = saved_blocks(workspace)
+    return next((each for each in blocks if each.get("id") == id and each.get("type") in types), None)
 
 
 def _with_initial_value(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
@@ -100,11 +115,12 @@ def _with_script(workspace: dict[str, object], block: dict[str, object]) -> dict
     return workspace
 
 
-def _add_time_limit(block: dict[str, object]) -> None:
+def _with_time_limit(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
     block["type"] = "control_wait_until_at_most"
     inputs = block.setdefault("inputs", {})
     if isinstance(inputs, dict):
         inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": DEFAULT_TIME_LIMIT_S}}}
+    return workspace
 
 
 def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
@@ -127,18 +143,14 @@ def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -
     return workspace
 
 
-def _join_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
-    # Removes the event block, which then starts nothing. ``hats`` are two ids joined by a colon; ids may
-    # contain colons.
+def _join_scripts(workspace: dict[str, object], moved: str, target: str) -> dict[str, object] | None:
+    # Removes the event block, which then starts nothing.
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):
         return None
     by_id = {top.get("id"): top for top in tops if isinstance(top, dict)}
-    parts = hats.split(":")
-    pairs = ((":".join(parts[:index]), ":".join(parts[index:])) for index in range(1, len(parts)))
-    matches = ((by_id[later], by_id[earlier]) for later, earlier in pairs if {later, earlier} <= by_id.keys())
-    moved_hat, last_block = next(matches, (None, None))
+    moved_hat, last_block = by_id.get(moved), by_id.get(target)
     if (
         moved_hat is None
         or last_block is None

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
+from app.intents import Intent
+
 Severity = Literal["error", "warning", "info"]
 
 
@@ -22,8 +24,7 @@ class Problem:
         subject: Part of `message` that is shown in bold.
         message: Message for the user.
         fix: Text of the button that fixes the problem; None for no button.
-        fix_action: Action of the button: an action of `app.blocks.fixes.fixes.fix`, ``connect:<robot>``
-            or ``variable.rename:<id>``; None for no button.
+        fix_action: Intent of the button, such as a `BlockFix`; None for no button.
         icon: Icon of the block.
     """
 
@@ -33,7 +34,7 @@ class Problem:
     subject: str
     message: str
     fix: str | None = None
-    fix_action: str | None = None
+    fix_action: Intent | None = None
     icon: str = ""
 
 

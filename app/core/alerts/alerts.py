@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from app.core.alerts.intents import Intent
+from app.intents import Intent
 
 SEVERITIES = ("error", "warn", "info")
 

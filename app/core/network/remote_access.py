@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import AllowOtherComputers
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
+from app.intents import AllowOtherComputers
 from nep.errors import NepError
 from nep.i18n import _
 from nep.masters.process import listen

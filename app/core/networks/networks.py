@@ -8,7 +8,6 @@ from itertools import count
 from typing import Literal, Protocol
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import BrowseNetworks
 from app.core.network.mailbox import Batch
 from app.core.network.nodes import NodeEntry, Nodes
 from app.core.network.source import GraphReceived, MasterFound, MasterLost, Sink, WatchFailed
@@ -16,6 +15,7 @@ from app.core.network.topics import Topic, Topics, split_key
 from app.core.networks.kinds import KINDS, NetworkKind, find_kind
 from app.core.networks.source import OtherSource
 from app.core.storage.settings import Settings
+from app.intents import BrowseNetworks
 from nep.errors import NepError
 from nep.i18n import _
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Protocol
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ShowAlarms
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import PermissionQuestion
@@ -24,6 +23,7 @@ from app.core.storage.user_file import read_stored
 from app.core.world.console import Console
 from app.core.world.live import LiveWorld
 from app.core.world.part import SessionPart
+from app.intents import ShowAlarms
 from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node

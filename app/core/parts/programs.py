@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import OPEN_DOCTOR_LABEL, ConnectRobot, OpenDoctor
 from app.core.faults import log_errors
 from app.core.network.web_pages import WebPages
 from app.core.projects.open_projects import OpenProjects
@@ -20,6 +19,7 @@ from app.core.run.spare_child import SpareChild
 from app.core.world.console import Console
 from app.core.world.live import LiveWorld
 from app.core.world.part import SessionPart
+from app.intents import OPEN_DOCTOR_LABEL, ConnectRobot, OpenDoctor
 from nep.i18n import _, lazy
 
 SPARE_CHILD_DELAY_S = 3.0

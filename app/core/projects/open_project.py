@@ -30,6 +30,7 @@ from app.core.projects.titles import name_of
 from app.core.projects.versions import SavedVersion, Stamp, rename_versions, save_version, stamp_of
 from app.core.storage.background_worker import BackgroundWorker
 from app.errors import DescriptionError, DocumentError
+from app.intents import BlockFix
 from app.robots.description.description import Robot, parse
 from nep.i18n import _, lazy
 from nep.system.lazy_import import lazy_module
@@ -289,23 +290,12 @@ class OpenProject:
         if self.dirty:
             self._write_journal()
 
-    def can_fix(self, action: str) -> bool:
-        """Return True if the fix of a problem can be applied to the blocks.
-
-        Args:
-            action: Action of the fix's button.
-        """
+    def can_fix(self, action: BlockFix) -> bool:
+        """Return True if the fix of a problem can be applied to the blocks."""
         return self._fixed_page(action) is not None
 
-    def fix(self, action: str) -> bool:
-        """Apply the fix of a problem to the blocks.
-
-        Args:
-            action: Action of the fix's button.
-
-        Returns:
-            False if the action does not change blocks.
-        """
+    def fix(self, action: BlockFix) -> bool:
+        """Apply the fix of a problem to the blocks; return False if that isn't possible."""
         page = self._fixed_page(action)
         if page is None:
             return False
@@ -313,17 +303,12 @@ class OpenProject:
         self.fixes += 1
         return True
 
-    def _fixed_page(self, action: str) -> Page | None:
-        verb, _colon, target = action.partition(":")
-        page = self.project.always
-        if verb in fixes.BLOCK_FIXES:
-            page = next(
-                (each for each in self.project.pages[1:] if target.startswith(each.block_prefix)), page
-            )
-        page_action = (
-            f":{target}".replace(f":{page.block_prefix}", ":") if page.block_prefix else f":{target}"
-        )
-        blocks = deep_json.run_deep(lambda: fixes.fix(page.workspace.blocks, verb + page_action))
+    def _fixed_page(self, action: BlockFix) -> Page | None:
+        id = next(iter(fixes.block_ids(action)), "")
+        pages = self.project.pages[1:] if id else ()
+        page = next((each for each in pages if id.startswith(each.block_prefix)), self.project.always)
+        page_action = fixes.without_prefix(action, page.block_prefix)
+        blocks = deep_json.run_deep(lambda: fixes.fix(page.workspace.blocks, page_action))
         return page.with_workspace(WorkspaceJson.from_blocks(blocks)) if blocks is not None else None
 
     def replace_missing_robot(self, missing: str, robot: Robot) -> bool:

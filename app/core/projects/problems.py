@@ -14,10 +14,10 @@ from app.blocks.fixes.replace_robot import (
 )
 from app.blocks.model.program import Problem
 from app.blocks.model.project import Page
+from app.intents import ConnectRobot, Intent, ReplaceRobot, StartVirtualRobot
 from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
-CONNECT_PREFIX = "connect:"
 MAX_FIXES = 2  # more don't fit into a line
 
 
@@ -27,11 +27,11 @@ class Fix:
 
     Attributes:
         label: Label of the button.
-        action: Command that the button runs.
+        action: Intent of the button.
     """
 
     label: str
-    action: str
+    action: Intent
 
 
 @dataclass(frozen=True)
@@ -140,22 +140,21 @@ def robot_fixes(
         return (_show_robots_fix(name),)
     preferred_robots = [other for other in suitable_robots if other.model == robot.model] or suitable_robots
     fixes = [
-        Fix(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
+        Fix(_("Use {robot}").format(robot=other.name), ReplaceRobot(name, other.name))
         for other in preferred_robots[:MAX_FIXES]
     ]
     if robot.model in virtual_models and len(fixes) < MAX_FIXES:
-        fixes.append(Fix(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
+        fixes.append(Fix(_("Start a virtual {robot}").format(robot=name), StartVirtualRobot(name)))
     return tuple(fixes) or (_show_robots_fix(name),)
 
 
 def _show_robots_fix(name: str) -> Fix:
     # Studio can't switch a real robot on: it shows the present ones, and why others are missing.
-    return Fix(_("Show the robots"), f"{CONNECT_PREFIX}{name}")
+    return Fix(_("Show the robots"), ConnectRobot(name))
 
 
 def _missing_robot_name(problem: Problem) -> str | None:
-    action = problem.fix_action or ""
-    return action.removeprefix(CONNECT_PREFIX) if action.startswith(CONNECT_PREFIX) else None
+    return problem.fix_action.name if isinstance(problem.fix_action, ConnectRobot) else None
 
 
 def _with_block_count(line: ProblemLine) -> ProblemLine:

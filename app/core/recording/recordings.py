@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ChooseRecordingsFolder
 from app.core.recording.client import (
     RecorderClient,
     RecorderEvent,
@@ -36,6 +35,7 @@ from app.core.storage.setting import Setting
 from app.core.storage.settings import Settings
 from app.core.world.part import SessionPart
 from app.errors import SettingsError
+from app.intents import ChooseRecordingsFolder
 from nep.i18n import _, lazy
 from nep.programs.alarms import AlarmAction, AlarmEvent
 from nep.programs.alarms.alarms import DoneCallback

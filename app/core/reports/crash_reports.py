@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ReportProblem
 from app.core.faults import CONSOLE_EXTRA, RepeatFilter, log_folder
 from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
 from app.core.reports.studio_versions import VERSION_PATTERN
 from app.core.storage.atomic_file import MAX_BYTES, read_regular_file, write_atomically
+from app.intents import ReportProblem
 from nep.i18n import _, lazy
 from nep.system.replace_file import replace_file
 from nep.version import __version__

@@ -6,7 +6,12 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import (
+from app.core.network.decode_checks import CheckResult
+from app.core.network.topics import Topics
+from app.core.reports.own_process import ExecutableState
+from app.core.robots.fleet import Fleet
+from app.core.robots.robot_link import RobotLink
+from app.intents import (
     OPEN_DOCTOR_LABEL,
     ConnectRobot,
     Inspect,
@@ -15,11 +20,6 @@ from app.core.alerts.intents import (
     SaveBehaviourAs,
     StopRobots,
 )
-from app.core.network.decode_checks import CheckResult
-from app.core.network.topics import Topics
-from app.core.reports.own_process import ExecutableState
-from app.core.robots.fleet import Fleet
-from app.core.robots.robot_link import RobotLink
 from app.robots.client.limits import SENSOR_SILENCE_TIMEOUT_S
 from nep.i18n import _, format_list, lazy, ngettext
 from nep.protocol.graph_view import Alert, GraphView

@@ -9,7 +9,7 @@ from typing import Protocol
 from app.blocks.model.program import Program
 from app.blocks.model.stack import SHOW_BLOCK_ID, Stack
 from app.core.projects.open_project import OpenProject
-from app.core.projects.problems import CONNECT_PREFIX
+from app.intents import ConnectRobot
 from app.robots.description.description import Robot
 from app.robots.description.inputs import display_unit
 from nep.i18n import _
@@ -89,8 +89,8 @@ def _missing_robot_errors(program: Program, stack: Stack) -> dict[str, str]:
     # A block whose robot is missing would do nothing.
     if stack.id not in program.absent:
         return {}
-    fixes = (each.fix_action or "" for each in program.problems if each.block_id == stack.id)
-    robot = next((fix.removeprefix(CONNECT_PREFIX) for fix in fixes if fix.startswith(CONNECT_PREFIX)), "")
+    fixes = (each.fix_action for each in program.problems if each.block_id == stack.id)
+    robot = next((fix.name for fix in fixes if isinstance(fix, ConnectRobot)), "")
     if not robot:
         return {stack.id: _("The robot isn't connected, so these blocks can't be tried.")}
     return {stack.id: _("{robot} isn't connected, so these blocks can't be tried.").format(robot=robot)}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import StopRobots
 from app.core.robots.fleet import Fleet
 from app.core.run.view import STOP_AGAIN, clock_text, result_text, stop_text, unconfirmed_texts
 from app.core.world.console import Console
+from app.intents import StopRobots
 from app.robots.client.stop_report import StopReport
 from nep.i18n import _
 

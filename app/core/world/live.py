@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import OPEN_DOCTOR_LABEL, OpenDoctor
 from app.core.faults import FaultAlerts, log_errors
 from app.core.network.decode_checks import CheckResult, DecodeChecker
 from app.core.network.graph_changes import change_messages
@@ -25,6 +24,7 @@ from app.core.network.topics import split_key
 from app.core.networks.networks import NetworkEvent, Networks, split_by_network
 from app.core.storage.settings import Settings
 from app.core.world.world import World
+from app.intents import OPEN_DOCTOR_LABEL, OpenDoctor
 from nep.i18n import _, lazy, ngettext
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE

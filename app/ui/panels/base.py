@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction, QFont
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QStackedWidget, QVBoxLayout, QWidget
 
+from app.intents import Intent
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import Home
 from app.ui.theme.theme import Theme
 from app.ui.widgets.empty_state import EmptyAction
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -49,6 +52,38 @@ class ShowToast(Protocol):
     ) -> None: ...
 
 
+class AskName(Protocol):
+    """Signature of the function that asks for a name in a sheet.
+
+    Args:
+        question: Title of the sheet.
+        verb: Text of the button that applies the name.
+        rejection_reason: Returns the reason why a name is invalid, as a sentence, or "".
+        callback: Called with the name if it is valid.
+        name: Initial text of the field.
+    """
+
+    def __call__(
+        self,
+        question: str,
+        verb: str,
+        rejection_reason: Callable[[str], str],
+        callback: Callable[[str], object],
+        name: str = "",
+        /,
+    ) -> None: ...
+
+
+def _ask_nothing(
+    _question: str,
+    _verb: str,
+    _rejection_reason: Callable[[str], str],
+    _callback: Callable[[str], object],
+    _name: str = "",
+) -> None:
+    pass
+
+
 @dataclass(frozen=True, slots=True)
 class PanelContext:
     """Session, theme and functions of the window for use by panels.
@@ -58,13 +93,17 @@ class PanelContext:
         theme: Theme of the window.
         open_topic: Shows a topic in the panel that fits its message type.
         show_toast: Shows a short message that disappears after some seconds.
-        run: Runs a command of the window by its id (`app.ui.shell.commands.table`).
+        run: Runs a command of the window or of a panel by its id.
         files: Dialogs for opening and saving files.
         focus_question: Gives the keyboard focus to the question of a running behaviour, if there is one.
         plot: Plots a field of a topic; with an empty path, asks for the field.
         open_to_side: Shows a topic in an additional panel.
         open_doctor: Opens the connection doctor for a panel and a topic; "" stands for any topic.
         panels: Returns the visible panels.
+        request: Requests an intent, which another panel or the window carries out.
+        ask_name: Asks for a name in a sheet.
+        layout: Returns the name of the current layout; "" on the start page.
+        surface: Parent widget of dialogs; None without a window.
     """
 
     session: Session
@@ -74,10 +113,14 @@ class PanelContext:
     run: Callable[[str], None]
     files: FileDialogs
     focus_question: Callable[[], None] = lambda: None
-    plot: Callable[[str, str], None] = lambda _topic, _path: None
+    plot: Callable[[str, str], object] = lambda _topic, _path: None
     open_to_side: Callable[[str], None] = lambda _topic: None
-    open_doctor: Callable[[PanelWidget, str], None] = lambda _panel, _topic: None
+    open_doctor: Callable[[PanelWidget, str], object] = lambda _panel, _topic: None
     panels: Callable[[], Sequence[PanelWidget]] = lambda: ()
+    request: Callable[[Intent], object] = lambda _intent: None
+    ask_name: AskName = _ask_nothing
+    layout: Callable[[], str] = lambda: ""
+    surface: QWidget | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +180,9 @@ def numbered_title(title: str, number: int) -> str:
 class Panel:
     """Description of a panel, found by `app.ui.panels.registry`.
 
+    A panel contributes its commands to menus, palette and shortcuts, and handles intents that other panels,
+    alerts and problems request.
+
     Attributes:
         name: Id in saved layouts.
         title: Title, wrapped in `lazy`.
@@ -144,6 +190,10 @@ class Panel:
         accepted_types: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
         make: Creates the widget of the panel.
         allows_multiple: True if several panels of this kind can be open, each with its own topic.
+        home: Places in the layouts. Commands and intents show the panel in the current layout if it has a
+            place there, else in the layout of the first place; without places, in the current layout.
+        commands: Commands of the panel, which receive its widget.
+        intents: Handlers of intents, which receive its widget.
     """
 
     name: str
@@ -152,6 +202,22 @@ class Panel:
     accepted_types: tuple[str, ...]
     make: Callable[[PanelContext], PanelWidget]
     allows_multiple: bool = False
+    home: tuple[Home, ...] = ()
+    commands: tuple[Command[Any, PanelContext], ...] = ()
+    intents: tuple[IntentHandler[Any, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class Diagnose(Intent):
+    """Find out why a panel shows no data.
+
+    Attributes:
+        panel: Panel whose data is missing.
+        topic: Topic to check first; "" for any topic.
+    """
+
+    panel: PanelWidget
+    topic: str
 
 
 class PanelWidget(QWidget):
@@ -298,6 +364,14 @@ class PanelWidget(QWidget):
         return EmptyAction(
             _("Why is nothing shown?"), lambda: self.context.open_doctor(self, topic), "stethoscope"
         )
+
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Apply pending edits to the session, then call `callback`. By default there are none."""
+        callback()
+
+    def freeze_button(self) -> QAbstractButton | None:
+        """Return the checkable button that stops updates; hidden without live contents, or None."""
+        return None
 
     def save_state(self) -> dict[str, object]:
         """Return the panel's state for the saved layout, as JSON values."""

@@ -10,10 +10,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.alerts.intents import BrowseNetworks
 from app.core.network.source import NODE_NAME
 from app.core.networks.networks import lost_message
-from app.ui.intents import command_of
+from app.intents import BrowseNetworks
 from app.ui.panels.base import PanelContext
 from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.theme.theme import Theme
@@ -30,10 +29,10 @@ class NetworkTable(TablePanel[Row]):
 
     def __init__(self, context: PanelContext, texts: TableTexts, icon: str) -> None:
         super().__init__(context, texts, icon)
-        self.networks = NetworkLine(self.theme, context.run)
+        self.networks = NetworkLine(self.theme, lambda: context.request(BrowseNetworks()))
         self._network_count = 0
         self._networks_action = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
-        self._networks_action.triggered.connect(lambda _on=False: context.run(command_of(BrowseNetworks())))
+        self._networks_action.triggered.connect(lambda _on=False: context.request(BrowseNetworks()))
 
     def has_other_networks(self) -> bool:
         """Return True if the table shows other networks in addition to Studio's own."""
@@ -53,13 +52,13 @@ class NetworkTable(TablePanel[Row]):
 class NetworkLine(QWidget):
     """Line with the unreachable networks and a button to their settings."""
 
-    def __init__(self, theme: Theme, run: Callable[[str], None]) -> None:
+    def __init__(self, theme: Theme, on_click: Callable[[], object]) -> None:
         super().__init__()
         self.text_label = label("", "small", role="warn", wrap=True)
         self.text_label.setMinimumWidth(0)
         self.button = LinkButton(theme, _("Other networks"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.button.clicked.connect(lambda: run(command_of(BrowseNetworks())))
+        self.button.clicked.connect(on_click)
         row = QHBoxLayout()
         row.setContentsMargins(12, 5, 12, 5)
         row.setSpacing(8)

@@ -8,11 +8,13 @@ from typing import NamedTuple
 from PySide6.QtGui import QGuiApplication
 
 from app.core.network.topics import split_key
+from app.ui.intents import NewAlarm, PublishMessage, RecordTopic, SelectService
 from app.ui.panels.base import PanelContext
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
 from nep.messages.codecs import content_of
+from nep.programs.alarms import AlarmCondition
 
 
 class RowAction(NamedTuple):
@@ -52,18 +54,27 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
         actions.append(RowAction(_("Plot a field"), "chart-line", lambda: context.plot(key, "")))
     if not network:  # publishing, alarms and recordings work on Studio's own network only
         if has_fields(context, key):
-            actions.append(
-                RowAction(_("Publish to this topic"), "send", lambda: context.run(f"publish.topic:{key}"))
-            )
-        actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.topic:{key}")))
-        actions.append(RowAction(_("Record topic"), "circle-dot", lambda: context.run(f"record.topic:{key}")))
+            publish = PublishMessage(key)
+            actions.append(RowAction(_("Publish to this topic"), "send", lambda: context.request(publish)))
+        actions.append(RowAction(_("New alarm"), "bell", lambda: context.request(silence_alarm(key))))
+        actions.append(RowAction(_("Record topic"), "circle-dot", lambda: context.request(RecordTopic(key))))
     return [*actions, copy_action(context, name)]
+
+
+def silence_alarm(topic: str) -> NewAlarm:
+    """Return the intent to create an alarm on a topic without messages for 2 s."""
+    return NewAlarm(AlarmCondition("silent", topic, for_s=2.0))
+
+
+def departure_alarm(node: str) -> NewAlarm:
+    """Return the intent to create an alarm on a node that leaves."""
+    return NewAlarm(AlarmCondition("leaves", node))
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
     """Return the context menu actions for a service of Studio's own network."""
     return [
-        RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
+        RowAction(_("Call service"), "play", lambda: context.request(SelectService(name))),
         copy_action(context, name),
     ]
 
@@ -78,7 +89,7 @@ def node_actions(context: PanelContext, network: str, name: str) -> list[RowActi
     """
     actions: list[RowAction] = []
     if not network:
-        actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.node:{name}")))
+        actions.append(RowAction(_("New alarm"), "bell", lambda: context.request(departure_alarm(name))))
     return [*actions, copy_action(context, name)]
 
 

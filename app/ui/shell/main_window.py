@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import QKeyCombination, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
@@ -17,7 +16,10 @@ from app.core.faults import log_errors
 from app.core.projects.titles import recent_titles
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
-from app.ui.panels.base import Panel, PanelContext, PanelWidget, ShowToast
+from app.intents import Intent
+from app.ui.intents import BlockEdit, EditBlocks, PlotField, ShowTab
+from app.ui.panels.base import Diagnose, Panel, PanelContext, ShowToast
+from app.ui.shell.actions.shortcuts import format_key
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
 from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.developer_tools import DeveloperTools
@@ -30,7 +32,7 @@ from app.ui.shell.commands.shell import START_PAGE
 from app.ui.shell.dialogs.motion_permission import MotionPermissionCard
 from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
 from app.ui.shell.docking.dock import Dock, dock_for_kinds
-from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
+from app.ui.shell.docking.layouts import LAYOUTS, Layout, arranged, layout_named
 from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.focus_ring import FocusRing
@@ -50,8 +52,8 @@ TICK_MS = 33
 MIN_SIZE = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
 DEFAULT_SIZE = QSize(1440, 900)
 STATUS_REFRESH_TICKS = 8  # ticks between refreshes
-ALERTS_COMMAND = "panel:alerts"
-BLOCK_KEYS = {
+ALERTS_COMMAND = "alerts.show"
+BLOCK_KEYS: Mapping[QKeySequence.StandardKey, BlockEdit] = {
     QKeySequence.StandardKey.Copy: "copy",
     QKeySequence.StandardKey.Cut: "cut",
     QKeySequence.StandardKey.Paste: "paste",
@@ -61,14 +63,6 @@ DUPLICATE_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_
 BOOKMARK_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
 LOADING_TEXTS = {"behaviour": lazy("Loading blocks…")}
 OTHER_LOADING_TEXT = lazy("Loading panels…")
-
-
-@runtime_checkable
-class SupportsFields(Protocol):
-    """Interface of a panel that plots fields of topics."""
-
-    def plot_field(self, topic: str, path: str) -> None:
-        """Add a curve for a field of a topic; if the path is "", ask for the field."""
 
 
 class MainWindow(QMainWindow):
@@ -105,15 +99,20 @@ class MainWindow(QMainWindow):
         self._ticks = self._half_ticks = 0
         self._has_double_rate = False  # the timer runs at twice the tick rate
         self._is_closed = False
-        self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
+        self._flush_before_close = FlushBeforeClose(self, self.flush, self.close)
         self._build(examples)
         files = dialogs if dialogs is not None else self._file_dialogs()
         focus_question = self.question_card.focus_input
         self.context = PanelContext(
             session, theme, self.open_topic, self.show_toast, self._run_command, files, focus_question,
-            self.plot,
-            partial(self.open_topic, beside=True), self._diagnose,
+            lambda topic, path: self.request(PlotField(topic, path)),
+            partial(self.open_topic, beside=True),
+            lambda panel, topic: self.request(Diagnose(panel, topic)),
             lambda: self.bench.visible_panels() if self.bench is not None else (),
+            self.request,
+            self._ask_name,
+            lambda: "" if self._current_layout == START_PAGE else self._current_layout,
+            self,
         )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
@@ -121,12 +120,19 @@ class MainWindow(QMainWindow):
         self.timer.timeout.connect(self._on_half_tick)
         self.gc_freeze = GcFreezeTimer(self)
         self.panel_focus = PanelFocus(lambda: None if self._is_closed else self.bench, self)
-        self.commands = Commands(self, session, files)
+        self.commands = Commands(self, session, self.context)
         self._connect()
         self.show_start()
 
-    def _diagnose(self, panel: PanelWidget, topic: str) -> None:
-        self.commands.view.open_doctor(panel, topic)
+    def _ask_name(
+        self,
+        question: str,
+        verb: str,
+        rejection_reason: Callable[[str], str],
+        callback: Callable[[str], object],
+        name: str = "",
+    ) -> None:
+        self.commands.view.name_sheet.ask(question, verb, rejection_reason, callback, name)
 
     def _build(self, examples: Sequence[Example]) -> None:
         theme = self.theme
@@ -179,7 +185,7 @@ class MainWindow(QMainWindow):
         start.work_selected.connect(self._continue_work)
         start.exited.connect(actions["start_page.leave"].trigger)
         actions["help.first_steps"].triggered.connect(lambda: start.offer_first_steps(False))
-        self.banner.on_action = run
+        self.banner.on_action = self.request
         self.banner.on_dismiss = self.session.alerts.dismiss
         self.banner.on_more = partial(run, ALERTS_COMMAND)
         self.pages.currentChanged.connect(self._page_changed)
@@ -247,7 +253,7 @@ class MainWindow(QMainWindow):
         return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""
 
     def _continue_work(self, key: str) -> None:
-        self._run_command(f"tab:{key}")
+        self.request(ShowTab(key))
         self._run_command("layout.behaviour")
 
     def show_examples(self) -> None:
@@ -266,6 +272,7 @@ class MainWindow(QMainWindow):
         """Show a layout and return its workbench, which is created and restored on first use."""
         layout = layout_named(name)
         if layout.name not in self.benches:
+            self.commands.add_panels()
             self.benches[layout.name] = bench = self._new_bench(layout)
             self._prepared_benches.pop(layout.name, None)
             self.pages.addWidget(bench)
@@ -299,7 +306,9 @@ class MainWindow(QMainWindow):
                 self._prepared_benches[layout.name] = bench = self._new_bench(layout)
                 bench.preload(name)
 
-        return [partial(create, layout, name) for layout in LAYOUTS for name in layout.default_panels]
+        panels = self.panels.values()
+        names = [(layout, name) for layout in LAYOUTS for name in arranged(layout, panels).default_panels]
+        return [self.commands.add_panels, *(partial(create, layout, name) for layout, name in names)]
 
     def show_placeholder(self, layout: str) -> None:
         """Show the bars of a layout, and a placeholder until `show_layout` creates its workbench."""
@@ -324,11 +333,29 @@ class MainWindow(QMainWindow):
         """Current workbench, or None on the start page."""
         return self.benches.get(self.current_layout)
 
-    def editor(self) -> object:
-        """Return the panel with the block editor, or None if it wasn't created yet."""
-        bench = self.benches.get("behaviour")
-        dock = bench.docks.get("behaviour") if bench is not None else None
-        return dock.panel if dock is not None else None
+    def find_dock(self, name: str) -> Dock | None:
+        """Return the dock of a panel that was created, preferably in the current layout, or None."""
+        benches = [self.bench, *self.benches.values()]
+        docks = (bench.docks.get(name) for bench in benches if bench is not None)
+        return next((dock for dock in docks if dock is not None), None)
+
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Apply the pending edit of the block editor to its document, then call `callback`."""
+        dock = self.find_dock("behaviour")
+        if dock is None:
+            callback()
+        else:
+            dock.panel.flush(callback)
+
+    def show_current_behaviour(self) -> None:
+        """Show the current behaviour in the block editor without waiting for the next tick."""
+        dock = self.find_dock("behaviour")
+        if dock is not None:
+            dock.refresh()
+
+    def request(self, intent: Intent) -> bool:
+        """Carry out an intent; return False if the object that it names doesn't exist."""
+        return self.commands.request(intent)
 
     def open_panel(self, name: str) -> Dock | None:
         """Show a panel in the current layout; return None if the panel isn't available.
@@ -338,6 +365,17 @@ class MainWindow(QMainWindow):
         """
         layout_name = "behaviour" if name == "behaviour" or self.bench is None else self.current_layout
         return self.show_layout(layout_name).open(name)
+
+    def open_home(self, panel: Panel) -> Dock | None:
+        """Show a panel in a layout in which it has a place; return None if the panel isn't available.
+
+        This is the current layout if possible, else the layout of the panel's first place. Of several
+        panels of a kind, the most recently used one is shown.
+        """
+        layouts = [home.layout for home in panel.home]
+        is_at_home = self.current_layout in layouts or (not layouts and self.bench is not None)
+        layout = self.current_layout if is_at_home else next(iter(layouts), LAYOUTS[0].name)
+        return self.show_layout(layout).open_latest(panel.name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
         """Show a topic in the open panel that suits its type best, or else in the Inspector.
@@ -360,23 +398,22 @@ class MainWindow(QMainWindow):
             dock.raise_()
             dock.panel.show_topic(topic)
 
-    def plot(self, topic: str, path: str) -> None:
-        """Plot a field of a topic; if the path is "", ask for the field."""
-        bench = self.bench if self.bench is not None else self.show_layout("developer")
-        dock = bench.open_latest("plot")
-        if dock is not None and isinstance(dock.panel, SupportsFields):
-            dock.panel.plot_field(topic, path)
-
     def _run_command(self, name: str) -> None:
         self.commands.run(name)
 
+    def _edit_blocks(self, edit: BlockEdit) -> None:
+        if self.current_layout == "behaviour":
+            self.request(EditBlocks(edit))
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Handle keys that no widget has accepted, such as those to copy and paste blocks."""
-        edit = next((edit for key, edit in BLOCK_KEYS.items() if event.matches(key)), "")
+        if self.commands.add_panels() and self.commands.view.run_shortcut(format_key(event.keyCombination())):
+            return  # before that, the shortcuts of panels don't work
+        edit = next((edit for key, edit in BLOCK_KEYS.items() if event.matches(key)), None)
         if event.keyCombination() == DUPLICATE_KEY:
             edit = "duplicate"
-        if edit:
-            self._run_command(f"blocks.edit:{edit}")
+        if edit is not None:
+            self._edit_blocks(edit)
         elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
             self._run_command("replay.play")
         elif event.keyCombination() == BOOKMARK_KEY and self.session.replay is not None:

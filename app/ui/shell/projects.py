@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 from PySide6.QtCore import QObject, QTimer
 
-from app.core.alerts.intents import Intent, OpenBehaviour, SaveBehaviourAs
 from app.core.projects.file_format import SUFFIX, file_type_hint
 from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import OpenProject
@@ -19,27 +18,12 @@ from app.core.projects.project_files import ClosedProject
 from app.core.session import Session
 from app.core.storage.folders import closed_tabs_folder
 from app.errors import AppError, DocumentError
+from app.intents import BlockFix, Intent, OpenBehaviour, SaveBehaviourAs
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
 MAX_FLUSH_MS = 500
 RECORDING, LAYOUT = OTHER_SUFFIXES = (".mcap", ".nep-layout")
-
-
-@runtime_checkable
-class SupportsFlush(Protocol):
-    """Interface of a panel that can hold an edit which the document doesn't contain yet."""
-
-    def flush(self, callback: Callable[[], None]) -> None:
-        """Apply the pending edit to the document, then call ``callback``."""
-
-
-@runtime_checkable
-class SupportsShowCurrent(Protocol):
-    """Interface of a panel that shows the current behaviour."""
-
-    def show_current(self) -> None:
-        """Update the panel to the current behaviour immediately, without waiting for the next tick."""
 
 
 class ProjectController:
@@ -50,7 +34,8 @@ class ProjectController:
         dialogs: File dialogs.
         show_toast: Shows a toast.
         show_editor: Called when a behaviour was opened or reopened.
-        editor: Returns the panel with the block editor, or None before it is created.
+        flush: Applies the pending edit of the block editor to its document, then calls a function.
+        show_current: Shows the current behaviour without waiting for the next tick.
     """
 
     def __init__(
@@ -59,7 +44,8 @@ class ProjectController:
         dialogs: FileDialogs,
         show_toast: Callable[..., object],
         show_editor: Callable[[], object],
-        editor: Callable[[], object],
+        flush: Callable[[Callable[[], None]], object],
+        show_current: Callable[[], object],
     ) -> None:
         self._session, self.dialogs, self._show_toast, self._show_editor = (
             session,
@@ -68,7 +54,7 @@ class ProjectController:
             show_editor,
         )
         self._documents = session.documents
-        self._editor = editor
+        self._flush, self._show_current = flush, show_current
         self.open_recording: Callable[[Path], object] = lambda _path: None
         """Opens a recording that was dropped on the window or passed at startup."""
         self.open_layout: Callable[[Path], object] = lambda _path: None
@@ -164,9 +150,7 @@ class ProjectController:
     def show(self, document: OpenProject) -> None:
         """Show the tab of a document, without waiting for the next tick."""
         self._documents.show(document)
-        editor = self._editor()
-        if isinstance(editor, SupportsShowCurrent):
-            editor.show_current()
+        self._show_current()
 
     def duplicate(self, document: OpenProject) -> None:
         """Open a copy of a document in a new tab."""
@@ -213,15 +197,8 @@ class ProjectController:
         suggestion = str(folder / f"{document.name}{SUFFIX}")
         self.dialogs.save(suggestion, lambda path: self.run_after_flush(lambda: self._save(path)))
 
-    def fix(self, action: str) -> bool:
-        """Apply a fix to the blocks of the current behaviour.
-
-        Args:
-            action: Action of a problem, such as ``limit:ID``.
-
-        Returns:
-            False if the action isn't a fix or can't be applied.
-        """
+    def fix(self, action: BlockFix) -> bool:
+        """Apply a fix to the blocks of the current behaviour; return False if that isn't possible."""
         document = self._session.document
         if not document.can_fix(action):
             return False
@@ -234,11 +211,7 @@ class ProjectController:
 
     def run_after_flush(self, callback: Callable[[], None]) -> None:
         """Call a function after the pending edit of the block editor was applied to the document."""
-        editor = self._editor()
-        if isinstance(editor, SupportsFlush):
-            editor.flush(callback)
-        else:
-            callback()
+        self._flush(callback)
 
     def _save(self, path: Path | None) -> None:
         document = self._session.document
@@ -351,10 +324,15 @@ class FlushBeforeClose(QObject):
     The window closes after at most 0.5 s, even if the block editor doesn't respond.
     """
 
-    def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        parent: QObject,
+        flush: Callable[[Callable[[], None]], object],
+        close: Callable[[], object],
+    ) -> None:
         # `close` is called once if `can_close` had to wait.
         super().__init__(parent)
-        self._editor, self._close = editor, close
+        self._flush, self._close = flush, close
         self._is_requested = self._is_ready = self._is_waiting = False
 
     def can_close(self) -> bool:
@@ -365,11 +343,7 @@ class FlushBeforeClose(QObject):
         """
         if not self._is_requested:
             self._is_requested, self._is_ready = True, False
-            editor = self._editor()
-            if isinstance(editor, SupportsFlush):
-                editor.flush(self._on_flushed)
-            else:
-                self._is_ready = True
+            self._flush(self._on_flushed)
             self._is_waiting = not self._is_ready
             if self._is_waiting:
                 QTimer.singleShot(MAX_FLUSH_MS, self, self._on_flushed)

@@ -8,6 +8,7 @@ import pytest
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.blocks.model.workspace import parse_workspace
+from app.intents import AddTimeLimit, ConnectRobot
 from tests.blocks.fakes import play
 from tests.blocks.samples import (
     block,
@@ -116,10 +117,14 @@ def test_absent_robot_and_missing_time_limit_are_reported_as_problems():
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
     assert (first.subject, first.message) == ("wave", "NAO isn't connected, so wave will be skipped.")
-    assert (first.fix, first.fix_action) == ("Show the robots", "connect:NAO")
+    assert (first.fix, first.fix_action) == ("Show the robots", ConnectRobot("NAO"))
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
     assert second.message == "wait until waits forever if no one appears."
-    assert (second.subject, second.fix, second.fix_action) == ("wait until", "Add a time limit", "limit:w")
+    assert (second.subject, second.fix, second.fix_action) == (
+        "wait until",
+        "Add a time limit",
+        AddTimeLimit("w"),
+    )
 
 
 def sentences(saved, robots=None) -> list[tuple[str, str]]:

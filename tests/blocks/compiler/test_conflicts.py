@@ -7,6 +7,7 @@ import pytest
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.fixes.fixes import fix
 from app.blocks.model.program import Problem
+from app.intents import JoinScripts
 from tests.blocks.fighting import fighter, home, look, turn
 from tests.blocks.samples import block, boolean, call, define, number, say, started, workspace
 
@@ -148,5 +149,5 @@ def test_conflict_fix_does_not_append_below_forever_loop() -> None:
 
 
 def test_conflict_fix_for_missing_script_does_nothing() -> None:
-    assert fix(workspace(named(started(turn("a")), "s1")), "after:s2:s1") is None
-    assert fix(workspace(named(started(turn("a")), "s1")), "after:s1:s1") is None
+    assert fix(workspace(named(started(turn("a")), "s1")), JoinScripts("s2", "s1")) is None
+    assert fix(workspace(named(started(turn("a")), "s1")), JoinScripts("s1", "s1")) is None

@@ -7,6 +7,7 @@ from app.blocks.compiler.foreign import EQUIVALENT_BLOCKS
 from app.blocks.model.program import Program
 from app.blocks.model.workspace import parse_workspace
 from app.blocks.toolbox.catalogue import categories
+from app.intents import PointAtBlock, RenameVariable
 from tests.blocks.samples import block, robot, started, workspace
 
 
@@ -37,7 +38,7 @@ def test_unknown_blocks_including_nested_ones_are_named_as_on_the_canvas() -> No
     assert "no connected robot" in told["r"].message
     assert not any("robot" in told[id].message for id in "qzpv")
     assert "version" in told["n"].message
-    assert (told["q"].fix_action, told["p"].fix_action) == ("point.block:control_if", None)
+    assert (told["q"].fix_action, told["p"].fix_action) == (PointAtBlock("control_if"), None)
 
 
 def test_disabled_unknown_blocks_are_not_reported() -> None:
@@ -60,7 +61,7 @@ def test_variable_without_name_is_reported_with_rename_fix() -> None:
         variables=[{"id": "listed", "name": "count"}],
     )
     (problem,) = (each for each in program.problems if each.severity == "warning")
-    assert (problem.block_id, problem.fix_action) == ("s", "variable.rename:gone")
+    assert (problem.block_id, problem.fix_action) == ("s", RenameVariable("gone"))
     assert {each.id for each in program.variables} == {"gone", "told", "listed"}
     assert "count" not in program.readings["s"]
     assert "speed" in program.readings["t"]

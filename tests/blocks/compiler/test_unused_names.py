@@ -6,6 +6,7 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.fixes.fixes import fix
+from app.intents import AddReceiver, SetAtStart
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, get, list_of, number, stack, started, text, workspace, write
 
@@ -41,7 +42,7 @@ def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
     assert (problem.severity, problem.message) == ("warning", NEVER)
     assert problem.subject in problem.message
     assert problem.fix == "Set it to an empty list at the start"
-    fixed = fix(saved, problem.fix_action or "")
+    fixed = fix(saved, problem.fix_action)
     assert fixed is not None
     program = compile_behaviour(fixed, [])
     assert program.problems == ()
@@ -52,7 +53,7 @@ def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
 def test_program_with_unset_list_runs_after_the_fix():
     saved = workspace(started(add(), write(block("lists_length", LIST=get("scores")))), variables=("scores",))
     assert play(saved).runtime.error is not None
-    fixed = fix(saved, compile_behaviour(saved, []).problems[0].fix_action or "")
+    fixed = fix(saved, compile_behaviour(saved, []).problems[0].fix_action)
     assert fixed is not None
     assert play(fixed).lines == ["1"]
 
@@ -61,7 +62,7 @@ def test_number_never_set_is_reported_and_fix_adds_a_start_script():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.message, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")
-    fixed = fix(saved, problem.fix_action or "")  # there is no start script, so the fix adds one
+    fixed = fix(saved, problem.fix_action)  # there is no start script, so the fix adds one
     assert fixed is not None
     assert compile_behaviour(fixed, []).problems == ()
     assert compile_behaviour(fixed, []).starts == 2
@@ -105,5 +106,5 @@ def test_unset_variable_with_any_name_is_reported(name):
     "blocks", [None, 7, {}, {"blocks": None}, {"blocks": [None, {"type": "events_started", "next": 3}]}]
 )
 def test_fixes_on_invalid_workspace_do_not_raise(blocks):
-    assert fix({"blocks": blocks}, "begin:list:v") is not None
-    assert fix({"blocks": blocks}, "receive:x") is not None
+    assert fix({"blocks": blocks}, SetAtStart("v", is_list=True)) is not None
+    assert fix({"blocks": blocks}, AddReceiver("x")) is not None

@@ -218,7 +218,7 @@ def test_broadcast_without_receiver_is_reported_with_fix():
     assert (problem.severity, problem.block_id) == ("warning", "b")
     assert problem.message == "Nothing receives “start quiz”."
     assert problem.subject in problem.message
-    fixed = fix(saved, problem.fix_action or "")
+    fixed = fix(saved, problem.fix_action)
     assert fixed is not None
     assert compile_behaviour(fixed, []).problems == ()
     assert fixed["blocks"]["blocks"][1]["x"] > 400

@@ -179,7 +179,7 @@ def test_call_of_missing_function_is_an_error_with_fix() -> None:
     assert (problem.message, problem.block_id, problem.fix) == (sentence, "c", "Define the function")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
-    fixed = fix(saved, str(problem.fix_action))
+    fixed = fix(saved, problem.fix_action)
     assert fixed is not None
     again = compile_behaviour(fixed, [])
     assert not again.problems

@@ -7,9 +7,9 @@ import threading
 import pytest
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import AllowOtherComputers
 from app.core.network.remote_access import ALERT, RemoteAccess
 from app.core.storage.settings import Settings
+from app.intents import AllowOtherComputers
 from nep.errors import RequestRefusedError
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress

@@ -17,6 +17,7 @@ from app.core.projects.file_format import parse_file, read_file, write_file
 from app.core.projects.journal import Journal, unsaved_work
 from app.core.projects.open_project import OpenProject
 from app.errors import DocumentError
+from app.intents import AddTimeLimit
 
 ROOT = Path(__file__).parents[3]
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of Unix")
@@ -137,7 +138,7 @@ def test_unknown_file_content_is_preserved_on_save(tmp_path: Path) -> None:
     document = OpenProject(lambda: Journal(tmp_path / "journal"))
     document.open(path)
     assert "s" in {each.block_id for each in document.problems()}, "it is told that it will be skipped"
-    assert document.fix("limit:w")
+    assert document.fix(AddTimeLimit("w"))
     document.save()
     after = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
     assert json.dumps(after["workspace"]["blocks"]["blocks"][0]) == json.dumps(start), "to the byte"

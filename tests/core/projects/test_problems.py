@@ -8,6 +8,7 @@ from app.blocks.model.project import Project
 from app.core.projects.journal import Journal
 from app.core.projects.open_project import OpenProject
 from app.core.projects.problems import Fix, problem_lines
+from app.intents import ConnectRobot, ReplaceRobot, StartVirtualRobot
 from app.robots import simulated
 from app.robots.description.description import Robot, parse, thing_description
 from tests.blocks.samples import block, nao, started, text, workspace
@@ -37,7 +38,7 @@ def test_all_blocks_of_missing_robot_are_reported_as_one_problem() -> None:
     assert line.problem.message == "Pepper isn't connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
     assert line.problem.block_id, "a press leads to the first"
-    assert line.fixes == (Fix("Start a virtual Pepper", "robot.virtual:Pepper"),)
+    assert line.fixes == (Fix("Start a virtual Pepper", StartVirtualRobot("Pepper")),)
 
 
 def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
@@ -56,9 +57,9 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
 def test_missing_robot_fix_says_whether_a_virtual_robot_starts() -> None:
     """The label must not suggest that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
-    assert line.fixes == (Fix("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
+    assert line.fixes == (Fix("Start a virtual Nao 3", StartVirtualRobot("Nao 3")),)
     (line,) = lines(speaks("Nao 3"), [], [])
-    assert line.fixes == (Fix("Show the robots", "connect:Nao 3"),)
+    assert line.fixes == (Fix("Show the robots", ConnectRobot("Nao 3")),)
 
 
 def test_problem_with_a_single_block_names_the_block() -> None:
@@ -69,7 +70,7 @@ def test_problem_with_a_single_block_names_the_block() -> None:
 def test_connected_robot_of_same_model_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
     assert [fix.label for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
-    assert line.fixes[0].action == "robot.use:Pepper:Pepper 2"
+    assert line.fixes[0].action == ReplaceRobot("Pepper", "Pepper 2")
 
 
 def test_missing_robot_without_virtual_or_suitable_robot_has_no_replacement_suggestion() -> None:
@@ -84,8 +85,8 @@ def test_two_missing_robots_are_reported_as_two_problems() -> None:
     )
     found = lines(both, [pepper("A"), pepper("B")], [])
     assert [(line.block_count, line.fixes[0].action) for line in found] == [
-        (2, "robot.virtual:A"),
-        (1, "robot.virtual:B"),
+        (2, StartVirtualRobot("A")),
+        (1, StartVirtualRobot("B")),
     ]
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ChooseRecordingsFolder
 from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import (
     NO_FOLDER_ALERT,
@@ -19,6 +18,7 @@ from app.core.recording.recordings import (
 )
 from app.core.recording.topic_choice import RecordingChoice, RingSettings
 from app.core.storage.settings import Settings
+from app.intents import ChooseRecordingsFolder
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmRule
 from tests.core.recording.test_client import OrdersOnly, status
 

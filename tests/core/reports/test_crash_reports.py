@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ReportProblem
 from app.core.reports.crash import PARTS, Crash, crash_extra
 from app.core.reports.crash_reports import (
     ALERT_ID,
@@ -20,6 +19,7 @@ from app.core.reports.crash_reports import (
     read_reports,
     show_crash_alert,
 )
+from app.intents import ReportProblem
 from nep.version import __version__
 from tests.pseudo import untranslated
 

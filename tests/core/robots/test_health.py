@@ -8,13 +8,13 @@ from typing import cast
 import pytest
 
 from app.core.alerts.alerts import ActiveAlert, Alerts
-from app.core.alerts.intents import ConnectRobot, Inspect, OpenDoctor, StopRobots
 from app.core.network.decode_checks import CheckResult
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RECOVERY_S, RESTART_TIMEOUT_S, Health
 from app.core.robots.reported_count import GROWTH_WINDOW_S, ReportedCount
+from app.intents import ConnectRobot, Inspect, OpenDoctor, StopRobots
 from nep.messages.message import Message
 from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberInfo, TopicInfo
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 from functools import partial
 
 from app.core import session as session_module
-from app.core.alerts.intents import Inspect
 from app.core.network import doctor as doctor_module
 from app.core.network.master import MasterState
 from app.core.network.topics import Topic
@@ -24,6 +23,7 @@ from app.core.projects.saved_tabs import SavedTabs
 from app.core.robots.robot_link import RobotLink, topics_of
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent
+from app.intents import Inspect
 from app.robots.client.stop_report import StopReport
 from app.robots.description.model import Robot
 from nep.messages.message import Message

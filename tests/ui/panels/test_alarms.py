@@ -10,6 +10,7 @@ from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
+from app.ui.panels.row_actions import departure_alarm, silence_alarm
 from app.ui.panels.watch.alarms import PANEL
 from app.ui.panels.watch.alarms.columns import csv_text
 from app.ui.panels.watch.alarms.panel import AlarmsPanel
@@ -317,19 +318,20 @@ def test_limits_are_parsed_as_numbers_for_comparisons_and_otherwise_as_json() ->
 
 def test_menus_of_topics_and_nodes_offer_an_alarm(qtbot, window) -> None:
     for panel, key, wanted in (
-        (topics.PANEL, "/odom", "alarm.topic:/odom"),
-        (nodes.PANEL, "", "alarm.node:"),
+        (topics.PANEL, "/odom", silence_alarm("/odom")),
+        (nodes.PANEL, "", None),
     ):
         made = window.make(panel)
         qtbot.addWidget(made)
         for widget in made.header_widgets():
             qtbot.addWidget(widget)
         made.rebuild()
-        made.table.select_key(key or made.model.key_of(made.model.row_at(made.model.index(0, 0))))
+        row = made.model.row_at(made.model.index(0, 0))
+        made.table.select_key(key or made.model.key_of(row))
         at = made.table.visualRect(made.table.currentIndex()).center()
         reason = QContextMenuEvent.Reason.Mouse
         QApplication.sendEvent(
             made.table.viewport(), QContextMenuEvent(reason, at, made.table.viewport().mapToGlobal(at))
         )
         choose("New alarm")
-        assert window.commands[-1].startswith(wanted)
+        assert window.commands[-1] == (wanted or departure_alarm(row.node.name))

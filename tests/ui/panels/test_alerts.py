@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from app.intents import Inspect
 from app.ui.panels.watch.alerts import PANEL, AlertsPanel
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, press
@@ -25,7 +26,7 @@ def panel(qtbot, window) -> AlertsPanel:
 def test_alert_is_shown_with_its_severity_and_next_step(panel, window) -> None:
     assert panel.rows[0].accessibleName().startswith("error: /faces sends text that is not JSON")
     press(panel.rows[0].button)
-    assert window.commands == ["inspect:/faces"]
+    assert window.commands == [Inspect("/faces")]
     assert (panel.chip.text, panel.chip.status) == ("1", "error")
 
 

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from app.blocks.model.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT_ID
+from app.ui.intents import PressKey, ShowTab
 from app.ui.panels.base import Panel
 from app.ui.panels.build.behaviour.dragged_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.build.behaviour.panel import BehaviourPanel
@@ -238,7 +239,7 @@ def test_undo_button_is_enabled_when_available_and_undoes_in_the_editor(panel, w
 def test_function_keys_in_the_page_trigger_window_commands(panel, window) -> None:
     for key in ("F12", "F5"):
         editor(panel).key_pressed.emit(key)
-    assert window.commands == ["key:F12", "key:F5"]  # the window maps keys to commands
+    assert window.commands == [PressKey("F12"), PressKey("F5")]  # the window maps keys to commands
 
 
 def test_tab_shows_name_and_save_state_of_the_behaviour(panel, window) -> None:
@@ -408,7 +409,7 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     assert shown.isVisible()
     assert (shown.width(), shown.height()) == (30, 20)
     assert shown.pos() == title.window().mapFromGlobal(place) + POINTER_OFFSET
-    qtbot.waitUntil(lambda: window.commands == [f"tab:{other.key}"])
+    qtbot.waitUntil(lambda: window.commands == [ShowTab(other.key)])
     editor(panel).blocks_dragged_outside.emit(None, home.key)
     assert not shown.isVisible()
     editor(panel).drag_picture_rendered.emit(bytes(data.data()), 2.0)

@@ -8,6 +8,7 @@ from PySide6.QtGui import QContextMenuEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
+from app.ui.intents import CloseTab, DuplicateTab
 from app.ui.panels.build.behaviour.tab import TabState
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from app.ui.theme.theme import Theme
@@ -165,7 +166,7 @@ def test_tabs_are_not_clipped_at_200_per_cent_text_size(tabs, theme) -> None:
 
 @pytest.mark.qt_log_ignore("does not support", extend=True)
 def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
-    asked = heard(tabs.command_requested)
+    asked = heard(tabs.intent_requested)
     place = tabs.tabs["b"].geometry().center()
     QApplication.sendEvent(
         tabs, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, tabs.mapToGlobal(place))
@@ -186,7 +187,7 @@ def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
     for each in ("Duplicate", "Close"):
         by_words[each].trigger()
     menu.close()
-    assert asked == [("tab.duplicate", "b"), ("tab.close", "b")]
+    assert asked == [(DuplicateTab("b"),), (CloseTab("b"),)]
 
 
 # -- renaming -------------------------------------------------------------------------------------

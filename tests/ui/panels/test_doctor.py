@@ -10,6 +10,8 @@ from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
 from app.core.reports.not_installed import MissingLibraries, alert_missing
+from app.intents import AllowOtherComputers, Inspect
+from app.ui.intents import OpenPanel, SelectService
 from app.ui.panels.base import Blocker, PanelWidget, paused_blocker
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.watch import console
@@ -280,16 +282,16 @@ def test_open_recording_that_hides_the_live_topic_is_reported(qtbot, panel, wind
         (
             Finding("topic:closed", "info", "This computer only."),
             "Let other computers connect",
-            "network.others",
+            AllowOtherComputers(),
         ),
-        (Finding("topic:unreadable", "error", "No JSON."), "Show the bytes", "inspect:/x"),
-        (Finding("topic:name", "error", "No name."), "Choose a topic", "panel:topics"),
+        (Finding("topic:unreadable", "error", "No JSON."), "Show the bytes", Inspect("/x")),
+        (Finding("topic:name", "error", "No name."), "Choose a topic", OpenPanel("topics")),
         (
             Finding("topic:silent:cam", "error", "Silent.", instead="restart"),
             "Call restart",
-            "service.call:restart",
+            SelectService("restart"),
         ),
-        (Finding("topic:service", "error", "A service.", instead="/x"), "Call /x", "service.call:/x"),
+        (Finding("topic:service", "error", "A service.", instead="/x"), "Call /x", SelectService("/x")),
     ],
 )
 def test_each_finding_has_one_button(qtbot, panel, window, finding, button, command) -> None:

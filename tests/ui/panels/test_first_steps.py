@@ -9,6 +9,8 @@ import pytest
 
 from app import resources
 from app.core.projects.file_format import read_file
+from app.intents import PointAtBlock
+from app.ui.intents import HideBlockHint, PointAtButton
 from app.ui.panels.base import Panel
 from app.ui.panels.build.first_steps.panel import HINT_DELAY_S, FirstStepsPanel
 from app.ui.panels.build.first_steps.steps import (
@@ -151,7 +153,7 @@ def test_next_step_shows_its_hint_and_button(panel, window) -> None:
         "Drag “when started” onto the page: the next step",
     ]
     press(panel.rows[1].button)
-    assert window.commands[-1] == "point.block:events_started"
+    assert window.commands[-1] == PointAtBlock("events_started")
     assert panel.chip.text == "1 of 6"
 
 
@@ -168,10 +170,10 @@ def test_show_me_points_at_the_block_of_the_connected_robot(panel, window) -> No
     window.session.join(pepper())
     build(panel, block("events_started"))
     press(panel.rows[2].button)
-    assert window.commands[-1] == "point.block:robot_virtual_pepper_do_say"
+    assert window.commands[-1] == PointAtBlock("robot_virtual_pepper_do_say")
     build(panel, block("events_started", block(SAYS)))
     press(panel.rows[3].button)
-    assert window.commands[-1] == "point.button:run.run"
+    assert window.commands[-1] == PointAtButton("run.run")
 
 
 def test_hint_for_a_detached_block_says_where_to_attach_it(panel, window) -> None:
@@ -210,9 +212,9 @@ def test_next_step_is_highlighted_once_after_twenty_idle_seconds(panel, window, 
     clock.now += HINT_DELAY_S
     panel.refresh()
     panel.refresh()
-    assert window.commands == ["point.block:events_started"]
+    assert window.commands == [PointAtBlock("events_started")]
     build(panel, block("events_started"))
-    assert window.commands[-1] == "point.block:-", "the ring goes with its step"
+    assert window.commands[-1] == HideBlockHint(), "the ring goes with its step"
 
 
 def test_completed_first_steps_show_next_steps_and_can_be_restarted(panel, window) -> None:

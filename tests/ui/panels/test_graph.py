@@ -18,6 +18,8 @@ from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
 from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
+from app.ui.intents import PublishMessage, RecordTopic, SelectService
+from app.ui.panels.row_actions import departure_alarm, silence_alarm
 from app.ui.panels.watch.graph.panel import DOT_KIND, PANEL, SVG_KIND, GraphPanel
 from app.ui.panels.watch.graph.scene import GraphScene
 from app.ui.panels.watch.graph.texts import line_width, short_rate
@@ -248,13 +250,13 @@ def test_click_on_an_edge_shows_its_topic_and_inspect_opens_the_topic(
     ]
     assert panel.card.isVisible()
     press(panel.card.record)
-    assert window.commands == ["record.topic:/blackboard"]
+    assert window.commands == [RecordTopic("/blackboard")]
     press(panel.card.inspect)
     assert window.opened == ["/blackboard"]
     press(panel.card.plot)
     assert window.plotted == [("/blackboard", "")]
     press(panel.card.alarm)
-    assert window.commands == ["record.topic:/blackboard", "alarm.topic:/blackboard"]
+    assert window.commands == [RecordTopic("/blackboard"), silence_alarm("/blackboard")]
     press(panel.card.close_button)
     assert panel.canvas.selection is None
     assert not panel.card.isVisible()
@@ -282,7 +284,7 @@ def test_node_card_links_to_its_topics(panel: GraphPanel, window: Window) -> Non
     assert not panel.card.inspect.isVisible()
     assert not panel.card.plot.isVisible()
     press(panel.card.alarm)
-    assert window.commands == ["alarm.node:blackboard"]
+    assert window.commands == [departure_alarm("blackboard")]
     press(button(panel.card, "/touch"))
     assert panel.canvas.selection == GraphSelection("topic", "/touch")
     press(button(panel.card, "pepper_driver"))
@@ -334,18 +336,21 @@ def test_context_menu_of_an_edge_lists_the_commands_of_its_topic(panel: GraphPan
     assert (window.opened, window.beside, window.plotted) == (
         ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
     )  # fmt: skip
-    about = ("publish.topic", "alarm.topic", "record.topic")
-    assert window.commands == [f"{command}:/blackboard" for command in about]
+    assert window.commands == [
+        PublishMessage("/blackboard"),
+        silence_alarm("/blackboard"),
+        RecordTopic("/blackboard"),
+    ]
     assert QGuiApplication.clipboard().text() == "/blackboard"
     assert run_all(panel.menu_of(GraphSelection("topic", "remember"))) == ["Call service", "Copy name"]
-    assert window.commands[-1] == "service.call:remember"
+    assert window.commands[-1] == SelectService("remember")
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 def test_menu_key_opens_the_menu_of_the_selected_node(panel: GraphPanel, window: Window) -> None:
     panel.canvas.select(GraphSelection("node", key_of(panel, "pepper_driver")))
     assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy name"]
-    assert window.commands == ["alarm.node:pepper_driver"]
+    assert window.commands == [departure_alarm("pepper_driver")]
 
 
 def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPanel, window: Window) -> None:
@@ -362,8 +367,11 @@ def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPane
     part = menu.actions()[0].menu()
     assert isinstance(part, QMenu)
     run_all(part)
-    about = ("publish.topic", "alarm.topic", "record.topic")
-    assert window.commands == [f"{command}:/touch&go" for command in about]
+    assert window.commands == [
+        PublishMessage("/touch&go"),
+        silence_alarm("/touch&go"),
+        RecordTopic("/touch&go"),
+    ]
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, 2.0**64, -1.0])

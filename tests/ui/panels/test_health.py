@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from app.intents import ConnectRobot, OpenDoctor
 from app.ui.panels.robots.health import PANEL, HealthPanel
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
@@ -60,7 +61,7 @@ def test_problems_are_counted_and_listed_first(panel, asked) -> None:
     assert (panel.chip.text, panel.chip.status) == ("2 problems", "error")
 
 
-@pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
+@pytest.mark.parametrize(("virtual", "does"), [(True, ConnectRobot("Pepper")), (False, OpenDoctor())])
 def test_unresponsive_robot_shows_a_next_step(panel, asked, virtual: bool, does: str) -> None:
     link = asked.session.fleet.links[0]
     link.robot, link.is_unresponsive = replace(link.robot, virtual=virtual), True

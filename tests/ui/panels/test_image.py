@@ -14,6 +14,8 @@ from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 
 from app.core.messages.picture import Picture
+from app.intents import Inspect
+from app.ui.intents import ExportRecording, RecordTopic
 from app.ui.panels.robots.camera import PANEL as CAMERA
 from app.ui.panels.robots.camera import CameraPanel
 from app.ui.panels.watch.image.actions import ACTION_SPECS
@@ -394,14 +396,14 @@ def test_sequence_command_records_the_topic_or_exports_the_open_recording(qtbot,
     panel = made(qtbot, window)
     (action,) = [each for each in panel.more_actions() if each.text() == "Record a sequence"]
     action.trigger()
-    assert window.commands == [f"record.topic:{panel._topic}"]
+    assert window.commands == [RecordTopic(panel._topic)]
     path = tmp_path / "Tour.mcap"
     record(path, [[recorded(seq) for seq in range(3)]])
     window.session.open_recording(path)
     panel.more_actions()
     assert action.text() == "Save the sequence as files"
     action.trigger()
-    assert window.commands[1:] == [f"recording.export:{path}"]
+    assert window.commands[1:] == [ExportRecording(path)]
     panel.show_topic("")
     panel.more_actions()
     assert not action.isEnabled()
@@ -560,7 +562,7 @@ def test_topic_without_images_offers_the_inspector(qtbot, qapp) -> None:
     panel.refresh()
     assert panel.empty._title.text() == "Can't show the message as an image"
     next(each for each in panel.empty._buttons).click()
-    assert window.commands == ["inspect:/cam"]
+    assert window.commands == [Inspect("/cam")]
     assert panel.fit_button.isHidden()
 
 

@@ -14,13 +14,13 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
+from app.ui.intents import NewValueAlarm, OpenPanel
 from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TREE
 from app.ui.panels.watch.inspector.diff import NO_BASE, changes_text, count_changes
 from app.ui.panels.watch.inspector.footer import message_info
 from app.ui.panels.watch.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.watch.inspector.tree_model import TreeNode
 from app.ui.panels.watch.inspector.values import clipboard_text, image_summary
-from app.ui.shell.commands.view import parse_topic_field
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.fields import parse_path
 from nep.messages.message import Message, message_kind
@@ -53,7 +53,7 @@ def test_without_a_topic_the_inspector_links_to_the_topics_panel(panel, window) 
     assert panel.body.page == NOTHING
     assert window.session.watched == []
     press(button(panel.body.empty, "Choose a topic"))
-    assert window.commands == ["panel:topics"]
+    assert window.commands == [OpenPanel("topics")]
 
 
 def test_inspector_watches_only_the_shown_topic(panel, window) -> None:
@@ -587,9 +587,9 @@ def test_alarm_is_created_from_a_value_with_any_key_names(panel, window) -> None
         assert isinstance(menu, QMenu)
         menu.close()
         next(each for each in menu.actions() if each.text() == "New alarm").trigger()
-        command, _colon, about = window.commands[-1].partition(":")
-        topic, path = parse_topic_field(about)
-        assert (command, topic, parse_path(path)) == ("alarm.value", "/blackboard", steps)
+        intent = window.commands[-1]
+        assert isinstance(intent, NewValueAlarm)
+        assert (intent.topic, parse_path(intent.path)) == ("/blackboard", steps)
 
 
 def test_value_is_plotted_by_action_or_footer_button_and_can_be_dragged(panel, window, monkeypatch) -> None:

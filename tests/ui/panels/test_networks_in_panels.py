@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtWidgets import QLabel
 
 from app.core.network.source import GraphReceived, MasterLost, WatchFailed
+from app.intents import BrowseNetworks
 from app.ui.panels.watch.image.panel import PANEL as IMAGE
 from app.ui.panels.watch.inspector.panel import PANEL as INSPECTOR
 from app.ui.panels.watch.inspector.panel import InspectorPanel
@@ -163,7 +164,7 @@ def test_rows_of_a_lost_network_are_grey_and_show_the_reason(qtbot, window: Wind
         assert panel.model.cell_at(panel.model.index_of(key).row(), 0).role == "textDisabled"
     assert topics.model.cell_at(topics.model.index_of("/odom").row(), 0).role == "text"
     topics.networks.button.click()
-    assert window.commands == ["network.look"]
+    assert window.commands == [BrowseNetworks()]
     ros.tell(GraphReceived(ros_graph(), 0.0))
     ticks(window, topics, 2)
     assert not topics.networks.isVisibleTo(topics)

@@ -23,6 +23,9 @@ from tests.ui.panels.test_behaviour import Editor
 BASES = {
     "act.armed_strip",
     "base",
+    "build.variable_values",
+    "command",
+    "home",
     "registry",
     "network_table",
     "one_robot_panel",

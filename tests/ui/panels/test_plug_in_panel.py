@@ -1,4 +1,4 @@
-"""Test of a plug-in panel in one file: listed, docked, refreshed and restored."""
+"""Test of a plug-in panel in one file: listed, at home in the layout, with its commands and intents."""
 
 from __future__ import annotations
 
@@ -24,9 +24,21 @@ SOURCE = '''
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from PySide6.QtWidgets import QLabel, QVBoxLayout
 
+from app.intents import Intent
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import RowHome
+
+
+@dataclass(frozen=True)
+class SetCount(Intent):
+    """Set the counter."""
+
+    count: int
 
 
 class Counter(PanelWidget):
@@ -35,7 +47,7 @@ class Counter(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         """Start with none."""
         super().__init__(context, "Counter")
-        self.count = 0
+        self.count = self.reset_count = 0
         self.label = QLabel(self)
         QVBoxLayout(self).addWidget(self.label)
 
@@ -44,8 +56,35 @@ class Counter(PanelWidget):
         self.count += 1
         self.label.setText(str(self.count))
 
+    def reset(self) -> None:
+        """Begin again."""
+        self.count = 0
+        self.reset_count += 1
 
-PANEL = Panel("counter", "Counter", "hash", (), Counter)
+    def double(self) -> None:
+        """Double the count."""
+        self.count *= 2
+
+    def set_count(self, intent: SetCount) -> None:
+        """Continue with another number."""
+        self.count = intent.count
+
+
+PANEL = Panel(
+    "counter",
+    "Counter",
+    "hash",
+    (),
+    Counter,
+    home=(RowHome("developer", 1, 1, 200),),
+    commands=(
+        Command("counter.reset", "Reset the counter", Counter.reset, "View", ("Ctrl+Alt+Z",),
+                after="view.freeze"),
+        Command("counter.double", "Double the counter", Counter.double, "View", ("F5", "Ctrl+Alt+D"),
+                disabled_reason=lambda context: "" if context.layout() else "Not on the start page"),
+    ),
+    intents=(IntentHandler(SetCount, Counter.set_count),),
+)
 '''
 
 
@@ -70,20 +109,61 @@ def menu_named(where: QMenuBar | QMenu, name: str) -> QMenu:
     )
 
 
-def test_plug_in_panel_is_listed_docked_and_refreshed(
-    qtbot, plug_in: None, theme: Theme, session: Session
-) -> None:
-    window = MainWindow(session, theme, {**PANELS, "counter": PanelRegistry()["counter"]}, [])
-    qtbot.addWidget(window)
-    window.show_layout("developer")
+@pytest.fixture
+def window(qtbot, plug_in: None, theme: Theme, session: Session) -> Iterator[MainWindow]:
+    made = MainWindow(session, theme, {**PANELS, "counter": PanelRegistry()["counter"]}, [])
+    qtbot.addWidget(made)
+    yield made
+    made.close()
+
+
+def test_plug_in_panel_is_listed_and_has_its_home_in_the_layout(qtbot, window: MainWindow) -> None:
+    bench = window.show_layout("developer")
     window.show()
+    dock = bench.docks["counter"]
+    qtbot.waitUntil(dock.is_displayed)
+    inspector = bench.docks["inspector"]
+    assert dock.x() == inspector.x()
+    assert dock.y() > inspector.y()
     view = menu_named(window.bar.menus, "View")
     view.aboutToShow.emit()
     entries = {action.text().replace("&", ""): action for action in menu_named(view, "Panels").actions()}
-    entries["Counter"].trigger()
-    dock = window.bench.docks["counter"]
-    assert dock is not None
-    qtbot.waitUntil(dock.is_displayed)
+    assert entries["Counter"].isChecked()
+    assert "panel:counter" in {entry.id for entry in window.commands.entries.all()}
     window.tick()
     assert dock.panel.count >= 1
-    window.close()
+    assert "counter" not in window.show_layout("behaviour").docks
+
+
+def test_commands_of_a_plug_in_panel_are_in_menu_palette_and_shortcuts(window: MainWindow) -> None:
+    view = menu_named(window.bar.menus, "View")
+    view.aboutToShow.emit()
+    texts = [action.text() for action in view.actions()]
+    start = texts.index("Freeze display") + 1
+    assert texts[start : start + 2] == ["Reset the counter", "Double the counter"]
+    entries = {entry.id: entry for entry in window.commands.entries.all()}
+    assert entries["command:counter.reset"].key == "Ctrl+Alt+Z"
+    assert entries["command:counter.double"].key == "Ctrl+Alt+D", "F5 is the key of Run"
+    assert entries["command:counter.double"].reason == "Not on the start page"
+    assert window.commands.shortcuts.command_for("Ctrl+Alt+Z") == "counter.reset"
+    assert window.commands.actions["counter.reset"].shortcuts()[0].toString() == "Ctrl+Alt+Z"
+
+
+def test_commands_of_a_plug_in_panel_open_it_at_home_and_run_on_it(window: MainWindow) -> None:
+    window.show_layout("behaviour")
+    assert window.context.run("counter.reset") is None
+    assert window.current_layout == "developer"
+    counter = window.benches["developer"].docks["counter"].panel
+    assert counter.reset_count == 1
+    counter.count = 4
+    assert window.commands.run("counter.double")
+    assert counter.count == 8
+
+
+def test_intent_opens_the_plug_in_panel_that_handles_it(window: MainWindow) -> None:
+    intent = sys.modules["app.ui.panels.watch.counter"].SetCount(7)
+    bench = window.show_layout("developer")
+    bench.docks["counter"].close()
+    window.context.request(intent)
+    assert "counter" in bench.open_names()
+    assert bench.docks["counter"].panel.count == 7

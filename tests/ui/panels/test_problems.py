@@ -7,6 +7,8 @@ from PySide6.QtTest import QTest
 
 from app.blocks.model.program import Problem
 from app.core.reports.not_installed import MissingLibraries, alert_missing
+from app.intents import ConnectRobot, ReplaceRobot
+from app.ui.intents import ShowBlock
 from app.ui.panels.build.problems import PANEL, ProblemsPanel
 from app.ui.widgets import paint
 from app.ui.widgets.keyboard import tab_stops
@@ -42,7 +44,7 @@ def test_each_problem_is_shown_with_its_message_and_fix(panel, window) -> None:
 def test_click_or_return_shows_the_block(panel, window) -> None:
     QTest.mouseClick(panel.rows[0], Qt.MouseButton.LeftButton, pos=QPoint(200, 15))
     QTest.keyClick(panel.rows[1], Qt.Key.Key_Return)
-    assert window.commands == ["block:b8", "block:b3"]
+    assert window.commands == [ShowBlock("b8"), ShowBlock("b3")]
 
 
 def test_behaviour_is_checked_only_after_an_edit(panel, window) -> None:
@@ -82,7 +84,7 @@ def test_missing_robot_is_one_row_that_lists_possible_replacements(panel, window
     document = window.session.document
     absent = [
         Problem("warning", f"b{n}", "robot", "say", "Pepper 2 isn't connected, so say will be skipped.",
-                "Show the robots", "connect:Pepper 2", icon="message-circle")
+                "Show the robots", ConnectRobot("Pepper 2"), icon="message-circle")
         for n in range(3)
     ]  # fmt: skip
     document.found, document.edits, document.absent_blocks = tuple(absent), 7, ("b0", "b1", "b2")
@@ -94,7 +96,7 @@ def test_missing_robot_is_one_row_that_lists_possible_replacements(panel, window
     assert row.accessibleName() == "warning: Pepper 2 isn't connected, so 3 blocks will be skipped."
     assert [button.text() for button in row.buttons] == ["Use Pepper"]
     press(row.buttons[0])
-    assert window.commands == ["robot.use:Pepper 2:Pepper"]
+    assert window.commands == [ReplaceRobot("Pepper 2", "Pepper")]
     assert panel.chip.toolTip() == "1 warning"
 
 

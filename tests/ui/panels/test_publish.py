@@ -12,6 +12,7 @@ from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import SavedMessage
 from app.core.world.world import World
+from app.ui.intents import PublishMessage
 from app.ui.panels.act.publish import PANEL
 from app.ui.panels.act.publish.panel import PublishPanel
 from app.ui.panels.watch.topics import panel as topics
@@ -254,7 +255,7 @@ def test_publish_is_in_the_menu_of_topics_with_fields(qtbot, window) -> None:
         qtbot.addWidget(widget)
     action = next(each for each in table.row_actions("/blackboard") if each.text == "Publish to this topic")
     action.run()
-    assert window.commands == ["publish.topic:/blackboard"]
+    assert window.commands == [PublishMessage("/blackboard")]
     assert "Publish to this topic" not in [each.text for each in table.row_actions("/robot/camera")]
 
 

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
 from app.core.timeline.times import clock_text
+from app.ui.intents import OpenRecording, RecordTopic
 from app.ui.panels.record.recordings import PANEL
 from app.ui.panels.record.recordings import panel as panel_module
 from app.ui.panels.record.recordings.columns import badge_of
@@ -118,7 +119,7 @@ def test_click_selects_and_enter_opens_a_recording(qtbot, panel, window, folder)
     QTest.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
     assert window.commands == []
     QTest.keyClick(table, Qt.Key.Key_Return)
-    assert window.commands == [f"recording.open:{folder / 'arm.mcap'}"]
+    assert window.commands == [OpenRecording(folder / "arm.mcap")]
 
 
 def test_f2_renames_a_recording_in_place_and_overwrites_no_file(qtbot, panel, window, folder):
@@ -349,7 +350,7 @@ def test_recording_saved_by_an_alarm_is_opened_from_its_history(qtbot, window, f
     (action,) = (each for each in menu.actions() if each.text() == "Open the recording")
     menu.close()
     action.trigger()
-    assert window.commands == [f"recording.open:{folder / 'alarm-2026-11-26-22-01-05.mcap'}"]
+    assert window.commands == [OpenRecording(folder / "alarm-2026-11-26-22-01-05.mcap")]
     panel.dispose()
 
 
@@ -361,5 +362,5 @@ def test_record_topic_in_the_topic_menu_runs_the_record_command(qtbot, folder):
         qtbot.addWidget(widget)
     (run,) = (each.run for each in panel.row_actions("/odom") if each.text == "Record topic")
     run()
-    assert window.commands == ["record.topic:/odom"]
+    assert window.commands == [RecordTopic("/odom")]
     panel.dispose()

@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
 from app.blocks.model.stack import Stack
+from app.ui.intents import OpenPanel
 from app.ui.panels.robots.robot.panel import PANEL, STALE_AFTER_S, RobotPanel
 from tests.blocks.samples import block, number, started, workspace
 from tests.ui.fakes import Session
@@ -160,7 +161,7 @@ def test_real_robot_has_a_link_to_its_actions_instead_of_a_drawing(qtbot, qapp) 
     assert isinstance(panel, RobotPanel)
     assert not panel.reset_button.isVisibleTo(panel)
     press(button(panel, "Show actions"))
-    assert window.commands == ["panel:robots"]
+    assert window.commands == [OpenPanel("robots")]
     panel.dispose()
     assert window.session.looked_at == []
 

@@ -10,6 +10,7 @@ from PySide6.QtGui import QGuiApplication
 from app.core.run.acting.arming import Target
 from app.core.run.acting.sent_log import SentRecord
 from app.core.run.acting.shelf import SavedMessage
+from app.ui.intents import SelectService
 from app.ui.panels.act.sent import PANEL, SentPanel
 from tests.pseudo import untranslated_in
 from tests.ui.clipping import clipped
@@ -135,7 +136,7 @@ def test_menus_of_sent_calls_and_replayed_messages_differ_from_published_message
     ]
     called = next(each for each in acting.sent_log.records if each.origin == "service")
     panel.table.opened.emit(str(called.number))
-    assert window.commands[-1] == "service.call:remember_face"
+    assert window.commands[-1] == SelectService("remember_face")
     panel.table.opened.emit("12345")
     assert panel.menu_of("12345") is None
 

@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 
 from app.core.run.acting.arming import Target
+from app.ui.intents import SelectService
 from app.ui.panels.act.services import PANEL
 from app.ui.panels.act.services.panel import ServicesPanel
 from app.ui.panels.act.services.reply_view import MAX_ROWS, MAX_TEXT_CHARS, reply_rows
@@ -200,7 +201,7 @@ def test_service_from_a_menu_command_is_selected(window, panel) -> None:
     assert panel.text == "{}"
     for action in service_actions(window.context(), "set_language"):
         action.run()
-    assert window.commands == ["service.call:set_language"]
+    assert window.commands == [SelectService("set_language")]
 
 
 def test_large_and_deeply_nested_replies_are_shown_in_a_bounded_number_of_rows() -> None:

@@ -9,6 +9,8 @@ from PySide6.QtTest import QTest
 from app.blocks.model.program import Variable
 from app.blocks.runtime.events import VariablesChanged
 from app.blocks.runtime.variables import VariableValue, display_value
+from app.intents import RenameVariable
+from app.ui.intents import DeleteVariable, ToggleVariableWatch
 from app.ui.panels.build.variables import PANEL, VariablesPanel, rows_of, value_cell
 from app.ui.widgets.table.model import Order
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
@@ -113,7 +115,11 @@ def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
     }
     menu.actions()[0].trigger()
     menu.deleteLater()
-    assert window.commands[-3:] == ["variable.rename:score", "variable.delete:score", "variable.watch:score"]
+    assert window.commands[-3:] == [
+        RenameVariable("score"),
+        DeleteVariable("score"),
+        ToggleVariableWatch("score"),
+    ]
 
 
 def test_panel_without_variables_explains_variables_and_offers_to_create_a_variable(panel, window) -> None:

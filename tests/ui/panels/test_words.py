@@ -16,7 +16,8 @@ from app.core.run.acting.picture_point import MESSAGE_TYPES, default_topic
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
 from app.ui.panels.base import Panel, PanelWidget
-from app.ui.panels.build.behaviour import panel as behaviour
+from app.ui.panels.build import behaviour
+from app.ui.panels.build.behaviour.panel import BehaviourPanel
 from app.ui.panels.watch.alarms.phrases import payload_text
 from app.ui.panels.watch.inspector.tree_view import TreeView
 from app.ui.panels.watch.nodes import rows as nodes
@@ -55,7 +56,7 @@ def panel_of(name: str) -> Panel:
     """Return a panel by name; the Behaviour panel has a fake block editor, which is tested separately."""
     if name != "behaviour":
         return SIZES[name][0]
-    make = lambda context: behaviour.BehaviourPanel(context, Editor)  # noqa: E731
+    make = lambda context: BehaviourPanel(context, Editor)  # noqa: E731
     return Panel("behaviour", behaviour.PANEL.title, "blocks", (), make)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
+from app.ui.intents import PublishMessage, SelectService
 from app.ui.panels.act.publish import PANEL as PUBLISH
 from app.ui.panels.act.publish.panel import PublishPanel
 from app.ui.panels.act.services import PANEL as SERVICES
@@ -38,7 +39,8 @@ def acting_of(window: MainWindow) -> SessionActing:
 
 def test_publish_and_call_commands_open_their_panels_and_stop_disarms(window: MainWindow) -> None:
     acting, run = acting_of(window), window.commands.run
-    assert run("publish.topic:/blackboard")
+    request = window.commands.request
+    assert request(PublishMessage("/blackboard"))
     bench = window.show_layout("developer")
     publish = bench.docks["publish"].panel
     assert isinstance(publish, PublishPanel)
@@ -46,8 +48,8 @@ def test_publish_and_call_commands_open_their_panels_and_stop_disarms(window: Ma
     assert publish.message.topic == "/blackboard"
     assert run("publish.new")
     assert [each.topic for each in acting.saved_messages.messages] == ["/blackboard", ""]
-    assert not run("publish.topic:ros2 /camera"), "other networks are only looked at"
-    assert run("service.call:remember_face")
+    assert not request(PublishMessage("ros2 /camera")), "other networks are only looked at"
+    assert request(SelectService("remember_face"))
     assert isinstance(bench.docks["services"].panel, ServicesPanel)
     assert {"publish", "services"} <= {entry.name for entry in window.commands.entries.all()}
     assert not acting.arming.is_on, "nothing is armed by opening a panel"

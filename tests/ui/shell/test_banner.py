@@ -8,8 +8,8 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
-from app.core.alerts.intents import OpenDoctor, StopRobots
 from app.core.run.view import RunView
+from app.intents import OpenDoctor, StopRobots
 from app.ui.shell.bars.banner import CLICK_GUARD_S
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import STATUS_REFRESH_TICKS, MainWindow

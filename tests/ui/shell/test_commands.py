@@ -1,39 +1,42 @@
-"""Tests of the command table: every referenced command exists, and command arguments are typed."""
+"""Tests of commands and intents: every referenced command exists, and every intent has one handler."""
 
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator
-from dataclasses import fields
 from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from PySide6.QtWidgets import QMenu
 
 import app
-from app.core.alerts.intents import Intent
-from app.ui.intents import command_of
+from app import intents
+from app.intents import Intent
+from app.ui import intents as window_intents
+from app.ui.panels.base import Diagnose
+from app.ui.panels.command import UnknownCommandError
+from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.actions.actions import MENU_ROLES, STOP_COMMAND
-from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.bars.run_bar import SPEED_COMMANDS
-from app.ui.shell.commands.behaviours import TabPosition
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.menus import LAYOUT_COMMANDS
-from app.ui.shell.commands.robots import RobotReplacement
-from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
+from app.ui.shell.commands.table import COMMANDS, INTENT_COMMANDS, INTENTS, MENUS
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
-IDS = {command.id for command in COMMANDS}
-ABOUT = {command.id for command in ARGUMENT_COMMANDS}
-CALLS = {"run": 0, "_run": 0, "bind": 1, "assign_command": 1, "Fix": 1, "_raise_alert": 1}
+PANEL_COMMANDS = [command for panel in PanelRegistry().values() for command in panel.commands]
+IDS = {command.id for command in (*COMMANDS, *PANEL_COMMANDS)}
+CALLS = {"run": 0, "_run": 0, "bind": 1, "assign_command": 1}
 """Functions that take a command id, with its argument position; `setProperty` is handled separately."""
-KEYWORDS = {"action", "fix_action"}
+INTENT_CLASSES = [
+    *(each for module in (intents, window_intents) for each in vars(module).values() if isinstance(each, type)
+      and issubclass(each, Intent) and each.__module__ == module.__name__),
+    Diagnose,
+]  # fmt: skip
+"""All classes of intents; `Intent` and `BlockFix` are base classes."""
 
 
 Constants = dict[str, str]
@@ -67,7 +70,7 @@ def named(path: Path) -> Iterator[tuple[str, int]]:
         if not isinstance(node, ast.Call):
             continue
         called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        given = [keyword.value for keyword in node.keywords if keyword.arg in KEYWORDS]
+        given = []
         if called == "add_argument":  # argparse, not a command of the window
             continue
         if called == "setProperty" and list(said(node.args[0], constants)) == ["command"]:
@@ -88,12 +91,7 @@ def modules() -> list[Path]:
 
 def is_known(words: str) -> bool:
     """Return whether the command table contains an id or a pattern with "{}"."""
-    id, colon, argument = words.partition(":")
-    if id == "{}" and colon:  # menu of a tab: its commands are checked where they are listed
-        return True
-    if not colon and "{}" in id:
-        return bool([known for known in IDS if fnmatch(known, id.replace("{}", "*"))])
-    return id in ABOUT and bool(argument) if colon else id in IDS
+    return any(fnmatch(known, words.replace("{}", "*")) for known in IDS) if "{}" in words else words in IDS
 
 
 @cache
@@ -104,15 +102,8 @@ def found() -> list[tuple[Path, str, int]]:
 
 def test_command_references_in_core_code_panels_and_buttons_are_collected() -> None:
     words = {words for _, words, _ in found()}
-    assert {
-        "limit:{}",
-        "robot.use:{}:{}",
-        "robot.virtual:{}",
-        "tab.move:{}:{}",  # panels
-        "edit.undo",  # buttons
-        "run.stop",
-    } <= words
-    assert len(words) > 30
+    assert {"layout.{}", "help.doctor", "file.new", "edit.undo", "run.stop"} <= words
+    assert len(words) > 25
 
 
 def test_every_referenced_command_is_registered() -> None:
@@ -124,21 +115,22 @@ def test_lists_of_command_ids_contain_only_existing_commands() -> None:
     assert {*MENU_ROLES, *SPEED_COMMANDS, *LAYOUT_COMMANDS, STOP_COMMAND} <= IDS
 
 
-def test_every_tab_command_of_the_tab_menu_is_registered() -> None:
-    source = (Path(app.__file__).parent / "ui" / "panels" / "build" / "behaviour" / "tabs.py").read_text(
-        "utf-8"
-    )
-    listed = set(re.findall(r'"(tab\.[a-z_]+)"', source))
-    assert len(listed) == 6
-    assert listed <= ABOUT
+@pytest.mark.parametrize("kind", INTENT_CLASSES, ids=lambda kind: kind.__name__)
+def test_each_intent_has_one_handler(kind: type[Intent]) -> None:
+    handled = [*INTENT_COMMANDS, *(each.kind for each in INTENTS)]
+    handled += [handler.kind for panel in PanelRegistry().values() for handler in panel.intents]
+    classes = {*kind.__mro__} - {Intent}
+    expected = 0 if kind is Intent else 1
+    assert len([each for each in handled if each in classes]) == expected
+    assert set(INTENT_COMMANDS.values()) <= IDS
 
 
-@pytest.mark.parametrize("kind", get_args(Intent), ids=lambda kind: kind.__name__)
-def test_next_step_of_an_alert_is_an_existing_command(kind: type[Intent]) -> None:
-    assert is_known(command_of(kind(*("x" for _field in fields(kind)))))
+def test_request_of_an_intent_without_handler_raises_immediately(commands: Commands) -> None:
+    with pytest.raises(UnknownCommandError, match="Intent"):
+        commands.request(Intent())
 
 
-@pytest.mark.parametrize("name", ["nonsense", "nonsense:x", "panel.nonsense", "run.run:x", ""])
+@pytest.mark.parametrize("name", ["nonsense", "panel:topics", "panel.nonsense", "run.run:x", ""])
 def test_unknown_command_raises_immediately(commands: Commands, name: str) -> None:
     with pytest.raises(UnknownCommandError, match="no command"):
         commands.run(name)
@@ -153,17 +145,11 @@ def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) 
         window.commands.shortcuts.shortcuts_of("help.nobody")
 
 
-def test_command_arguments_are_parsed_to_typed_values() -> None:
-    assert TabPosition.parse("a:b:2") == TabPosition("a:b", 2)
-    assert RobotReplacement.parse("NAO:Pepper:2") == RobotReplacement("NAO", "Pepper:2")
-    with pytest.raises(ValueError, match="invalid literal"):
-        TabPosition.parse("key:first")
-
-
 def test_command_ids_are_unique_and_each_menu_is_in_the_menu_bar() -> None:
-    assert len(IDS) == len(COMMANDS)
-    assert len(ABOUT) == len(ARGUMENT_COMMANDS)
-    assert {command.menu for command in COMMANDS} <= {*MENUS, ""}
+    commands = [*COMMANDS, *PANEL_COMMANDS]
+    assert len(IDS) == len(commands)
+    assert {command.menu for command in commands} <= {*MENUS, ""}
+    assert {command.after for command in commands} <= {*IDS, ""}
 
 
 def test_every_menu_has_at_most_18_entries(window: MainWindow, commands: Commands) -> None:

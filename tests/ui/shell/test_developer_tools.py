@@ -25,10 +25,11 @@ def tools(qtbot, window: MainWindow, commands: Commands) -> DeveloperTools:
 def live(window: MainWindow, name: str) -> QPushButton:
     """Add a freeze button to a panel and return the button."""
     panel = window.benches["developer"].docks[name].panel
-    panel.freeze = QPushButton(panel)
-    panel.freeze.setCheckable(True)
-    panel.freeze.show()
-    return panel.freeze
+    button = QPushButton(panel)
+    button.setCheckable(True)
+    button.show()
+    panel.freeze_button = lambda: button
+    return button
 
 
 def click(button) -> None:

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from app.blocks.model.project import Project
-from app.core.alerts.intents import OpenBehaviour
 from app.core.projects.file_format import write_file
 from app.core.projects.open_project import OpenProject
 from app.core.projects.versions import free_path
 from app.core.run.view import RunState
+from app.intents import AddTimeLimit, OpenBehaviour
+from app.ui.intents import CloseOtherTabs, CloseTab, MoveTab
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.main_window import MainWindow
 from tests.ui.shell_parts import Answers
@@ -133,7 +134,7 @@ def test_several_tabs_are_closed_and_restored_together(commands, window, tmp_pat
     for path in paths:
         commands.files.open(path)
         window.session.document.apply_edit(changed(path.stem))
-    commands.run(f"tab.close_others:{window.session.document.key}")
+    commands.request(CloseOtherTabs(window.session.document.key))
     assert window.toast.text == "Saved 2 behaviours"
     press_toast(window)
     assert [path.read_bytes() for path in paths] == before
@@ -296,11 +297,11 @@ def test_tabs_are_selected_moved_and_closed_by_commands(commands, window, tmp_pa
     commands.run("tab.previous")
     assert window.session.document.name == "C"
     key = window.session.document.key
-    commands.run(f"tab.move:{key}:0")
+    commands.request(MoveTab(key, 0))
     assert names(window) == ["C", "A", "B"]
-    commands.run(f"tab.close_others:{key}")
+    commands.request(CloseOtherTabs(key))
     assert names(window) == ["C"]
-    commands.run("tab.close:nobody")
+    commands.request(CloseTab("nobody"))
     assert names(window) == ["C"]
 
 
@@ -369,7 +370,7 @@ def test_fix_changes_the_blocks_and_the_fix_counter(commands: Commands, document
     wait = {"type": "control_wait_until", "id": "w"}
     document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [wait]}})
     before = document.fixes
-    assert commands.run("limit:w")
+    assert commands.request(AddTimeLimit("w"))
     assert document.workspace["blocks"]["blocks"][0]["type"] == "control_wait_until_at_most"
     assert document.fixes > before
     assert document.dirty

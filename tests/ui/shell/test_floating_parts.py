@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
-from app.core.alerts.intents import Intent
+from app.intents import Intent
 from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.dialogs.about import AboutSheet

@@ -28,14 +28,14 @@ class Late:
 
 def test_window_closes_immediately_without_an_editor(qapp) -> None:
     closed: list[bool] = []
-    assert FlushBeforeClose(QObject(), lambda: None, lambda: closed.append(True)).can_close()
+    assert FlushBeforeClose(QObject(), lambda done: done(), lambda: closed.append(True)).can_close()
     assert closed == []
 
 
 def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch) -> None:
     monkeypatch.setattr(projects, "MAX_FLUSH_MS", 2000)
     editor, closed, parent = Late(), [], QObject()
-    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(waits.can_close()))
+    waits = FlushBeforeClose(parent, editor.flush, lambda: closed.append(waits.can_close()))
     assert not waits.can_close()
     assert not waits.can_close()
     assert len(editor.done) == 1
@@ -47,7 +47,7 @@ def test_close_waits_for_a_slow_editor_and_flushes_once(qtbot, qapp, monkeypatch
 
 def test_hanging_editor_does_not_block_closing(qtbot, qapp) -> None:
     editor, closed, parent = Late(), [], QObject()
-    waits = FlushBeforeClose(parent, lambda: editor, lambda: closed.append(True))
+    waits = FlushBeforeClose(parent, editor.flush, lambda: closed.append(True))
     assert not waits.can_close()
     qtbot.waitUntil(lambda: closed == [True], timeout=60_000)
     assert waits.can_close()

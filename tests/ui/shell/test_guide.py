@@ -13,13 +13,13 @@ from PySide6.QtTest import QTest
 
 from app import resources
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.dialogs.guide import IMAGE_PIXEL_RATIO, GuidePage, GuideSheet, read_pages
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep import i18n
 from nep.version import __version__
+from tests.ui.shell_parts import COMMANDS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 FOLDER = resources.path("guide")

@@ -9,6 +9,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QStackedWidget
 
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.layouts import LAYOUTS
@@ -18,7 +19,10 @@ from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 
 # Stands in for the blocks panel before its web view exists: nothing in it takes the focus.
-BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+HOME = (RowHome("behaviour", 0, 0, 626),)
+BLOCKS = Panel(
+    "behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"), home=HOME
+)
 STOPS = 3  # number of tab stops to check in each panel
 
 

@@ -13,25 +13,25 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QTabBar, QWidget
 
 from app.blocks.model.project import Project
-from app.core.alerts.intents import Inspect
 from app.core.faults import RepeatFilter
 from app.core.projects.journal import Journal, unsaved_work
 from app.core.run.view import RunState, RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.intents import Inspect
 from app.robots import simulated
 from app.robots.description.description import parse, thing_description
 from app.ui.application import Options, last_layout, show_first_page
+from app.ui.intents import OpenPanel, ShowBlock, ShowTab
 from app.ui.panels.base import PanelContext
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.shell.main_window import MainWindow, Placeholder
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.file_dialogs import SystemDialogs
 from app.ui.widgets.keyboard import tab_stops
-from tests.ui.shell_parts import PANELS, PlainPanel, free_address
+from tests.ui.shell_parts import COMMANDS, PANELS, PlainPanel, free_address
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -309,7 +309,7 @@ def test_panels_are_floated_closed_and_reopened(qtbot, window: MainWindow, comma
     assert [action.text() for action in dock.menu().actions()] == ["Dock", "Close"]
     dock.menu().actions()[1].trigger()
     assert "inspector" not in bench.open_names()
-    assert commands.run("panel:inspector")
+    assert commands.request(OpenPanel("inspector"))
     assert "inspector" in bench.open_names()
 
 
@@ -367,7 +367,7 @@ def test_dock_tabs_and_tabs_of_a_panel_are_in_separate_rows(qtbot, window: MainW
 def test_panel_opens_as_a_tab_in_its_default_dock_area(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     bench = window.show_layout("behaviour")
-    commands.run("panel:console")
+    commands.request(OpenPanel("console"))
     assert bench.docks["console"] in bench.tabifiedDockWidgets(bench.docks["problems"])
 
 
@@ -452,15 +452,15 @@ def test_topic_opens_in_the_matching_panel(qtbot, window: MainWindow, commands: 
 
 def test_commands_are_run_by_id_and_unknown_ids_fail(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
-    assert commands.run("inspect:/faces")
+    assert commands.request(Inspect("/faces"))
     assert panel(window, "developer", "inspector").topics == ["/faces"]
-    assert commands.run("block:b7")
+    assert commands.request(ShowBlock("b7"))
     assert panel(window, "behaviour", "behaviour").blocks == ["b7"]
     assert commands.run("edit.undo")
     assert panel(window, "behaviour", "behaviour").undone == ["undo"]
-    assert commands.run("panel:topics")
-    assert not commands.run("panel:nonsense")
-    assert not commands.run("tab:nobody")
+    assert commands.request(OpenPanel("topics"))
+    assert not commands.request(OpenPanel("nonsense"))
+    assert not commands.request(ShowTab("nobody"))
 
 
 def test_alert_is_shown_in_the_banner_until_resolved_or_dismissed(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,12 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
-from app.core.alerts.intents import StopRobots
 from app.core.graph.walk import GraphSelection
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.intents import StopRobots
 from app.robots import simulated
 from app.robots.description.description import parse, thing_description
-from app.ui.panels.base import Panel
 from app.ui.panels.build.behaviour.panel import BehaviourPanel
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.table_panel import TablePanel
@@ -54,7 +54,7 @@ def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
     )
     session.fleet.connect(parse(thing_description(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
     panels = PanelRegistry()
-    behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
+    behaviour = replace(panels["behaviour"], make=lambda ctx: BehaviourPanel(ctx, Editor))
     made = MainWindow(session, theme, {**panels, "behaviour": behaviour}, dialogs=Answers())
     qtbot.addWidget(made)
     theme.apply()

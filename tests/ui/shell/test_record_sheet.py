@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 from app.core.recording.client import RecorderEvent
 from app.core.recording.recordings import SessionRecordings
 from app.core.recording.topic_choice import RecordingChoice, RingSettings
+from app.ui.intents import OpenRecording, RecordTopic
 from app.ui.shell.dialogs.record import RecordSheet
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
@@ -250,21 +251,21 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
 
 
 def test_single_native_topic_is_recorded_and_topics_of_other_networks_are_rejected(window, recorder):
-    assert window.commands.run("record.topic:/odom")
+    assert window.commands.request(RecordTopic("/odom"))
     assert recorder.line.orders[0]["topics"] == ["/odom"]
     assert recorder.session.recordings.choice == RecordingChoice()
-    assert not window.commands.run("record.topic:ros2 /odom")
+    assert not window.commands.request(RecordTopic("ros2 /odom"))
 
 
 def test_missing_recording_file_is_reported_and_not_opened(window, recorder, tmp_path, monkeypatch):
     path = tmp_path / "a.mcap"
     opened: list[Path] = []
     monkeypatch.setattr(recorder.session, "open_recording", opened.append)
-    window.commands.run(f"recording.open:{path}")
+    window.commands.request(OpenRecording(path))
     assert "no longer exists" in window.toast.accessibleName()
     assert opened == []
     path.touch()
-    window.commands.run(f"recording.open:{path}")
+    window.commands.request(OpenRecording(path))
     assert opened == [path]
 
 

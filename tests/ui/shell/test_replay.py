@@ -12,10 +12,12 @@ from PySide6.QtGui import QColor, QImage, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from app.core.alerts.intents import ShowRecordingFile
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
+from app.intents import ShowRecordingFile
+from app.ui.intents import OpenRecording
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
@@ -28,7 +30,10 @@ from tests.ui.shell_parts import Answers
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
 COUNT = 90
-BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+HOME = (RowHome("behaviour", 0, 0, 626),)
+BLOCKS = Panel(
+    "behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"), home=HOME
+)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +74,7 @@ def until(qtbot, window: MainWindow, true: Callable[[], object]) -> None:
 
 def opened(qtbot, window: MainWindow, path: Path) -> Replay:
     """Open the recording, wait until it is loaded and return the replay."""
-    window.commands.run(f"recording.open:{path}")
+    window.commands.request(OpenRecording(path))
     replay = window.session.replay
     assert replay is not None
     until(qtbot, window, lambda: replay.opened_recording is not None)
@@ -185,7 +190,7 @@ def test_recording_is_opened_by_menu_and_drop_and_replaces_the_open_recording(
 def test_file_that_is_not_a_recording_raises_an_alert_and_can_be_closed(qtbot, window, session, tmp_path):
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(b"no recording")
-    window.commands.run(f"recording.open:{broken}")
+    window.commands.request(OpenRecording(broken))
     until(qtbot, window, lambda: session.replay.status.stage == "failed")
     window.tick()
     assert [alert.intent for alert in session.alerts.active] == [ShowRecordingFile(broken)]
@@ -281,7 +286,7 @@ def test_plot_shows_data_before_the_playhead_and_restarts_on_return_to_live(
     qtbot, window, session, path, whole
 ):
     opened(qtbot, window, path)
-    window.plot("/a", "x")
+    window.context.plot("/a", "x")
     plot = window.bench.docks["plot"].panel
     go_to(qtbot, window, whole[40][0])
     wanted = [message.seq for log_ns, message in whole[:41] if message.topic == "/a"]
@@ -331,7 +336,7 @@ def test_plotted_topic_missing_in_the_recording_is_not_listed_as_a_recorded_topi
     qtbot, window, session, path
 ):
     window.show_layout("developer")
-    window.plot("/ghost", "x")
+    window.context.plot("/ghost", "x")
     replay = opened(qtbot, window, path)
     replay.seek(replay.start_ns + 1)
     until(qtbot, window, lambda: replay.player.position_ns == replay.start_ns + 1)
@@ -344,7 +349,7 @@ def test_plotted_topic_missing_in_the_recording_is_not_listed_as_a_recorded_topi
 def test_reset_panels_ends_the_subscriptions_of_a_plot_and_keeps_its_curves(qtbot, window, session):
     window.show()
     window.show_layout("developer")
-    window.plot("/ghost", "x")
+    window.context.plot("/ghost", "x")
     assert session.shown.series.topics == ("/ghost",)
     window.commands.run("layout.reset")
     assert session.shown.series.topics == ()

@@ -13,7 +13,9 @@ from PySide6.QtWidgets import QApplication, QMenu
 
 from app.core.recording.replay.replay import Replay
 from app.core.session import Session
+from app.ui.intents import OpenRecording
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
@@ -28,7 +30,10 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 
 COUNT = 100
-BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+HOME = (RowHome("behaviour", 0, 0, 626),)
+BLOCKS = Panel(
+    "behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"), home=HOME
+)
 
 
 def at(step: int) -> int:
@@ -91,7 +96,7 @@ class Shown:
 
     def __init__(self, qtbot, window: MainWindow, path: Path) -> None:
         self.qtbot, self.window = qtbot, window
-        window.commands.run(f"recording.open:{path}")
+        window.commands.request(OpenRecording(path))
         replay = window.session.replay
         assert replay is not None
         self.replay: Replay = replay

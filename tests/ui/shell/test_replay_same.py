@@ -13,7 +13,9 @@ from PySide6.QtCore import QModelIndex, Qt
 
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.ui.intents import OpenRecording
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.watch.console.panel import ConsolePanel
 from app.ui.panels.watch.image.panel import ImagePanel
@@ -34,7 +36,10 @@ pytest_plugins = ["tests.ui.shell_fixtures"]
 
 ODD, NUMBERS, WORDS, BYTES, CAMERA = "/odd", "/numbers", "/words", "/bytes", "/camera"
 INSPECTED = (ODD, NUMBERS, WORDS, BYTES)
-BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+HOME = (RowHome("behaviour", 0, 0, 626),)
+BLOCKS = Panel(
+    "behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"), home=HOME
+)
 ROUNDS = 6
 VALUES = (
     0,
@@ -230,7 +235,7 @@ def test_panels_show_identical_bytes_live_and_in_replay(studio: Studio, tmp_path
     with Recording(path) as recording:
         times = [log_ns for log_ns, _message in recording.read()]
     assert len(times) == len(sent)
-    studio.window.commands.run(f"recording.open:{path}")
+    studio.window.commands.request(OpenRecording(path))
     replay = studio.session.replay
     assert replay is not None
     studio.until(lambda: replay.opened_recording is not None)

@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 
 from app.core.run.view import RunView
 from app.robots.client.stop_report import StopStatus
+from app.ui.panels.command import Command
 from app.ui.shell.actions.actions import Actions
-from app.ui.shell.actions.command import Command
 from app.ui.shell.bars.run_bar import SPEED_COMMANDS, RunBar, ToolBar
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StopButton, paint

@@ -15,8 +15,8 @@ from app.ui.panels.robots.robots.controls.number import UnboundedNumberEdit
 from app.ui.panels.watch.console.list import LogFindField
 from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
+from app.ui.shell.commands import table
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.docking.layouts import LAYOUTS
@@ -26,6 +26,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.lists.entry_list import Heading
 from app.ui.widgets.lists.fuzzy import Match
+from tests.ui.shell_parts import COMMANDS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 CTRL = Qt.KeyboardModifier.ControlModifier
@@ -176,6 +177,21 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
     assert keys.shortcuts_of("file.open") == ("Ctrl+O",)
 
 
+def test_saved_shortcut_of_a_panel_applies_once_its_commands_are_added(tmp_path: Path, qapp: object) -> None:
+    settings = Settings(tmp_path)
+    settings.shortcuts = {"print.ask": ["F7"], "removed.command": ["F6"]}
+    keys = Shortcuts(settings, print, table.COMMANDS)
+    assert keys.command_for("F7") == ""
+    keys.assign("file.new", "F4")
+    assert settings.shortcuts == {
+        "print.ask": ["F7"], "removed.command": ["F6"], "file.new": ["F4"],
+    }  # fmt: skip
+    keys.set_commands(COMMANDS)
+    assert keys.shortcuts_of("print.ask") == ("F7",)
+    assert keys.shortcuts_of("file.new") == ("F4",)
+    assert keys.shortcuts_of("help.doctor") == ()  # F4 is in use
+
+
 @pytest.mark.parametrize(
     ("key", "held", "said"),
     [
@@ -224,10 +240,12 @@ def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -
     QTest.keyClick(sheet.field, key, held)
 
 
-def test_shortcut_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet) -> None:
+def test_shortcut_sheet_lists_every_command_and_every_fixed_shortcut(
+    sheet: ShortcutSheet, commands: Commands
+) -> None:
     shown = [line.entry.id for line in sheet.rows.line_model.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
-    assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
+    assert set(shown) == {f"command:{row.id}" for row in commands.actions.commands if row.in_shortcuts} | {
         f"fixed:{number}" for number in range(len(FIXED_KEYS))
     }
     headings = [line.text for line in sheet.rows.line_model.lines if isinstance(line, Heading)]

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app import resources
 from app.blocks.model.program import Problem
 from app.ui.panels.base import Panel, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.panels.registry import PanelRegistry
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
@@ -44,7 +45,10 @@ TILES, NAMES, NARROW = 52, 196, 760  # px: toolbox width (narrow, wide page); wi
 MIN_CANVAS = 420
 SETTLE_MS, RESTS = 15, 3  # wait time, and waits without a moved widget until the layout is settled
 # Stands in for the blocks panel, whose web view has its own tests.
-BLOCKS = Panel("behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"))
+HOME = (RowHome("behaviour", 0, 0, 626),)
+BLOCKS = Panel(
+    "behaviour", "Behaviour", "blocks", (), lambda context: PanelWidget(context, "Behaviour"), home=HOME
+)
 
 
 @pytest.fixture

@@ -7,8 +7,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.blocks.model.workspace import parse_workspace
+from app.intents import RenameVariable
+from app.ui.intents import DeleteVariable, ShowNextUse
+from app.ui.panels.build.behaviour.variable_commands import uses_of
+from app.ui.panels.build.variable_values import ask_value, parse_value
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.variables import parse_value, uses_of
 from app.ui.shell.dialogs.name import NameSheet
 from app.ui.shell.main_window import MainWindow
 from tests.blocks.samples import block, get, number, started, workspace, write
@@ -38,9 +41,10 @@ def shown(qtbot, window: MainWindow, commands: Commands) -> MainWindow:
 
 
 def editor(window: MainWindow) -> PlainPanel:
-    panel = window.editor()
-    assert isinstance(panel, PlainPanel)
-    return panel
+    dock = window.find_dock("behaviour")
+    assert dock is not None
+    assert isinstance(dock.panel, PlainPanel)
+    return dock.panel
 
 
 def sheet_of(window: MainWindow) -> NameSheet:
@@ -102,38 +106,38 @@ def test_existing_variable_name_is_reported_while_typing(
 def test_variable_can_be_renamed_to_a_name_that_differs_only_in_letter_case(
     shown: MainWindow, commands: Commands
 ) -> None:
-    commands.run("variable.rename:s")
+    commands.request(RenameVariable("s"))
     sheet = sheet_of(shown)
     assert (sheet.heading.text(), sheet.field.text()) == ("New name for “Score”", "Score")
     QTest.keyClick(typed(sheet, "score").field, Qt.Key.Key_Return)
     assert editor(shown).edited == [{"do": "rename", "id": "s", "name": "score"}]
-    commands.run("variable.rename:gone")
+    commands.request(RenameVariable("gone"))
     assert not sheet.isVisible()
 
 
 def test_deleting_a_variable_reports_removed_blocks_and_can_be_undone(
     shown: MainWindow, commands: Commands
 ) -> None:
-    commands.run("variable.delete:s")
+    commands.request(DeleteVariable("s"))
     assert editor(shown).edited == [{"do": "delete", "id": "s"}]
     assert shown.toast.text == "Deleted “Score” and 2 blocks that used it"
     shown.toast.button.click()
     assert editor(shown).edited[1] == {"do": "undo"}
-    commands.run("variable.delete:n")
+    commands.request(DeleteVariable("n"))
     assert shown.toast.text == "Deleted “名前”"
 
 
 def test_find_command_steps_through_the_uses_of_a_variable(shown: MainWindow, commands: Commands) -> None:
     for _ in range(3):
-        commands.run("variable.find:s")
+        commands.request(ShowNextUse("s"))
     assert [edit["id"] for edit in editor(shown).edited] == ["set", "get", "set"]
-    commands.run("variable.find:n")
+    commands.request(ShowNextUse("n"))
     assert len(editor(shown).edited) == 3
     assert uses_of(parse_workspace(SAVED), "s") == ["set", "get"]
 
 
-def test_value_cannot_be_set_while_the_behaviour_does_not_run(shown: MainWindow, commands: Commands) -> None:
-    commands.run("variable.put:s")
+def test_value_cannot_be_set_while_the_behaviour_does_not_run(shown: MainWindow) -> None:
+    ask_value(shown.context, "s")
     assert not shown.findChildren(NameSheet)
 
 

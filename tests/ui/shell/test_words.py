@@ -12,18 +12,17 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from app import resources
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ShowAlarms
 from app.core.network.remote_access import RemoteAccess
 from app.core.robots.motion.permission import MotionPermission
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.intents import ShowAlarms
 from app.robots.client.stop_report import RobotStop, StopReport
 from app.ui.application import startup_problem, translate_qt
 from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import StatusFormatter
-from app.ui.shell.commands.table import COMMANDS
 from app.ui.shell.dialogs.command_palette import CommandPalette
 from app.ui.shell.dialogs.motion_permission import MotionPermissionCard
 from app.ui.shell.dialogs.name import NameSheet
@@ -46,7 +45,7 @@ from tests.ui import fakes
 from tests.ui.clipping import clipped
 from tests.ui.shell.test_files import changed, saved
 from tests.ui.shell.test_motion_permission import ROVER
-from tests.ui.shell_parts import NAMES, PANELS, Answers, robots_in
+from tests.ui.shell_parts import COMMANDS, NAMES, PANELS, Answers, robots_in
 
 # on the offscreen platform, popups can't grab the keyboard
 pytestmark = pytest.mark.qt_log_ignore("does not support grabbing the keyboard", extend=True)
@@ -269,8 +268,9 @@ def test_menus_of_the_window_and_docks_are_translated(qtbot, whole: MainWindow) 
 
 def test_all_commands_and_shortcuts_are_translated(whole: MainWindow) -> None:
     shown = whole.commands.shortcuts
+    whole.commands.add_panels()
     said = [text for each in COMMANDS for text in (each.label, _(each.menu), _(each.tip))]
-    said += [whole.commands.actions.disabled_reason(each.id) for each in COMMANDS]
+    said += [whole.commands.actions.disabled_reason(each.id) for each in whole.commands.actions.commands]
     said += [text for each in FIXED_KEYS for text in (_(each.label), _(each.scope))]
     ctrl = Qt.KeyboardModifier.ControlModifier
     for key in (

@@ -17,11 +17,11 @@ from app.blocks.model.program import Problem
 from app.blocks.toolbox.catalogue import Catalogue
 from app.core.projects.problems import ProblemLine
 from app.ui.panels.build.problems import ProblemRow
-from app.ui.shell.commands.table import COMMANDS
 from app.ui.theme import icons
 from app.ui.theme import tokens as theme_tokens
 from app.ui.theme.theme import Theme
 from tests.blocks.samples import robot
+from tests.ui.shell_parts import COMMANDS
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 

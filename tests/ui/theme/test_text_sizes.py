@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import QPoint, QRect
 
 from app import resources
-from app.core.alerts.intents import ShowAlarms
 from app.core.run.view import RunView
 from app.core.session import Session
+from app.intents import ShowAlarms
 from app.ui.panels.base import PanelContext
 from app.ui.panels.robots.robots import panel as robots
 from app.ui.shell.bars.status_bar import StatusBar

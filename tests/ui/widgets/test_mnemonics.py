@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.ui.shell.commands.table import COMMANDS, MENUS
+from app.ui.shell.commands.table import MENUS
 from app.ui.widgets.mnemonics import key_of, mnemonic_positions, strip_mnemonic, with_mnemonics
 from nep import i18n
+from tests.ui.shell_parts import COMMANDS
 
 
 @pytest.fixture(params=["en", *sorted(i18n.known_languages())])

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from app.core.alerts.alerts import Alerts
-from app.core.alerts.intents import ShowRecordingFile
 from app.core.messages.image_streams import Images
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
@@ -20,6 +19,7 @@ from app.core.recording.replay.source import ReplayResults, ReplaySource, Replay
 from app.core.run.acting.acting import SessionActing
 from app.core.world.console import CAPACITY
 from app.core.world.world import World
+from app.intents import ShowRecordingFile
 from nep.i18n import _, number
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC

@@ -10,7 +10,9 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.sent_log import SentRecord
+from app.ui.intents import OpenPanel, SelectService
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, filter_blocker
+from app.ui.panels.home import TabHome
 from app.ui.panels.row_actions import RowAction, fill_menu, show_messages
 from app.ui.text.numbers import group_digits
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, IconButton, Separator
@@ -166,7 +168,7 @@ class SentPanel(PanelWidget):
         if reason:
             self.context.show_toast(reason)
         if self.acting.question is not None:
-            self.context.run("panel:publish")  # this panel asks for confirmation
+            self.context.request(OpenPanel("publish"))  # this panel asks for confirmation
         self.refresh()
 
     def copy(self) -> None:
@@ -194,7 +196,7 @@ class SentPanel(PanelWidget):
         if record is None or not record.name:
             return
         if record.origin == "service":
-            self.context.run(f"service.call:{record.name}")
+            self.context.request(SelectService(record.name))
         else:
             show_messages(self.context, record.name)
 
@@ -283,4 +285,11 @@ def _columns() -> tuple[Column[SentRecord], ...]:
     )  # fmt: skip
 
 
-PANEL = Panel("sent", lazy("Sent"), "send", (), SentPanel)
+PANEL = Panel(
+    "sent",
+    lazy("Sent"),
+    "send",
+    (),
+    SentPanel,
+    home=(TabHome("developer", "console"), TabHome("behaviour", "problems")),
+)

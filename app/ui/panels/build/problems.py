@@ -16,7 +16,9 @@ from app.blocks.model.program import Problem
 from app.core.projects.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
 from app.robots.virtual_models import virtual_models
+from app.ui.intents import ShowBlock
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.home import RowHome
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, ContentScrollArea, ElidedLabel, label, paint
@@ -54,12 +56,12 @@ class ProblemRow(QWidget):
 
     Signals:
         pressed: Id of the block with the problem.
-        fix_requested: Action of the fix to apply.
+        fix_requested: Intent of the fix to apply.
         step_requested: Number of rows by which to move the focus.
     """
 
     pressed = Signal(str)
-    fix_requested = Signal(str)
+    fix_requested = Signal(object)
     step_requested = Signal(int)
 
     def __init__(self, theme: Theme, line: ProblemLine, *, is_large: bool) -> None:
@@ -245,8 +247,8 @@ class ProblemsPanel(PanelWidget):
 
     def _create_row(self, line: ProblemLine) -> ProblemRow:
         row = ProblemRow(self.theme, line, is_large=self.density == "comfortable")
-        row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
-        row.fix_requested.connect(self.context.run)
+        row.pressed.connect(lambda block: self.context.request(ShowBlock(block)))
+        row.fix_requested.connect(self.context.request)
         row.step_requested.connect(lambda step: self._step_focus(row, step))
         return row
 
@@ -289,4 +291,6 @@ def _count_text(severity: str, count: int) -> str:
     return ngettext("{count} hint", "{count} hints", count).format(count=count)
 
 
-PANEL = Panel("problems", lazy("Problems"), "triangle-alert", (), ProblemsPanel)
+PANEL = Panel(
+    "problems", lazy("Problems"), "triangle-alert", (), ProblemsPanel, home=(RowHome("behaviour", 0, 1, 124),)
+)

@@ -11,7 +11,11 @@ from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
+from app.intents import Intent, RenameVariable
+from app.ui.intents import DeleteVariable, ShowNextUse, ToggleVariableWatch
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.build.variable_values import ask_value
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
 from app.ui.widgets.menus import Menu
@@ -179,8 +183,8 @@ class VariablesPanel(TablePanel[VariableRow]):
     def make_table(self, model: TableModel[VariableRow]) -> TableView[VariableRow]:
         table = _VariableTable(self.theme, model, "")
         table.expand_requested.connect(self._set_expanded)
-        table.rename_requested.connect(lambda key: self._run_command_for("variable.rename", key))
-        table.delete_requested.connect(lambda key: self._run_command_for("variable.delete", key))
+        table.rename_requested.connect(lambda key: self._request_for(RenameVariable, key))
+        table.delete_requested.connect(lambda key: self._request_for(DeleteVariable, key))
         return table
 
     # -- display ------------------------------------------------------------------------------------------
@@ -272,10 +276,10 @@ class VariablesPanel(TablePanel[VariableRow]):
         self.rebuild()
         self.table.select_key(VariableRow(row.variable, row.value).key)
 
-    def _run_command_for(self, command: str, key: str) -> None:
+    def _request_for(self, make: Callable[[str], Intent], key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is not None:
-            self.context.run(f"{command}:{row.variable.id}")
+            self.context.request(make(row.variable.id))
 
     def menu_of(self, key: str) -> Menu | None:
         """Return the context menu of a variable, or None if the table no longer contains the variable."""
@@ -285,16 +289,19 @@ class VariablesPanel(TablePanel[VariableRow]):
         menu = Menu(self.theme, self)
         runs = self.session.runs
         is_running = runs.active and runs.document is self.session.document
-        for text, icon, command, is_enabled in (
-            (_("Show next to the blocks"), "eye", "variable.watch", True),
-            (_("Show where it is used"), "search", "variable.find", bool(row.variable.python)),
-            (_("Change the value"), "pencil", "variable.put", is_running and bool(row.variable.python)),
-            (_("Rename"), "text-cursor-input", "variable.rename", True),
-            (_("Delete"), "trash-2", "variable.delete", True),
-        ):
+        is_used = bool(row.variable.python)
+        id, request = row.variable.id, self.context.request
+        entries: tuple[tuple[str, str, Callable[[], object], bool], ...] = (
+            (_("Show next to the blocks"), "eye", lambda: request(ToggleVariableWatch(id)), True),
+            (_("Show where it is used"), "search", lambda: request(ShowNextUse(id)), is_used),
+            (_("Change the value"), "pencil", lambda: ask_value(self.context, id), is_running and is_used),
+            (_("Rename"), "text-cursor-input", lambda: request(RenameVariable(id)), True),
+            (_("Delete"), "trash-2", lambda: request(DeleteVariable(id)), True),
+        )
+        for text, icon, run, is_enabled in entries:
             action = QAction(self.theme.icon(icon), text, menu)
             action.setEnabled(is_enabled)
-            action.triggered.connect(lambda _on=False, command=command: self._run_command_for(command, key))
+            action.triggered.connect(lambda _on=False, run=run: run())
             menu.addAction(action)
         return menu
 
@@ -326,4 +333,11 @@ class _VariableTable(TableView[VariableRow]):
             super().keyPressEvent(event)
 
 
-PANEL = Panel("variables", TABLE_TEXTS.title, "variable", (), VariablesPanel)
+PANEL = Panel(
+    "variables",
+    TABLE_TEXTS.title,
+    "variable",
+    (),
+    VariablesPanel,
+    home=(RowHome("behaviour", 0, 1, 124, tab=1), TabHome("developer", "console")),
+)

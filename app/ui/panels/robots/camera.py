@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QSize
 
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.pictures.boxes import boxes_in_camera, camera_of
@@ -130,4 +131,11 @@ def _topic_of(link: RobotLink) -> str:
     return camera.topic if camera is not None else ""
 
 
-PANEL = Panel("camera", lazy("Camera"), "camera", (), CameraPanel)
+PANEL = Panel(
+    "camera",
+    lazy("Camera"),
+    "camera",
+    (),
+    CameraPanel,
+    home=(RowHome("behaviour", 1, 1, 275), TabHome("developer", "image")),
+)

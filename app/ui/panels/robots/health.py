@@ -10,7 +10,9 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.robots.health_facts import HealthItem, health_items
+from app.intents import ConnectRobot, OpenDoctor
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text.numbers import age_text
@@ -154,7 +156,7 @@ class HealthPanel(OneRobotPanel):
     def _do_next_step(self) -> None:
         link = self.session.fleet.link(self._robot)
         if link is not None:
-            self.context.run(f"connect:{link.name}" if link.is_virtual else "help.doctor")
+            self.context.request(ConnectRobot(link.name) if link.is_virtual else OpenDoctor())
 
     def set_density(self, density: Density) -> None:
         super().set_density(density)
@@ -171,5 +173,15 @@ def _age_text(age_s: float) -> str:
     return f"{max(1, int(age_s))} s" if age_s < 60 else age_text(age_s)
 
 
-PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)
+PANEL = Panel(
+    "health",
+    lazy("Health"),
+    "heart",
+    (),
+    HealthPanel,
+    home=(
+        RowHome("behaviour", 1, 3, 190, opens_with="robots", tab_of="sensors"),
+        TabHome("developer", "console"),
+    ),
+)
 """Panel that shows if a robot responds, the state that it reports, and how it is stopped."""

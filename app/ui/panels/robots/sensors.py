@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.home import RowHome
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.text import plain
@@ -193,4 +194,6 @@ def _listed_sensors(link: RobotLink) -> list[Sensor]:
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 
 
-PANEL = Panel("sensors", lazy("Live sensors"), "eye", (), SensorsPanel)
+PANEL = Panel(
+    "sensors", lazy("Live sensors"), "eye", (), SensorsPanel, home=(RowHome("behaviour", 1, 2, 140),)
+)

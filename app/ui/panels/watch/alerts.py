@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from app.ui.intents import command_of
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.text.numbers import group_digits
 from app.ui.widgets import Chip, EmptyState
 from app.ui.widgets.cards import AlertRow
@@ -71,7 +71,7 @@ class AlertsPanel(PanelWidget):
     def _run_action(self, alert_id: str) -> None:
         intent = next((alert.intent for alert in self.shown_alerts if alert.id == alert_id), None)
         if intent is not None:
-            self.context.run(command_of(intent))
+            self.context.request(intent)
 
 
 def _since_text(alert: ActiveAlert) -> str:
@@ -83,4 +83,11 @@ def _since_text(alert: ActiveAlert) -> str:
     return template.format(clock=since, count=group_digits(alert.count))
 
 
-PANEL = Panel("alerts", lazy("Alerts"), "bell", (), AlertsPanel)
+PANEL = Panel(
+    "alerts",
+    lazy("Alerts"),
+    "bell",
+    (),
+    AlertsPanel,
+    home=(TabHome("behaviour", "problems"), RowHome("developer", 2, 1, 394, tab=1)),
+)

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
-from app.core.alerts.intents import BrowseNetworks
 from app.core.network.topics import split_key
 from app.core.networks.networks import lost_message, topic_label
 from app.core.reports import not_installed
-from app.ui.intents import command_of
-from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget
+from app.intents import AllowOtherComputers, BrowseNetworks, Inspect, Intent, OpenDoctor
+from app.ui.intents import OpenPanel, SelectService
+from app.ui.panels.base import Blocker, Diagnose, Panel, PanelContext, PanelWidget
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Separator, label
 from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.inputs.combo_box import ComboBox
@@ -108,6 +110,16 @@ class DoctorPanel(PanelWidget):
         column.addLayout(footer)
 
     # -- display ------------------------------------------------------------------------------------------
+
+    def diagnose(self, panel: PanelWidget | None = None, topic: str = "") -> None:
+        """Run the connection doctor.
+
+        Args:
+            panel: Panel that shows no new data; None for no panel.
+            topic: Topic to check first; "" for any topic.
+        """
+        self.session.doctor.expect_topic(topic)
+        self.set_stalled_panel(panel)
 
     def set_stalled_panel(self, panel: PanelWidget | None) -> None:
         """Report findings about a panel too. The topic of the doctor must be set before.
@@ -230,9 +242,7 @@ class DoctorPanel(PanelWidget):
         message = lost or (f"{topic_label(topic)}: {problem}." if problem else "")
         if message:
             fix = _("Check its address, and its password or key if it needs one.")
-            yield Blocker(
-                message, fix, _("Other networks"), lambda: self.context.run(command_of(BrowseNetworks()))
-            )
+            yield Blocker(message, fix, _("Other networks"), lambda: self.context.request(BrowseNetworks()))
 
     def _update_topics(self) -> None:
         live, expected_topic = self.session.live, self.session.doctor.expected_topic
@@ -312,17 +322,17 @@ class DoctorPanel(PanelWidget):
         if kind == "topic" and finding.instead:
             return NextStep(
                 _("Call {service}").format(service=finding.instead),
-                lambda: self.context.run(f"service.call:{finding.instead}"),
+                lambda: self.context.request(SelectService(finding.instead)),
             )
-        button = {
-            "topic:closed": (_("Let other computers connect"), "network.others"),
-            "topic:unreadable": (_("Show the bytes"), f"inspect:{self.session.doctor.expected_topic}"),
-            "topic:name": (_("Choose a topic"), "panel:topics"),
-        }.get(finding.id)
-        if button is not None:
-            return NextStep(
-                button[0], lambda: self.context.run(button[1]), is_fix=finding.severity in PROBLEM_SEVERITIES
-            )
+        buttons: dict[str, tuple[str, Intent]] = {
+            "topic:closed": (_("Let other computers connect"), AllowOtherComputers()),
+            "topic:unreadable": (_("Show the bytes"), Inspect(self.session.doctor.expected_topic)),
+            "topic:name": (_("Choose a topic"), OpenPanel("topics")),
+        }
+        if finding.id in buttons:
+            text, intent = buttons[finding.id]
+            is_fix = finding.severity in PROBLEM_SEVERITIES
+            return NextStep(text, lambda: self.context.request(intent), is_fix=is_fix)
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
         if finding.command:
@@ -370,4 +380,26 @@ class DoctorPanel(PanelWidget):
         return (self._copy_action,)
 
 
-PANEL = Panel("doctor", lazy("Connection doctor"), "stethoscope", (), DoctorPanel)
+PANEL = Panel(
+    "doctor",
+    lazy("Connection doctor"),
+    "stethoscope",
+    (),
+    DoctorPanel,
+    home=(TabHome("developer", "topics"), TabHome("behaviour", "behaviour")),
+    commands=(
+        Command(
+            "help.doctor",
+            lazy("Connection doctor"),
+            DoctorPanel.diagnose,
+            "Help",
+            ("F4",),
+            "stethoscope",
+            after="help.shortcuts",
+        ),
+    ),
+    intents=(
+        IntentHandler(OpenDoctor, lambda panel, _intent: panel.diagnose()),
+        IntentHandler(Diagnose, lambda panel, intent: panel.diagnose(intent.panel, intent.topic)),
+    ),
+)

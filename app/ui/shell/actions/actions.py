@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeVar
@@ -10,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QAbstractButton, QMenuBar, QWidget
 
-from app.ui.shell.actions.command import Command, UnknownCommandError
+from app.ui.panels.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
 from app.ui.widgets import assign_command
 from app.ui.widgets.menus import Menu
@@ -26,29 +27,80 @@ MENU_ROLES = {
 """Menu roles of the commands that macOS moves to the application menu."""
 
 T = TypeVar("T")
+_log = logging.getLogger(__name__)
 
 
 class Actions:
     """Collection of QActions, one per command.
+
+    The commands of panels are added when a menu or the palette opens, or when an unknown command is
+    looked up, because importing the panels takes time.
 
     Args:
         window: Window in which the shortcuts work.
         theme: Theme that provides the icons.
         commands: Commands in the order of the menus.
         handlers: Object that is passed to `run` and `disabled_reason` of each command.
+        contributions: Returns the commands of panels; called at most once.
+
+    Attributes:
+        commands: Commands in the order of menus and palette.
+        on_added: Called when the commands of panels were added.
     """
 
-    def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], handlers: T) -> None:
-        self._theme, self._commands = theme, commands
+    def __init__(
+        self,
+        window: QWidget,
+        theme: Theme,
+        commands: Sequence[Command[T, T]],
+        handlers: T,
+        contributions: Callable[[], Sequence[Command[T, T]]] = tuple,
+    ) -> None:
+        self._window, self._theme, self._handlers = window, theme, handlers
+        self.commands: Sequence[Command[Any, Any]] = commands
+        self.on_added: Callable[[], object] = lambda: None
+        self._contributions: Callable[[], Sequence[Command[Any, Any]]] | None = contributions
         self._groups: dict[str, QActionGroup] = {}
         self._actions: dict[str, QAction] = {}
+        self._menus: dict[str, Menu] = {}
         self._disabled_reasons: dict[str, Callable[[], str]] = {}
         for command in commands:
-            action = self._actions[command.id] = self._create_action(command, window)
-            action.triggered.connect(lambda _on=False, run=command.run: run(handlers))
-            self._disabled_reasons[command.id] = partial(command.disabled_reason, handlers)
+            self._add(command)
 
-    def _create_action(self, command: Command[Any], window: QWidget) -> QAction:
+    def _add(self, command: Command[Any, Any]) -> None:
+        action = self._actions[command.id] = self._create_action(command, self._window)
+        action.triggered.connect(lambda _on=False: command.run(self._handlers))
+        self._disabled_reasons[command.id] = partial(command.disabled_reason, self._handlers)
+
+    def add_contributions(self) -> bool:
+        """Add the commands of panels to the actions and the menus; return False if this was done before."""
+        contributions, self._contributions = self._contributions, None
+        if contributions is None:
+            return False
+        self.commands = merged(self.commands, contributions())
+        for command in self.commands:
+            if command.id not in self._actions:
+                self._add(command)
+                self._insert_into_menu(command)
+        self.on_added()
+        return True
+
+    def _insert_into_menu(self, command: Command[Any, Any]) -> None:
+        menu = self._menus.get(command.menu_path)
+        if menu is None:
+            return
+        position = self.commands.index(command)
+        earlier = [each for each in self.commands[:position] if each.menu_path == command.menu_path]
+        entries = menu.actions()
+        index = entries.index(self._actions[earlier[-1].id]) + 1 if earlier else 0
+        added = [menu.addSeparator()] if command.separator_above else []
+        for entry in (*added, self._actions[command.id]):
+            if index < len(entries):
+                menu.insertAction(entries[index], entry)
+            else:
+                menu.addAction(entry)
+
+    def _create_action(self, command: Command[Any, Any], window: QWidget) -> QAction:
         action = QAction("\t".join(filter(None, (command.label, command.displayed_key))), window)
         action.setObjectName(command.id)
         if command.icon is not None and not command.group:
@@ -66,12 +118,16 @@ class Actions:
         return action
 
     def __getitem__(self, name: str) -> QAction:
+        if name not in self._actions:
+            self.add_contributions()
         try:
             return self._actions[name]
         except KeyError:
             raise UnknownCommandError(name) from None
 
     def __contains__(self, name: object) -> bool:
+        if name not in self._actions:
+            self.add_contributions()
         return name in self._actions
 
     def bind(self, button: QAbstractButton, name: str) -> None:
@@ -150,16 +206,36 @@ class Actions:
         }
         for menu in menus_by_path.values():
             bar.addMenu(menu)
-        for command in self._commands:
+        self._menus = menus_by_path
+        for command in self.commands:
             if not command.menu:
                 continue
-            path = command.menu
-            if command.submenu:
-                path = f"{command.menu}/{command.submenu}"
-                if path not in menus_by_path:
-                    menus_by_path[path] = Menu(self._theme, menus_by_path[command.menu], _(command.submenu))
-                    menus_by_path[command.menu].addMenu(menus_by_path[path])
+            path = command.menu_path
+            if path not in menus_by_path:
+                menus_by_path[path] = Menu(self._theme, menus_by_path[command.menu], _(command.submenu))
+                menus_by_path[command.menu].addMenu(menus_by_path[path])
             if command.separator_above:
                 menus_by_path[path].addSeparator()
             menus_by_path[path].addAction(self._actions[command.id])
         return menus_by_path
+
+
+def merged(commands: Sequence[Command[T, T]], contributions: Sequence[Command[T, T]]) -> list[Command[T, T]]:
+    """Insert commands below the commands that their ``after`` names, or at the end.
+
+    A command whose id exists already is logged and left out.
+    """
+    result = list(commands)
+    last_below: dict[str, str] = {}  # command inserted last below another one
+    pending = list(contributions)
+    while pending:
+        ids = [each.id for each in result]
+        command = next((each for each in pending if each.after in ids), pending[0])
+        pending.remove(command)
+        if command.id in ids:
+            _log.warning("the command '%s' of a panel is ignored: its id exists already", command.id)
+            continue
+        above = last_below.get(command.after, command.after)
+        result.insert(ids.index(above) + 1 if above in ids else len(result), command)
+        last_below[command.after] = command.id
+    return result

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import QKeyCombination, QObject, Qt, Signal
@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
+from app.ui.panels.command import Command, UnknownCommandError
 from app.ui.shell.actions.actions import STOP_COMMAND
-from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.text import plain
 from app.ui.text.numbers import shortcut_text, tip_with_key
 from app.ui.widgets import IconButton
@@ -126,6 +126,12 @@ def format_key(combination: QKeyCombination) -> str:
     return QKeySequence(combination).toString(QKeySequence.SequenceFormat.PortableText)
 
 
+def _without_keys(command: Command[Any, Any], taken: set[str], platform: str) -> Command[Any, Any]:
+    keys = command.default_keys(platform)
+    free_keys = tuple(key for key in keys if normalize_key(key) not in taken)
+    return command if free_keys == keys else replace(command, keys=free_keys, mac_keys=())
+
+
 class Shortcuts(QObject):
     """Current shortcuts of all commands. `changed` is emitted when any of them changes."""
 
@@ -135,7 +141,7 @@ class Shortcuts(QObject):
         self,
         settings: Settings,
         report_error: Callable[[str], object],
-        commands: Sequence[Command[Any]],
+        commands: Sequence[Command[Any, Any]],
         *,
         platform: str = sys.platform,
     ) -> None:
@@ -143,13 +149,32 @@ class Shortcuts(QObject):
         # `sys.platform`.
         super().__init__()
         self._settings, self._report_error, self._platform = settings, report_error, platform
-        self.commands: Mapping[str, Command[Any]] = {command.id: command for command in commands}
-        self._custom_shortcuts = self._read()
+        self.commands: Mapping[str, Command[Any, Any]] = {command.id: command for command in commands}
+        self._custom_shortcuts: dict[str, tuple[str, ...]] = {}
+        self._unused_shortcuts = self._read()  # of commands that don't exist, such as those of removed panels
+        self._use_saved()
+
+    def set_commands(self, commands: Sequence[Command[Any, Any]]) -> None:
+        """Set the commands in the order of the list.
+
+        New commands lose those default shortcuts that are the defaults of existing ones.
+        """
+        taken = {key for name in self.commands for key in self.default_shortcuts(name)}
+        known = self.commands
+        self.commands = {
+            each.id: known.get(each.id) or _without_keys(each, taken, self._platform) for each in commands
+        }
+        self._use_saved()
+        self.changed.emit()
+
+    def _use_saved(self) -> None:
+        for name in self._unused_shortcuts.keys() & self.commands.keys():
+            self._custom_shortcuts[name] = self._unused_shortcuts.pop(name)
 
     def _read(self) -> dict[str, tuple[str, ...]]:
         shortcuts: dict[str, tuple[str, ...]] = {}
         for name, keys in self._settings.shortcuts.items():
-            if name in self.commands and isinstance(keys, list):
+            if isinstance(keys, list):
                 valid_keys = tuple(
                     normalize_key(key) for key in keys if isinstance(key, str) and normalize_key(key)
                 )
@@ -170,17 +195,16 @@ class Shortcuts(QObject):
     def shortcuts_of(self, name: str) -> tuple[str, ...]:
         """Return the current shortcuts of a command; menus show the first one.
 
-        The first shortcut of Stop is always F12.
+        Default shortcuts that the user has assigned to other commands are omitted. The first shortcut of
+        Stop is always F12.
         """
-        keys = self._custom_shortcuts.get(name, self.default_shortcuts(name))
+        custom_keys = self._custom_shortcuts.get(name)
+        keys = self.default_shortcuts(name) if custom_keys is None else custom_keys
+        if custom_keys is None or name == STOP_COMMAND:
+            others = [each for other, each in self._custom_shortcuts.items() if other != name]
+            keys = tuple(key for key in keys if not any(key in other_keys for other_keys in others))
         if name == STOP_COMMAND:
-            reassigned_keys = {
-                key
-                for other, other_keys in self._custom_shortcuts.items()
-                if other != STOP_COMMAND
-                for key in other_keys
-            }
-            return (STOP_KEY, *(key for key in keys if key != STOP_KEY and key not in reassigned_keys))
+            return (STOP_KEY, *(key for key in keys if key != STOP_KEY))
         return tuple(key for key in keys if key != STOP_KEY)
 
     def first_shortcut(self, name: str) -> str:
@@ -267,14 +291,15 @@ class Shortcuts(QObject):
 
     def reset_all(self) -> None:
         """Restore the default shortcuts of all commands."""
-        self._custom_shortcuts = {}
+        self._custom_shortcuts, self._unused_shortcuts = {}, {}
         self._save()
 
     def _save(self) -> None:
         for name in [name for name in self._custom_shortcuts if not self.is_customised(name)]:
             del self._custom_shortcuts[name]
         try:
-            self._settings.shortcuts = {name: list(keys) for name, keys in self._custom_shortcuts.items()}
+            shortcuts = {**self._unused_shortcuts, **self._custom_shortcuts}
+            self._settings.shortcuts = {name: list(keys) for name, keys in shortcuts.items()}
         except SettingsError as error:
             self._report_error(str(error))
         self.changed.emit()
@@ -283,7 +308,7 @@ class Shortcuts(QObject):
         """Update the shortcuts in the tooltips of all widgets with the property ``command``."""
         for widget in QApplication.allWidgets():
             command = widget.property("command")
-            if isinstance(command, str):
+            if isinstance(command, str) and command in self.commands:
                 text = _(self.commands[command].tip)
                 # the tooltip is the only text of an icon button
                 if not text or isinstance(widget, IconButton):

@@ -15,8 +15,7 @@ from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QCursor, QFont, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.alerts.intents import ConnectRobot, Intent, OpenBehaviour, OpenDoctor, ReportProblem
-from app.ui.intents import command_of
+from app.intents import ConnectRobot, Intent, OpenBehaviour, OpenDoctor, ReportProblem
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -277,7 +276,7 @@ class AlertBanner(QWidget):
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
         self._positioned_identity = ""
         self._guarded_until_s = 0.0
-        self.on_action: Callable[[str], object] = lambda _name: None
+        self.on_action: Callable[[Intent], object] = lambda _intent: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
         self.on_more: Callable[[], object] = lambda: None
         row = QHBoxLayout(self)
@@ -367,7 +366,7 @@ class AlertBanner(QWidget):
         if self._offer is not None:
             self._run_offer_action(0)
         elif self._alert is not None and self._alert.intent is not None:
-            self.on_action(command_of(self._alert.intent))
+            self.on_action(self._alert.intent)
 
     def _close(self) -> None:
         if self._offer is not None:

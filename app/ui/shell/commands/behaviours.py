@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol
 
 from PySide6.QtCore import QUrl
 
-from app.blocks.model import deep_json
 from app.blocks.model.stack import Stack
 from app.core.projects.journal import UnsavedWork
 from app.core.projects.open_project import OpenProject
@@ -17,11 +15,8 @@ from app.core.session import Session
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
 from app.ui.other_programs import open_externally
-from app.ui.shell.commands.printing import PrintCommands
-from app.ui.shell.commands.program_pictures import ImageCommands
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.projects import ProjectController
-from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
 
@@ -39,116 +34,6 @@ class ShowOffer(Protocol):
     def __call__(self, title: str, detail: str, yes: OfferButton, no: OfferButton) -> None: ...
 
 
-@runtime_checkable
-class SupportsUndo(Protocol):
-    """Interface of a panel with an undo stack."""
-
-    def undo(self) -> None:
-        """Undo the last edit."""
-
-    def redo(self) -> None:
-        """Redo the last undone edit."""
-
-
-@runtime_checkable
-class SupportsBlockEdits(Protocol):
-    """Interface of a panel with blocks that can be copied and pasted."""
-
-    def edit_blocks(self, action: str) -> None:
-        """Apply an edit to the selected blocks, unless the page handles the keys itself.
-
-        Args:
-            action: "copy", "cut", "paste" or "duplicate".
-        """
-
-
-@runtime_checkable
-class SupportsShowBlock(Protocol):
-    """Interface of a panel that can scroll to a block."""
-
-    def show_block(self, block: str) -> None:
-        """Scroll to the block with this id."""
-
-
-@runtime_checkable
-class SupportsFindBlocks(Protocol):
-    """Interface of a panel that can search for blocks."""
-
-    def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search for blocks.
-
-        Args:
-            to_add: True to search the toolbox, False to search the behaviour.
-        """
-
-
-@runtime_checkable
-class SupportsPointAt(Protocol):
-    """Interface of a panel that can highlight a block in the toolbox."""
-
-    def point_at(self, block: str) -> None:
-        """Highlight a block in the toolbox by its type; "" removes the highlight."""
-
-
-@dataclass(frozen=True, slots=True)
-class TabPosition:
-    """New position of a tab, as argument of a command.
-
-    Attributes:
-        key: Key of the document.
-        position: Position, counted from 0.
-    """
-
-    key: str
-    position: int
-
-    @classmethod
-    def parse(cls, text: str) -> TabPosition:
-        """Parse a text such as ``KEY:2``.
-
-        Raises:
-            ValueError: The position isn't a number.
-        """
-        key, _colon, position = text.rpartition(":")
-        return cls(key, int(position))
-
-
-def parse_stack(text: str) -> Stack:
-    """Parse a script that the block editor's page has sent as JSON.
-
-    Raises:
-        ValueError: The text isn't a valid script.
-    """
-    return Stack.from_json(deep_json.loads(text))
-
-
-@dataclass(frozen=True, slots=True)
-class TabName:
-    """New name of a tab, as argument of a command.
-
-    Attributes:
-        key: Key of the document.
-        name: New name.
-    """
-
-    key: str
-    name: str
-
-    @classmethod
-    def parse(cls, text: str) -> TabName:
-        """Parse a text such as ``KEY:NAME``."""
-        key, _colon, name = text.partition(":")
-        return cls(key, name)
-
-
-@runtime_checkable
-class SupportsRename(Protocol):
-    """Interface of a panel in which the name of a behaviour can be edited."""
-
-    def rename_tab(self, key: str) -> None:
-        """Open a text field for the name of the tab with this key."""
-
-
 def show_blocks_panel(shell: Shell) -> None:
     """Show the Behaviour layout with the blocks panel in front."""
     shell.show_layout("behaviour")
@@ -161,13 +46,9 @@ class BehaviourCommands:
     Methods with a document key as argument return False if there is no such document.
     """
 
-    def __init__(
-        self, shell: Shell, session: Session, files: ProjectController, dialogs: FileDialogs
-    ) -> None:
+    def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
         self._shell, self._session, self._files = shell, session, files
         self._version_sheet: version_history.VersionHistorySheet | None = None
-        self.pictures = ImageCommands(shell, session, dialogs)
-        self.printing = PrintCommands(shell, session, dialogs)
 
     def run_or_resume(self) -> None:
         """Resume a paused program, or run the current behaviour.
@@ -281,18 +162,9 @@ class BehaviourCommands:
 
         return self._apply_to_document(key, save_as)
 
-    def rename_current(self) -> None:
-        """Open a text field for the name of the current tab."""
-        show_blocks_panel(self._shell)
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsRename):
-            editor.rename_tab(self._session.document.key)
-
-    def rename_tab(self, tab_name: TabName) -> bool:
+    def rename_tab(self, key: str, name: str) -> bool:
         """Rename a behaviour; return False if there is no such tab."""
-        return self._apply_to_document(
-            tab_name.key, lambda document: self._files.rename(document, tab_name.name)
-        )
+        return self._apply_to_document(key, lambda document: self._files.rename(document, name))
 
     def duplicate_tab(self, key: str) -> bool:
         """Open a copy of a behaviour in a new tab; return False if there is no such behaviour."""
@@ -322,71 +194,15 @@ class BehaviourCommands:
 
         return self._apply_to_document(key, show)
 
-    def move_tab(self, tab_position: TabPosition) -> bool:
-        """Move a tab to another position; return False if there is no such tab."""
-        return self._apply_to_document(
-            tab_position.key, lambda document: self._files.move(document, tab_position.position)
-        )
+    def move_tab(self, key: str, position: int) -> bool:
+        """Move a tab to another position, counted from 0; return False if there is no such tab."""
+        return self._apply_to_document(key, lambda document: self._files.move(document, position))
 
     def _apply_to_document(self, key: str, act: Callable[[OpenProject], object]) -> bool:
         document = self._session.documents.find_by_key(key)
         if document is not None:
             act(document)
         return document is not None
-
-    def undo(self) -> None:
-        """Undo the last edit of the blocks."""
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsUndo):
-            editor.undo()
-
-    def redo(self) -> None:
-        """Redo the last undone edit of the blocks."""
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsUndo):
-            editor.redo()
-
-    def edit_blocks(self, action: str) -> None:
-        """Apply an edit to the selected blocks if the Behaviour layout is shown, wherever the focus is.
-
-        Args:
-            action: "copy", "cut", "paste" or "duplicate".
-        """
-        editor = self._shell.editor()
-        if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsBlockEdits):
-            editor.edit_blocks(action)
-
-    def show_block(self, block: str) -> None:
-        """Show the Behaviour layout and scroll to the block with this id."""
-        self._shell.show_layout("behaviour")
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsShowBlock):
-            editor.show_block(block)
-
-    def point_at(self, block: str) -> bool:
-        """Show the toolbox and highlight a block by its type; return False without a block editor.
-
-        Args:
-            block: Type of the block; "-" removes the highlight.
-        """
-        has_block = block != "-"
-        if has_block:
-            show_blocks_panel(self._shell)
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsPointAt):
-            editor.point_at(block if has_block else "")
-        return isinstance(editor, SupportsPointAt)
-
-    def find_blocks(self, *, to_add: bool) -> None:
-        """Show the Behaviour layout and open the search for blocks.
-
-        Args:
-            to_add: True to search the toolbox, False to search the behaviour.
-        """
-        self._shell.show_layout("behaviour")
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsFindBlocks):
-            editor.find_blocks(to_add=to_add)
 
     def show_earlier_versions(self) -> None:
         """Open the version history of the current behaviour, after its newest edit was applied."""

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, runtime_checkable
-
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QMenuBar, QPlainTextEdit, QTextEdit, QWidget
 from shiboken6 import isValid
 
+from app.ui.intents import MenuEdit, UseEditMenu
 from app.ui.shell.commands.shell import Shell
 from nep.i18n import _
 
-Edit = Literal["cut", "copy", "paste", "selectAll"]
 Field = QLineEdit | QPlainTextEdit | QTextEdit
 FIELD_TYPES = (QLineEdit, QPlainTextEdit, QTextEdit)
 MODIFYING_EDITS = frozenset({"cut", "paste"})
-
-
-@runtime_checkable
-class SupportsEditMenu(Protocol):
-    """Interface of a panel that handles the Edit menu itself, because its text fields aren't Qt widgets."""
-
-    def edit_from_menu(self, edit: Edit) -> None:
-        """Apply an edit command to the focused field of the page, or to the selected blocks."""
 
 
 class EditCommands:
@@ -42,17 +32,16 @@ class EditCommands:
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
             self._last_focused = now
 
-    def run(self, edit: Edit) -> None:
+    def run(self, edit: MenuEdit) -> None:
         """Apply an edit to the focused field or to the blocks."""
         field = self._focused_field()
         if field is not None:
             getattr(field, edit)()
             return
-        editor = self._shell.editor()
-        if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsEditMenu):
-            editor.edit_from_menu(edit)
+        if self._shell.current_layout == "behaviour":
+            self._shell.request(UseEditMenu(edit))
 
-    def disabled_reason(self, edit: Edit) -> str:
+    def disabled_reason(self, edit: MenuEdit) -> str:
         """Return the reason why an edit is unavailable, or "" if it is available."""
         field = self._focused_field()
         if field is not None:

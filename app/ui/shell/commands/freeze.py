@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
-
 from PySide6.QtWidgets import QAbstractButton
 
 from app.ui.shell.docking.workbench import Workbench
 
 
-@runtime_checkable
-class SupportsFreeze(Protocol):
-    """Interface of a panel that can stop its updates.
-
-    Attributes:
-        freeze: Checkable button that stops the updates; hidden while the panel has no live contents.
-    """
-
-    freeze: QAbstractButton
-
-
 def freeze_buttons(bench: Workbench | None) -> list[QAbstractButton]:
     """Return the visible freeze buttons of the open panels; empty without a workbench."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
-    buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
-    return [button for button in buttons if not button.isHidden()]
+    buttons = [panel.freeze_button() for panel in panels]
+    return [button for button in buttons if button is not None and not button.isHidden()]
 
 
 def all_frozen(bench: Workbench | None) -> bool:

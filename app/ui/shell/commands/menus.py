@@ -63,6 +63,7 @@ class DynamicMenus:
         open_below(self._panel_menu, anchor)
 
     def _refresh(self, menu: str) -> None:
+        self.actions.add_contributions()
         self.actions.disable_unavailable()
         if menu == "File":
             self._list_recent()

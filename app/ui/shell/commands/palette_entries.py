@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from app.core.networks.networks import topic_label
 from app.core.projects.titles import recent_titles
 from app.core.session import Session
-from app.ui.shell.actions.command import Command
+from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.docking.layouts import layout_named
@@ -30,14 +29,10 @@ class PaletteEntries:
         self,
         shell: Shell,
         session: Session,
-        commands: Sequence[Command[Any]],
-        disabled_reason: Callable[[str], str],
+        actions: Actions,
         shortcuts: Shortcuts,
     ) -> None:
-        # `disabled_reason` returns the reason why a command is unavailable, or "".
-        self._shell, self._session, self._shortcuts = shell, session, shortcuts
-        self._palette_commands = [command for command in commands if command.in_palette]
-        self._disabled_reason = disabled_reason
+        self._shell, self._session, self._shortcuts, self._actions = shell, session, shortcuts, actions
         self._cached_topic_entries: list[Entry] = []
         self._topic_revisions = (-1, -1)
 
@@ -55,8 +50,14 @@ class PaletteEntries:
 
     def _commands(self) -> list[Entry]:
         entries = []
-        for command in self._palette_commands:
-            key, reason = self._shortcuts.first_shortcut(command.id), self._disabled_reason(command.id)
+        self._actions.add_contributions()
+        for command in self._actions.commands:
+            if not command.in_palette:
+                continue
+            key, reason = (
+                self._shortcuts.first_shortcut(command.id),
+                self._actions.disabled_reason(command.id),
+            )
             icon = command.icon or "chevrons-right"
             entries.append(Entry(f"command:{command.id}", command.label, icon, _(command.menu), key, reason))
         return entries

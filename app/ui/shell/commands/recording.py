@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING
 
 from app.core.network.topics import split_key
 from app.core.recording.topic_choice import RecordingChoice
 from app.core.session import Session
+from app.ui.intents import SelectRecording
 from app.ui.shell.commands.shell import Shell
 from app.ui.text.numbers import length_text, size_text
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -19,14 +20,6 @@ if TYPE_CHECKING:
     from app.ui.shell.dialogs import record as record_sheet
 else:
     record_sheet = lazy_module("app.ui.shell.dialogs.record")
-
-
-@runtime_checkable
-class SupportsRecordings(Protocol):
-    """Interface of the panel that lists recordings."""
-
-    def select_file(self, path: Path) -> None:
-        """Select a recording, now or as soon as it is listed."""
 
 
 class RecordCommands:
@@ -114,12 +107,8 @@ class RecordCommands:
         """Show the recordings panel and select a recording in it, if one is given."""
         if self._sheet is not None:
             self._sheet.dismiss()  # the sheet may cover the panel
-        if self._shell.bench is None:
-            self._shell.show_layout("developer")
-        dock = self._shell.open_panel("recordings")
-        if dock is not None and path is not None and isinstance(dock.panel, SupportsRecordings):
-            dock.panel.select_file(path)
-        self._shell.panel_focus.focus(dock)
+        if self._shell.request(SelectRecording(path)):
+            self._shell.panel_focus.focus(self._shell.open_panel("recordings"))
 
     def show_for_export(self, path: Path) -> None:
         """Select a recording in the recordings panel, which can export a part of it.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from app.core.session import Session
 from app.errors import SettingsError
+from app.intents import ReplaceRobot
 from app.robots.virtual_models import VirtualModel, virtual_models
+from app.ui.intents import Undo
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.projects import ProjectController
 from nep.i18n import _
@@ -22,41 +23,11 @@ else:  # imported after the window is shown
     web_pages = lazy_module("app.ui.shell.dialogs.web_pages")
 
 
-@dataclass(frozen=True, slots=True)
-class RobotReplacement:
-    """Replacement of a robot in a behaviour, as argument of a command.
-
-    Attributes:
-        missing: Name of the robot that is missing.
-        replacement: Name of the robot that replaces it.
-    """
-
-    missing: str
-    replacement: str
-
-    @classmethod
-    def parse(cls, text: str) -> RobotReplacement:
-        """Parse a text such as ``MISSING:OTHER``."""
-        missing, _colon, other = text.partition(":")
-        return cls(missing, other)
-
-
-@runtime_checkable
-class SupportsFullScreen(Protocol):
-    """Interface of a panel that can be shown in full screen."""
-
-    def toggle_full_screen(self) -> None:
-        """Toggle full screen."""
-
-
 class RobotCommands:
     """Handlers of the commands for robots and for access to the network."""
 
-    def __init__(
-        self, shell: Shell, session: Session, files: ProjectController, undo: Callable[[], object]
-    ) -> None:
-        # `undo` reverts the last edit of the blocks.
-        self._shell, self._session, self._files, self._undo = shell, session, files, undo
+    def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
+        self._shell, self._session, self._files = shell, session, files
         self._network_access: network_access.NetworkAccessSheet | None = None
         self._other_networks: other_networks.OtherNetworksSheet | None = None
         self._web_pages: web_pages.WebPagesSheet | None = None
@@ -107,12 +78,6 @@ class RobotCommands:
             launcher.stop_virtual_robot(robot)
         return bool(names)
 
-    def toggle_room_full_screen(self) -> None:
-        """Show the room of the virtual robots in full screen, or leave full screen."""
-        dock = self._shell.open_panel("robot")
-        if dock is not None and isinstance(dock.panel, SupportsFullScreen):
-            dock.panel.toggle_full_screen()
-
     def reconnect(self, name: str) -> None:
         """Restart a missing virtual robot; show the Robots panel for a real robot or an unknown model."""
         kind = self._description(name).get("rb:robot")
@@ -145,7 +110,7 @@ class RobotCommands:
         link = self._session.fleet.link(name)
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
-    def replace_robot(self, swap: RobotReplacement) -> bool:
+    def replace_robot(self, swap: ReplaceRobot) -> bool:
         """Replace a missing robot in the behaviour; return False if the new one is unknown.
 
         Shows a toast with an Undo button.
@@ -162,7 +127,7 @@ class RobotCommands:
             if document.replace_missing_robot(swap.missing, robot):
                 message = _("Replaced {other} with {robot}")
                 message = message.format(robot=swap.replacement, other=swap.missing)
-                self._shell.show_toast(message, _("Undo"), self._undo)
+                self._shell.show_toast(message, _("Undo"), lambda: self._shell.request(Undo()))
 
         self._files.run_after_flush(replace)
         return True

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from PySide6.QtWidgets import QMenuBar, QWidget
 
+from app.intents import Intent
 from app.ui.panels.base import Panel, ShowToast
 from app.ui.shell.docking.dock import Dock
 from app.ui.shell.docking.saved_layouts import SavedLayouts
@@ -63,8 +64,14 @@ class Shell(Protocol):
     def log_problem(self, message: str) -> None:
         """Log a sentence to the Console, about a problem that requires no action."""
 
-    def editor(self) -> object:
-        """Return the panel with the block editor, or None if it wasn't created yet."""
+    def request(self, intent: Intent) -> bool:
+        """Carry out an intent; return False if the object that it names doesn't exist."""
+
+    def flush(self, callback: Callable[[], None]) -> None:
+        """Apply the pending edit of the block editor to its document, then call `callback`."""
+
+    def show_current_behaviour(self) -> None:
+        """Show the current behaviour in the block editor without waiting for the next tick."""
 
     @property
     def return_layout(self) -> str:
@@ -84,6 +91,12 @@ class Shell(Protocol):
 
     def open_panel(self, name: str) -> Dock | None:
         """Show a panel in the current layout; return None if the panel isn't available."""
+
+    def open_home(self, panel: Panel) -> Dock | None:
+        """Show a panel in a layout in which it has a place; return None if the panel isn't available."""
+
+    def find_dock(self, name: str) -> Dock | None:
+        """Return the dock of a panel that was created, preferably in the current layout, or None."""
 
     def open_topic(self, topic: str) -> None:
         """Show a topic in the open panel that suits its type best."""

@@ -1,37 +1,71 @@
-"""Command table, used by menus, palette, shortcuts, tooltips and buttons.
+"""Table of the window's own commands and intents; panels contribute theirs in their descriptions.
 
-Panels, alerts and problems run a command by its id, such as ``help.doctor``, or with an argument, such
-as ``inspect:/faces``.
+Menus, palette, shortcuts, tooltips and buttons use the commands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from app.core.session import Session
+from app.intents import (
+    AllowOtherComputers,
+    BlockFix,
+    BrowseNetworks,
+    ChooseRecordingsFolder,
+    ConnectRobot,
+    Inspect,
+    Intent,
+    OpenBehaviour,
+    ReplaceRobot,
+    ReportProblem,
+    SaveBehaviour,
+    SaveBehaviourAs,
+    ShowLog,
+    ShowRecordingFile,
+    StartVirtualRobot,
+    StopRobots,
+)
 from app.robots.virtual_models import VirtualModel, virtual_models
-from app.ui.shell.actions.command import ArgumentCommand, Command
-from app.ui.shell.commands.acting import ActingCommands
-from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPosition, parse_stack
-from app.ui.shell.commands.editing import Edit, EditCommands
+from app.ui.intents import (
+    CloseOtherTabs,
+    CloseTab,
+    DuplicateTab,
+    ExportRecording,
+    MenuEdit,
+    MoveTab,
+    OpenPanel,
+    OpenRecording,
+    PointAtButton,
+    PressKey,
+    RecordTopic,
+    Redo,
+    RemoveVirtualRobot,
+    RenameTab,
+    SaveTab,
+    SaveTabAs,
+    ShowTab,
+    ShowTabFolder,
+    TryStack,
+    Undo,
+)
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.shell.commands.behaviours import BehaviourCommands
+from app.ui.shell.commands.editing import EditCommands
 from app.ui.shell.commands.freeze import freeze_buttons
 from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
-from app.ui.shell.commands.robots import RobotCommands, RobotReplacement
+from app.ui.shell.commands.robots import RobotCommands
 from app.ui.shell.commands.shell import START_PAGE, Shell
-from app.ui.shell.commands.variables import VariableCommands
-from app.ui.shell.commands.view import TEXT_SIZE_STEP_PERCENT, ViewCommands, parse_topic_field
+from app.ui.shell.commands.view import TEXT_SIZE_STEP_PERCENT, ViewCommands
 from app.ui.shell.projects import ProjectController
 from app.ui.theme.theme import TEXT_PERCENT_RANGE
 from nep.i18n import _, lazy
-from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
-A = TypeVar("A")
 OWN_MODELS = frozenset({"pepper", "diffdrive"})
 """Models of the virtual robots that have a row in the table."""
 APPEARANCE_MENU, RECORD_MENU = lazy("Appearance"), lazy("Record")
@@ -50,7 +84,6 @@ class Handlers:
     session: Session
     shell: Shell
     files: ProjectController
-    variables: VariableCommands
     behaviours: BehaviourCommands
     robots: RobotCommands
     view: ViewCommands
@@ -58,7 +91,6 @@ class Handlers:
     reports: ReportCommands
     recording: RecordCommands
     replay: ReplayCommands
-    acting: ActingCommands
 
 
 # Reasons why commands are unavailable, shown in the palette.
@@ -125,11 +157,6 @@ def _loaded_recording_disabled_reason(handlers: Handlers) -> str:
     return "" if handlers.session.replay.player is not None else _("The recording is still opening")
 
 
-def _room_disabled_reason(handlers: Handlers) -> str:
-    has_virtual_robot = any(link.is_virtual for link in handlers.session.fleet.connected)
-    return "" if has_virtual_robot else _("No virtual robots")
-
-
 def _virtual_robot_disabled_reason(handlers: Handlers) -> str:
     return (
         "" if handlers.session.launcher.models_by_name else _("No virtual robot was started in this window")
@@ -148,13 +175,13 @@ def _smaller_text_disabled_reason(handlers: Handlers) -> str:
     return _("Text is at its smallest") if handlers.shell.theme.text_percent <= TEXT_PERCENT_RANGE[0] else ""
 
 
-C = Command[Handlers]
+C = Command[Handlers, Handlers]
 
 
-def added_robot_commands() -> tuple[Command[Handlers], ...]:
+def added_robot_commands() -> tuple[C, ...]:
     """Return the commands that start the virtual robots without a row in the table."""
 
-    def command(robot: VirtualModel) -> Command[Handlers]:
+    def command(robot: VirtualModel) -> C:
         text = _("Use the virtual {robot}").format(robot=robot.name)
         return C(
             f"robots.virtual.{robot.model}",
@@ -178,7 +205,7 @@ def _panel_command(number: int) -> C:
     )
 
 
-def _edit_command(edit: Edit, text: str, key: str, icon: str, *, has_separator: bool = False) -> C:
+def _edit_command(edit: MenuEdit, text: str, key: str, icon: str, *, has_separator: bool = False) -> C:
     # A menu entry only; the focused widget handles its key.
     return C(
         f"edit.{edit}",
@@ -216,16 +243,8 @@ COMMANDS: tuple[C, ...] = (
       separator_above=True),
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
-    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.save_as(), "File",
-      icon="image-down", disabled_reason=_editor_disabled_reason),
-    C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.show_dialog(), "File", ("Ctrl+P",),
-      "printer", disabled_reason=_editor_disabled_reason),
-    C("print.pdf", lazy("Save blocks as PDF"), lambda do: do.behaviours.printing.ask_save_pdf(), "File",
-      icon="file-text", disabled_reason=_editor_disabled_reason),
     C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.show_earlier_versions(), "File"),
     C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
-    C("tab.rename", lazy("Rename the behaviour"), lambda do: do.behaviours.rename_current(), "File", ("F2",),
-      "pencil"),
     C("tab.reopen", lazy("Reopen closed behaviour"), lambda do: do.files.reopen(), "File",
       ("Ctrl+Shift+T",), "history"),
     C("file.forget_recent", lazy("Clear recent files"), lambda do: do.behaviours.clear_recent(),
@@ -236,24 +255,14 @@ COMMANDS: tuple[C, ...] = (
       in_shortcuts=False, disabled_reason=_previous_layout_disabled_reason),
     C("settings.open", lazy("Settings"), lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
     C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), separator_above=True),
-    C("edit.undo", lazy("Undo"), lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",
+    C("edit.undo", lazy("Undo"), lambda do: do.shell.request(Undo()), "Edit", ("Ctrl+Z",), "rotate-ccw",
       disabled_reason=_editor_disabled_reason),
-    C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
+    C("edit.redo", lazy("Redo"), lambda do: do.shell.request(Redo()), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
       "rotate-cw", disabled_reason=_editor_disabled_reason),
     _edit_command("cut", lazy("Cut"), "Ctrl+X", "scissors", has_separator=True),
     _edit_command("copy", lazy("Copy"), "Ctrl+C", "copy"),
     _edit_command("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
     _edit_command("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
-    C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
-      "Edit", icon="image", separator_above=True, disabled_reason=_editor_disabled_reason),
-    C("blocks.find", lazy("Find in blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
-      ("Ctrl+F",), "search", separator_above=True),
-    C("blocks.search", lazy("Find and add a block"), lambda do: do.behaviours.find_blocks(to_add=True),
-      "Edit"),
-    C("variable.new", lazy("New variable"), lambda do: do.variables.new(is_list=False), "Edit",
-      icon="variable", separator_above=True),
-    C("variable.new_list", lazy("New list"), lambda do: do.variables.new(is_list=True), "Edit",
-      icon="list-plus"),
     C("palette.open", lazy("Find a command or panel"), lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
       "search", in_palette=False),
     # macOS types special characters with Option (Alt) and reserves Cmd+Tab
@@ -345,13 +354,9 @@ COMMANDS: tuple[C, ...] = (
     *added_robot_commands(),
     C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.stop_virtual(), "Robots",
       disabled_reason=_virtual_robot_disabled_reason),
-    C("robots.room", lazy("Room in full screen"), lambda do: do.robots.toggle_room_full_screen(), "Robots",
-      ("F11",), "fullscreen", disabled_reason=_room_disabled_reason),
     # unlike "robots.virtual" without changing the layout
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
-    C("robots.show", lazy("Try what a robot can do"), lambda do: do.shell.open_panel("robots"), "Robots",
-      icon="eye", separator_above=True),
     C("robots.ask", lazy("Ask again before real robots move"),
       lambda do: do.robots.revoke_motion_permissions(),
       "Robots", icon="footprints"),
@@ -362,13 +367,8 @@ COMMANDS: tuple[C, ...] = (
       icon="waypoints"),
     C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.open_web_pages(), "Robots",
       icon="globe"),
-    C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell",
-      separator_above=True,
-      disabled_reason=_panels_disabled_reason),
-    C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
-      tip=lazy("Creates a message; nothing is sent until you arm sending")),
-    C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
-      tip=lazy("Shows the services that programs offer")),
+    C("alerts.show", lazy("Alerts"), lambda do: do.shell.open_panel("alerts"), in_palette=False,
+      in_shortcuts=False),
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
       ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), submenu=RECORD_MENU),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
@@ -387,8 +387,6 @@ COMMANDS: tuple[C, ...] = (
     C("help.examples", lazy("Examples"), lambda do: do.view.show_examples(), "Help", icon="blocks"),
     C("help.shortcuts", lazy("Keyboard shortcuts"), lambda do: do.view.open_shortcuts(), "Help", ("F1",),
       "keyboard"),
-    C("help.doctor", lazy("Connection doctor"), lambda do: do.view.open_doctor(), "Help", ("F4",),
-      "stethoscope"),
     C("help.report", lazy("Report a problem"), lambda do: do.reports.report(), "Help",
       icon="message-square-warning", separator_above=True),
     C("help.log", lazy("Show the log"), lambda do: do.view.open_log_folder(), "Help", icon="folder-open"),
@@ -398,57 +396,41 @@ COMMANDS: tuple[C, ...] = (
 )  # fmt: skip
 
 
-def _argument_command(
-    id: str, parse: Callable[[str], A], run: Callable[[Handlers, A], object]
-) -> ArgumentCommand[Handlers]:
-    # `run` returns False if the argument refers to nothing.
-    return ArgumentCommand(id, lambda do, text: run(do, parse(text)) is not False)
-
-
-def _fix_command(verb: str) -> ArgumentCommand[Handlers]:
-    return _argument_command(verb, str, lambda do, what: do.files.fix(f"{verb}:{what}"))
-
-
-ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
-    _argument_command("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
-    _argument_command("inspect", str, lambda do, topic: do.view.inspect(topic)),
-    _argument_command(
-        "alarm.topic", str, lambda do, topic: do.view.new_alarm(AlarmCondition("silent", topic, for_s=2.0))
-    ),
-    _argument_command("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
-    _argument_command("alarm.value", parse_topic_field, lambda do, about: do.view.new_value_alarm(about)),
-    _argument_command("publish.topic", str, lambda do, topic: do.acting.publish(topic)),
-    _argument_command("service.call", str, lambda do, service: do.acting.call(service)),
-    _argument_command("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
-    _argument_command("recording.open", Path, lambda do, path: do.replay.open(path)),
-    _argument_command("recording.export", Path, lambda do, path: do.recording.show_for_export(path)),
-    _argument_command("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
-    _argument_command("key", str, lambda do, key: do.view.run_shortcut(key)),
-    _argument_command("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
-    _argument_command("try", parse_stack, lambda do, stack: do.behaviours.try_stack(stack)),
-    _argument_command("block", str, lambda do, block: do.behaviours.show_block(block)),
-    _argument_command("variable.rename", str, lambda do, id: do.variables.ask_rename(id)),
-    _argument_command("variable.delete", str, lambda do, id: do.variables.delete(id)),
-    _argument_command("variable.watch", str, lambda do, id: do.variables.toggle_watch(id)),
-    _argument_command("variable.find", str, lambda do, id: do.variables.show_next_use(id)),
-    _argument_command("variable.put", str, lambda do, id: do.variables.ask_value(id)),
-    _argument_command("point.block", str, lambda do, block: do.behaviours.point_at(block)),
-    _argument_command("point.button", str, lambda do, command: do.view.point_at(command)),
-    _argument_command("tab", str, lambda do, key: do.behaviours.show_tab(key)),
-    _argument_command("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
-    _argument_command("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),
-    _argument_command("tab.save_as", str, lambda do, key: do.behaviours.save_tab_as(key)),
-    _argument_command("tab.rename", TabName.parse, lambda do, to: do.behaviours.rename_tab(to)),
-    _argument_command("tab.duplicate", str, lambda do, key: do.behaviours.duplicate_tab(key)),
-    _argument_command("tab.save", str, lambda do, key: do.behaviours.save_tab(key)),
-    _argument_command("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
-    _argument_command("tab.move", TabPosition.parse, lambda do, place: do.behaviours.move_tab(place)),
-    _argument_command("connect", str, lambda do, robot: do.robots.reconnect(robot)),
-    _argument_command("robot.use", RobotReplacement.parse, lambda do, swap: do.robots.replace_robot(swap)),
-    _argument_command("robot.end_virtual", str, lambda do, robot: do.robots.stop_virtual(robot)),
-    _argument_command("robot.virtual", str, lambda do, missing: do.robots.start_virtual_model(missing)),
-    *map(
-        _fix_command, ("limit", "define", "add", "after", "begin", "receive")
-    ),  # for buttons of problems (`app.blocks.fixes.fixes`)
+INTENT_COMMANDS: Mapping[type[Intent], str] = {
+    ShowLog: "help.log",
+    StopRobots: "run.stop",
+    SaveBehaviour: "file.save",
+    SaveBehaviourAs: "file.save_as",
+    OpenBehaviour: "file.open",
+    ChooseRecordingsFolder: "recording.folder",
+    BrowseNetworks: "network.look",
+    AllowOtherComputers: "network.others",
+    ReportProblem: "help.report",
+}
+"""Commands that carry out intents."""
+INTENTS: tuple[IntentHandler[Handlers, Any], ...] = (
+    IntentHandler(OpenPanel, lambda do, intent: do.shell.open_panel(intent.panel) is not None),
+    IntentHandler(Inspect, lambda do, intent: do.view.inspect(intent.topic)),
+    IntentHandler(RecordTopic, lambda do, intent: do.recording.record_topic(intent.topic)),
+    IntentHandler(OpenRecording, lambda do, intent: do.replay.open(intent.path)),
+    IntentHandler(ExportRecording, lambda do, intent: do.recording.show_for_export(intent.path)),
+    IntentHandler(ShowRecordingFile, lambda do, intent: do.replay.show_folder(intent.path)),
+    IntentHandler(PressKey, lambda do, intent: do.view.run_shortcut(intent.key)),
+    IntentHandler(PointAtButton, lambda do, intent: do.view.point_at(intent.command)),
+    IntentHandler(TryStack, lambda do, intent: do.behaviours.try_stack(intent.stack)),
+    IntentHandler(ShowTab, lambda do, intent: do.behaviours.show_tab(intent.key)),
+    IntentHandler(CloseTab, lambda do, intent: do.behaviours.close_tab(intent.key)),
+    IntentHandler(CloseOtherTabs, lambda do, intent: do.behaviours.close_other_tabs(intent.key)),
+    IntentHandler(SaveTab, lambda do, intent: do.behaviours.save_tab(intent.key)),
+    IntentHandler(SaveTabAs, lambda do, intent: do.behaviours.save_tab_as(intent.key)),
+    IntentHandler(RenameTab, lambda do, intent: do.behaviours.rename_tab(intent.key, intent.name)),
+    IntentHandler(DuplicateTab, lambda do, intent: do.behaviours.duplicate_tab(intent.key)),
+    IntentHandler(ShowTabFolder, lambda do, intent: do.behaviours.show_folder(intent.key)),
+    IntentHandler(MoveTab, lambda do, intent: do.behaviours.move_tab(intent.key, intent.position)),
+    IntentHandler(ConnectRobot, lambda do, intent: do.robots.reconnect(intent.name)),
+    IntentHandler(ReplaceRobot, lambda do, intent: do.robots.replace_robot(intent)),
+    IntentHandler(RemoveVirtualRobot, lambda do, intent: do.robots.stop_virtual(intent.name)),
+    IntentHandler(StartVirtualRobot, lambda do, intent: do.robots.start_virtual_model(intent.missing)),
+    IntentHandler(BlockFix, lambda do, intent: do.files.fix(intent)),
 )
-"""Commands that are run as ``id:argument``; tabs are identified by the key of their document."""
+"""Intents that the window carries out itself; tabs are identified by the key of their document."""

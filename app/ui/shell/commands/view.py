@@ -6,10 +6,8 @@ Sheets are created on first use, so that they don't delay the startup.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QAction
@@ -20,6 +18,7 @@ from app.core.recording.topic_choice import file_stem
 from app.core.session import Session
 from app.core.storage.atomic_file import read_regular_file, write_atomically
 from app.core.storage.settings import Mode, Preference, Settings
+from app.ui.intents import ShowRobot
 from app.ui.other_programs import open_externally
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
@@ -34,15 +33,10 @@ from app.ui.shell.projects import ProjectController
 from app.ui.speaker import has_voice_engine, voice_text
 from app.ui.widgets.file_dialogs import LAYOUT_FILTER, FileKind
 from app.ui.widgets.lists.fuzzy import Entry
-from nep.errors import NepError
 from nep.i18n import _, format_list, language
-from nep.messages.fields import parse_path, value_at
-from nep.programs.alarms import AlarmCondition
-from nep.programs.alarms.rule import NUMBER_KINDS
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from app.ui.panels.base import PanelWidget
     from app.ui.shell.dialogs import command_palette, guide, shortcuts
     from app.ui.shell.dialogs import name as name_sheet
     from app.ui.shell.dialogs import settings as settings_sheet
@@ -59,44 +53,6 @@ else:
 
 TEXT_SIZE_STEP_PERCENT = 25
 MAX_LISTED_PANELS = 4
-
-
-@runtime_checkable
-class SupportsRobotChoice(Protocol):
-    """Interface of a panel that shows one of several robots."""
-
-    def select_robot(self, name: str) -> None:
-        """Select the robot with this name."""
-
-
-@runtime_checkable
-class SupportsDiagnosis(Protocol):
-    """Interface of the panel of the connection doctor."""
-
-    def set_stalled_panel(self, stalled_panel: PanelWidget | None) -> None:
-        """Set the panel whose missing data is to be diagnosed; None for a general check."""
-
-
-@runtime_checkable
-class SupportsAlarms(Protocol):
-    """Interface of the panel of alarms."""
-
-    def add_alarm(self) -> None:
-        """Show the choices for a new alarm."""
-
-    def edit(self, rule_id: str, slot: str) -> None:
-        """Show an alarm, and open one of its slots for editing.
-
-        Args:
-            rule_id: Id of the alarm's rule.
-            slot: Name of the slot to open, such as "limit", or "" for none.
-        """
-
-
-def parse_topic_field(text: str) -> tuple[str, str]:
-    """Split a text such as "/odom pose.x" at the first space into topic and field path."""
-    topic, _blank, path = text.partition(" ")
-    return topic, path
 
 
 class ViewCommands:
@@ -124,19 +80,16 @@ class ViewCommands:
         self._update_theme_actions()
 
     def update_shortcuts(self) -> None:
-        """Update the shortcuts of all actions.
-
-        The command "Find" has its shortcut only in the Behaviour layout; elsewhere the panels handle
-        the key.
-        """
-        is_behaviour = self._shell.current_layout == "behaviour" and self._shell.bench is not None
-        keys_of = self.shortcuts.shortcuts_of
+        """Update the shortcuts of all actions; some work only in one layout."""
+        layout = self._shell.current_layout if self._shell.bench is not None else ""
+        commands, keys_of = self.shortcuts.commands, self.shortcuts.shortcuts_of
         self._actions.set_shortcuts(
-            lambda name: keys_of(name) if is_behaviour or name != "blocks.find" else ()
+            lambda name: keys_of(name) if commands[name].keys_layout in {"", layout} else ()
         )
 
     def run_shortcut(self, key: str) -> bool:
         """Run the command to which a shortcut is assigned; return False if none is available."""
+        self._actions.add_contributions()
         command = self.shortcuts.command_for(key)
         return bool(command) and self._actions.run(command)
 
@@ -166,9 +119,7 @@ class ViewCommands:
             shell.open_topic(name)
             self._select_topic(name)
         elif kind == "robot":
-            dock = shell.open_panel("robots")
-            if dock is not None and isinstance(dock.panel, SupportsRobotChoice):
-                dock.panel.select_robot(name)
+            shell.request(ShowRobot(name))
         elif kind == "layout":
             self.show_custom_layout(name)
         elif kind in {"file", "example"}:
@@ -191,45 +142,6 @@ class ViewCommands:
             dock.panel.show_topic(topic)
             self._select_topic(topic)
 
-    def new_alarm(self, condition: AlarmCondition | None = None) -> None:
-        """Create an alarm and open it for editing.
-
-        An alarm on a number stays off until the user has confirmed the limit.
-
-        Args:
-            condition: Condition of the alarm; None lets the user choose one.
-        """
-        dock = self._shell.open_panel("alarms")
-        if dock is None or not isinstance(dock.panel, SupportsAlarms):
-            return
-        if condition is None:
-            dock.panel.add_alarm()
-            return
-        rule = self._session.alarms.create(condition)
-        needs_limit = condition.kind in NUMBER_KINDS  # the limit has to be entered first
-        if needs_limit:
-            self._session.alarms.set_rule(replace(rule, is_enabled=False))
-        dock.panel.edit(rule.id, "limit" if needs_limit else "")
-
-    def new_value_alarm(self, topic_field: tuple[str, str]) -> None:
-        """Create an alarm on a field of a topic: on a limit for a number, else on any change.
-
-        For a number, the alarm stays off until the user has confirmed the limit.
-
-        Args:
-            topic_field: Topic and field path; "" is the path of the whole payload.
-        """
-        topic, path = topic_field
-        topic_state = self._session.shown.topics.get(topic)
-        newest = topic_state.newest if topic_state is not None else None
-        value: object = None
-        with suppress(NepError):
-            value = value_at(newest.payload, parse_path(path or ".")) if newest is not None else None
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        limit = value if isinstance(value, int | float) and is_number else None
-        kind = "below" if is_number else "changes"
-        self.new_alarm(AlarmCondition(kind, topic, path or ".", limit))
-
     def _select_topic(self, name: str) -> None:
         # If the topics panel is open, the topic is selected there too.
         bench = self._shell.bench
@@ -243,6 +155,7 @@ class ViewCommands:
     def _get_shortcut_sheet(self) -> shortcuts.ShortcutSheet:
         if self._shortcut_sheet is None:
             shell = self._shell
+            self._actions.add_contributions()
             self._shortcut_sheet = shortcuts.ShortcutSheet(shell.theme, shell.surface, self.shortcuts)
         return self._shortcut_sheet
 
@@ -307,7 +220,9 @@ class ViewCommands:
         if self._shell.bench is not None:
             self._shell.bench.reset_layout()
 
-    def _get_name_sheet(self) -> name_sheet.NameSheet:
+    @property
+    def name_sheet(self) -> name_sheet.NameSheet:
+        """Sheet that asks for a name, created on first use."""
         if self._name_sheet is None:
             self._name_sheet = name_sheet.NameSheet(self._shell.theme, self._shell.surface)
         return self._name_sheet
@@ -328,14 +243,14 @@ class ViewCommands:
             )
             shell.show_toast(message.format(name=name))
 
-        self._get_name_sheet().ask(_("Save layout as"), _("Save"), arrangements.rejection_reason, save)
+        self.name_sheet.ask(_("Save layout as"), _("Save"), arrangements.rejection_reason, save)
 
     def rename_layout(self) -> None:
         """Ask for a new name and rename the current custom layout."""
         arrangements = self._shell.saved_layouts
         old_name = arrangements.custom_name(self._shell.current_layout)
         if old_name:
-            self._get_name_sheet().ask(
+            self.name_sheet.ask(
                 _("New name for “{name}”").format(name=old_name),
                 _("Rename"),
                 lambda name: arrangements.rejection_reason(name, old_name),
@@ -459,6 +374,7 @@ class ViewCommands:
         self._guide_sheet.open()
 
     def _guide_pages(self) -> Sequence[guide.GuidePage]:
+        self._actions.add_contributions()
         return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first_shortcut)
 
     def show_examples(self) -> None:
@@ -471,20 +387,6 @@ class ViewCommands:
         if self._hint_ring is None:
             self._hint_ring = HintRing(self._shell.theme, self._shell.surface)
         return self._hint_ring.point_at(command)
-
-    def open_doctor(self, stalled_panel: PanelWidget | None = None, topic: str = "") -> None:
-        """Run the connection doctor and show its panel.
-
-        Args:
-            stalled_panel: Panel whose missing data is to be diagnosed, or None.
-            topic: Topic to check first, or "".
-        """
-        self._session.doctor.expect_topic(topic)
-        if self._shell.bench is None:
-            self.show_layout("developer")
-        dock = self._shell.open_panel("doctor")
-        if dock is not None and isinstance(dock.panel, SupportsDiagnosis):
-            dock.panel.set_stalled_panel(stalled_panel)
 
     def open_log_folder(self) -> None:
         """Open the folder of log files, creating it if necessary."""

@@ -193,6 +193,11 @@ class Dock(QDockWidget):
         self.setTitleBarWidget(title)
         self.setWidget(body)
 
+    @property
+    def is_placeholder(self) -> bool:
+        """True if the panel couldn't be created."""
+        return isinstance(self.panel, FailedPanel)
+
     def replace(self, panel: PanelWidget) -> None:
         """Replace the placeholder with a panel."""
         old = (self.title, self.body)

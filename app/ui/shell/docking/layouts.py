@@ -1,11 +1,16 @@
-"""Built-in layouts: Behaviour to build and run behaviours, Developer for programmers."""
+"""Built-in layouts: Behaviour to build and run behaviours, Developer for programmers.
+
+A layout defines its columns and its rules for small windows. Its rows come from the homes of the panels,
+which `arranged` adds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
-from app.ui.panels.base import Density
+from app.ui.panels.base import Density, Panel
+from app.ui.panels.home import BottomHome, RowHome, TabHome
 from nep.i18n import lazy
 
 
@@ -15,15 +20,15 @@ class DockColumn:
 
     Attributes:
         width: Width in px at 100 % text size; 0 takes the remaining space.
-        rows: Names of the panels that share a place, and height in px, for each row from top to bottom.
         max_share: Maximum width as a share of the window's width.
         min_share: Minimum width as a share of the window's width, for large windows.
+        rows: Names of the panels that share a place, and height in px, for each row from top to bottom.
     """
 
     width: int
-    rows: tuple[tuple[tuple[str, ...], int], ...]
     max_share: float = 1.0
     min_share: float = 0.0
+    rows: tuple[tuple[tuple[str, ...], int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Layout:
-    """Default arrangement of the panels in a workbench.
+    """Default arrangement of the panels in a workbench; without rows before `arranged`.
 
     Attributes:
         name: Unique name.
@@ -71,10 +76,10 @@ class Layout:
     density: Density
     columns: tuple[DockColumn, ...]
     folds: tuple[Fold, ...]
-    tab_targets: Mapping[str, str]
+    tab_targets: Mapping[str, str] = field(default_factory=dict)
     companions: Mapping[str, str] = field(default_factory=dict)
     min_heights: Mapping[str, int] = field(default_factory=dict)
-    bottom_heights: Mapping[str, int] = field(default_factory=lambda: {"timeline": 324})
+    bottom_heights: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def default_panels(self) -> tuple[str, ...]:
@@ -93,38 +98,12 @@ BEHAVIOUR = Layout(
     lazy("Behaviour"),
     "blocks",
     "comfortable",
-    (
-        DockColumn(0, ((("behaviour",), 626), (("problems", "variables"), 124))),
-        DockColumn(
-            384,
-            ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190)),
-            max_share=0.36,
-        ),
-    ),
+    (DockColumn(0), DockColumn(384, max_share=0.36)),
     (
         Fold("robot", ("camera",), below_width=1280),
         Fold("sensors", ("problems", "variables"), below_height=560),
         Fold("robot", ("sensors", "problems", "variables"), below_height=400),
     ),
-    {
-        "robots": "behaviour",
-        "doctor": "behaviour",
-        "plot": "behaviour",
-        "graph": "behaviour",
-        "alarms": "behaviour",
-        "recordings": "behaviour",
-        "publish": "behaviour",
-        "services": "behaviour",
-        "sent": "problems",
-        "console": "problems",
-        "alerts": "problems",
-        "nodes": "problems",
-        "image": "camera",
-        "first_steps": "camera",
-        "health": "sensors",
-    },
-    {"robots": "health"},
-    {"first_steps": 400},
 )
 DEVELOPER = Layout(
     "developer",
@@ -132,29 +111,14 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        DockColumn(640, ((("topics",), 780),), max_share=0.62, min_share=0.43),
-        DockColumn(330, ((("inspector",), 780),), max_share=0.28, min_share=0.22),
-        DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
+        DockColumn(640, max_share=0.62, min_share=0.43),
+        DockColumn(330, max_share=0.28, min_share=0.22),
+        DockColumn(0),
     ),
     (
         Fold("topics", ("inspector",), below_width=1280),
         Fold("image", ("console",), below_height=400),
     ),
-    {
-        "robots": "topics",
-        "doctor": "topics",
-        "graph": "topics",
-        "alarms": "topics",
-        "recordings": "topics",
-        "publish": "topics",
-        "services": "inspector",
-        "sent": "console",
-        "robot": "image",
-        "camera": "image",
-        "health": "console",
-        "variables": "console",
-        "plot": "topics",
-    },
 )
 LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 
@@ -162,3 +126,49 @@ LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 def layout_named(name: str) -> Layout:
     """Return the built-in layout with this name, or the first one if the name is unknown."""
     return next((layout for layout in LAYOUTS if layout.name == name), LAYOUTS[0])
+
+
+def arranged(layout: Layout, panels: Iterable[Panel]) -> Layout:
+    """Return a layout with the homes of panels."""
+    names_by_row: dict[tuple[int, int], list[tuple[int, str]]] = {}
+    heights: dict[tuple[int, int], int] = {}
+    tab_targets: dict[str, str] = {}
+    companions: dict[str, str] = {}
+    min_heights: dict[str, int] = {}
+    bottom_heights: dict[str, int] = {}
+    for panel in panels:
+        home = next((each for each in panel.home if each.layout == layout.name), None)
+        match home:
+            case RowHome():
+                place = (min(home.column, len(layout.columns) - 1), home.row)
+                names_by_row.setdefault(place, []).append((home.tab, panel.name))
+                heights[place] = max(home.height, heights.get(place, 0))
+                if home.opens_with:
+                    companions[home.opens_with] = panel.name
+                if home.tab_of:
+                    tab_targets[panel.name] = home.tab_of
+            case TabHome():
+                tab_targets[panel.name] = home.tab_of
+                if home.min_height:
+                    min_heights[panel.name] = home.min_height
+            case BottomHome():
+                bottom_heights[panel.name] = home.height
+    columns = tuple(
+        replace(
+            column,
+            rows=tuple(
+                (tuple(name for _tab, name in sorted(names_by_row[place])), heights[place])
+                for place in sorted(names_by_row)
+                if place[0] == index
+            ),
+        )
+        for index, column in enumerate(layout.columns)
+    )
+    return replace(
+        layout,
+        columns=columns,
+        tab_targets=tab_targets,
+        companions=companions,
+        min_heights=min_heights,
+        bottom_heights=bottom_heights,
+    )

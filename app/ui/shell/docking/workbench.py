@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered_title
 from app.ui.shell.docking.dock import Dock, create_dock, format_key, parse_key
-from app.ui.shell.docking.layouts import Fold, Layout
+from app.ui.shell.docking.layouts import Fold, Layout, arranged
 from app.ui.shell.docking.sizes import fit, shrink_above
 from app.ui.theme.theme import Theme
 from nep.i18n import _
@@ -47,7 +47,8 @@ class Workbench(QMainWindow):
         context: PanelContext,
     ) -> None:
         super().__init__()
-        self._theme, self._layout, self._panels, self._context = theme, layout, panels, context
+        self._theme, self._panels, self._context = theme, panels, context
+        self._layout = arranged(layout, panels.values())
         self.docks: dict[str, Dock] = {}
         self._prepared_docks: dict[str, Dock] = {}  # created in advance
         self._floating_docks: list[Dock] = []

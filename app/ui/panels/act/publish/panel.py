@@ -15,10 +15,13 @@ from app.core.run.acting.acting import result_text
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import MAX_MESSAGES, SavedMessage
 from app.core.run.acting.templates import format_empty_message, format_message
+from app.ui.intents import PublishMessage
 from app.ui.panels.act.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.act.publish.message_form import MessageForm
 from app.ui.panels.act.publish.shelf_list import SavedMessageList, state_cell
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.text.numbers import group_digits, rate_text
 from app.ui.widgets import Button, EmptyAction, EmptyState, label
@@ -212,15 +215,21 @@ class PublishPanel(PanelWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def open_for(self, key: str) -> None:
+    def open_for(self, key: str) -> bool:
         """Select the newest saved message for a topic, or create one from the topic's last message.
 
         A toast reports that no more messages can be saved.
 
         Args:
             key: Key of the topic; "" creates an empty message.
+
+        Returns:
+            False if the topic is in another network, to which Studio can't publish.
         """
-        _network, topic = split_key(key)
+        network, topic = split_key(key)
+        if network:
+            self.context.show_toast(_("You can only publish to topics of Studio's own network"))
+            return False
         saved = [each for each in self.acting.saved_messages.messages if topic and each.topic == topic]
         msg_type = self._type_of(topic) or "json"
         message = (
@@ -229,7 +238,7 @@ class PublishPanel(PanelWidget):
         if message is None:
             text = _("You have {count} saved messages, the maximum. Delete one first.")
             self.context.show_toast(text.format(count=MAX_MESSAGES))
-            return
+            return True
         self._requested_id = message.id
         self.filter.clear()
         self._rebuild()
@@ -237,6 +246,7 @@ class PublishPanel(PanelWidget):
             self.insert_template()
         field = self.form.edit if topic else self.form.topic_field
         field.setFocus(Qt.FocusReason.OtherFocusReason)
+        return True
 
     def insert_template(self) -> None:
         """Insert the topic's last message into the form, or its next one if none was received yet.
@@ -380,4 +390,22 @@ class PublishPanel(PanelWidget):
         self.acting.disarm()
 
 
-PANEL = Panel("publish", lazy("Publish"), "send", (), PublishPanel)
+PANEL = Panel(
+    "publish",
+    lazy("Publish"),
+    "send",
+    (),
+    PublishPanel,
+    home=(TabHome("developer", "topics"), TabHome("behaviour", "behaviour")),
+    commands=(
+        Command(
+            "publish.new",
+            lazy("Publish a message"),
+            lambda panel: panel.open_for(""),
+            icon="send",
+            tip=lazy("Creates a message; nothing is sent until you arm sending"),
+            after="alarm.new",
+        ),
+    ),
+    intents=(IntentHandler(PublishMessage, lambda panel, intent: panel.open_for(intent.topic)),),
+)

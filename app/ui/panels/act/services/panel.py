@@ -11,11 +11,14 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from app.core.run.acting.arming import Target
 from app.core.run.acting.calling import MAX_TIMEOUT_S, MIN_TIMEOUT_S, TIMEOUT_S, CallRecord
 from app.core.run.acting.json_text import JsonText, format_json, parse_json_text
+from app.ui.intents import SelectService
 from app.ui.panels.act.armed_strip import ArmDurationMenu, ArmedStrip
 from app.ui.panels.act.services.reply_view import ReplyView, clock_text, duration_cell
 from app.ui.panels.act.services.request_form import RequestForm
 from app.ui.panels.act.services.service_list import ServiceList, count_text, offered_services
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.panels.row_actions import RowAction, copy_action, fill_menu
 from app.ui.text import plain
 from app.ui.text.numbers import seconds_text, tip_with_key
@@ -467,4 +470,22 @@ def _one_line(value: object) -> str:
     return value if isinstance(value, str) else " ".join(format_json(value).split())
 
 
-PANEL = Panel("services", lazy("Services"), "spline", (), ServicesPanel)
+PANEL = Panel(
+    "services",
+    lazy("Services"),
+    "spline",
+    (),
+    ServicesPanel,
+    home=(TabHome("developer", "inspector"), TabHome("behaviour", "behaviour")),
+    commands=(
+        Command(
+            "service.show",
+            lazy("Call a service"),
+            lambda _panel: None,
+            icon="spline",
+            tip=lazy("Shows the services that programs offer"),
+            after="publish.new",
+        ),
+    ),
+    intents=(IntentHandler(SelectService, lambda panel, intent: panel.open_for(intent.service)),),
+)

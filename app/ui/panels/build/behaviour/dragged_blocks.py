@@ -10,6 +10,7 @@ from PySide6.QtGui import QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from app.core.session import Session
+from app.ui.intents import ShowTab
 from app.ui.panels.base import PanelContext
 from app.ui.panels.build.behaviour.tabs import NEW_TAB, BehaviourTabs
 from nep.i18n import _, ngettext
@@ -160,7 +161,7 @@ class BlockDrag:
 
     def _open_target(self) -> None:
         if self._drag_position is not None and self._hovered_target not in {"", NEW_TAB}:
-            self._context.run(f"tab:{self._hovered_target}")
+            self._context.request(ShowTab(self._hovered_target))
             self._show()
 
     def _set_image(self, data: bytes, ratio: float) -> None:
@@ -185,7 +186,7 @@ class BlockDrag:
         if not target:
             return
         if target != NEW_TAB:
-            self._context.run(f"tab:{target}")
+            self._context.request(ShowTab(target))
             self._transfer()
             return
         self._context.run("file.new")
@@ -201,7 +202,7 @@ class BlockDrag:
         message = transfer_text(count, how, self._session.documents.title(document))
 
         def undo() -> None:
-            self._context.run(f"tab:{home}")
+            self._context.request(ShowTab(home))
             self._editor.undo_block_move()
 
         self._context.show_toast(message, _("Undo"), undo)

@@ -14,19 +14,37 @@ from PySide6.QtCore import Qt, SignalInstance
 from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.blocks.model import deep_json
+from app.blocks.model.stack import Stack
 from app.core.projects.backpack import Backpack
 from app.core.projects.rename import name_problem
 from app.core.projects.titles import unique_titles
 from app.core.reports.not_installed import MissingLibraries, alert_missing, missing_libraries
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
-from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.intents import Intent, RenameVariable
+from app.ui.intents import (
+    BlockEdit,
+    CloseTab,
+    DeleteVariable,
+    MenuEdit,
+    MoveTab,
+    PressKey,
+    RenameTab,
+    ShowTab,
+    ToggleVariableWatch,
+    TryStack,
+)
+from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.build.behaviour.backpack_storage import BackpackController
 from app.ui.panels.build.behaviour.dragged_blocks import BlockDrag
 from app.ui.panels.build.behaviour.live_values import sensor_texts
+from app.ui.panels.build.behaviour.printing import PrintCommands
+from app.ui.panels.build.behaviour.program_pictures import ImageCommands
 from app.ui.panels.build.behaviour.program_view import ProgramView
 from app.ui.panels.build.behaviour.tab import TabState
 from app.ui.panels.build.behaviour.tabs import BehaviourTitle
+from app.ui.panels.build.behaviour.variable_commands import VariableCommands
 from app.ui.widgets import EmptyAction, EmptyState, label
 from app.ui.widgets.indicators import STATUS_BY_ROBOT_STATE
 from nep.i18n import _, lazy, ngettext, pgettext
@@ -45,6 +63,12 @@ LOADING_TEXT = lazy("Loading blocks…")
 LOADING_TEXT_DELAY_S = 0.5
 START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
 """Commands of the window that the buttons on an empty canvas run."""
+PAGE_INTENTS: Mapping[str, Callable[[str], Intent]] = {
+    "variable.rename": RenameVariable,
+    "variable.delete": DeleteVariable,
+    "variable.watch": ToggleVariableWatch,
+}
+"""Intents that menus of the page request for a variable, by their name in the page."""
 _PLACEHOLDER = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
 Json = Mapping[str, object]
 
@@ -134,11 +158,11 @@ class BehaviourPanel(PanelWidget):
         self._bar.undo.clicked.connect(self.undo)
         self._bar.redo.clicked.connect(self.redo)
         tabs = self._bar.tabs
-        tabs.selected.connect(lambda key: context.run(f"tab:{key}"))
-        tabs.close_requested.connect(lambda key: context.run(f"tab.close:{key}"))
-        tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
-        tabs.command_requested.connect(lambda command, key: context.run(f"{command}:{key}"))
-        tabs.renamed.connect(lambda key, name: context.run(f"tab.rename:{key}:{name}"))
+        tabs.selected.connect(lambda key: context.request(ShowTab(key)))
+        tabs.close_requested.connect(lambda key: context.request(CloseTab(key)))
+        tabs.moved.connect(lambda key, place: context.request(MoveTab(key, place)))
+        tabs.intent_requested.connect(context.request)
+        tabs.renamed.connect(lambda key, name: context.request(RenameTab(key, name)))
         tabs.name_problem = self._name_problem
         tabs.add.clicked.connect(lambda: context.run("file.new"))
         self.mode = "blocks"
@@ -159,6 +183,9 @@ class BehaviourPanel(PanelWidget):
         self._ticks = 0
         self._block_drag: BlockDrag | None = None
         self._backpack: BackpackController | None = None
+        self.variables = VariableCommands(context, self.flush, self.edit_variable)
+        self.pictures = ImageCommands(context, self.render_picture)
+        self.printing = PrintCommands(context, self.render_pdf)
 
     def title_widget(self) -> QWidget:
         return self._bar
@@ -257,10 +284,10 @@ class BehaviourPanel(PanelWidget):
         editor.history_changed.connect(self._history_changed)
         editor.key_pressed.connect(self._key_pressed)
         editor.visible_sensors_changed.connect(self._set_flyout_sensors)
-        editor.command_requested.connect(self.context.run)
+        editor.command_requested.connect(self._run_page_command)
         editor.watched_variables_changed.connect(self._watch_variables)
         editor.canvas_button_pressed.connect(lambda what: self.context.run(START_COMMANDS[what]))
-        editor.try_requested.connect(lambda stack: self.context.run(f"try:{stack}"))
+        editor.try_requested.connect(self._try_stack)
         editor.toolbox_pinned.connect(self._save_pinned)
         editor.blocks_deleted.connect(lambda count: self._blocks_deleted(editor, count))
         self._block_drag = BlockDrag(
@@ -277,6 +304,17 @@ class BehaviourPanel(PanelWidget):
             if had_focus:
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
         return editor
+
+    def _run_page_command(self, command: str) -> None:
+        # The page sends ids of commands, and intents for variables as "name:id".
+        name, _colon, id = command.partition(":")
+        if name in PAGE_INTENTS:
+            self.context.request(PAGE_INTENTS[name](id))
+        else:
+            self.context.run(command)
+
+    def _try_stack(self, stack: str) -> None:
+        self.context.request(TryStack(Stack.from_json(deep_json.loads(stack))))
 
     def _show_missing_libraries(self, missing: MissingLibraries) -> None:
         alert_missing(self.session.alerts, missing)
@@ -384,13 +422,13 @@ class BehaviourPanel(PanelWidget):
         if self.editor is not None:
             self.editor.redo()
 
-    def edit_blocks(self, command: str) -> None:
-        """Run "copy", "cut", "paste" or "duplicate" on the selected blocks if the blocks view is active."""
+    def edit_blocks(self, command: BlockEdit) -> None:
+        """Edit the selected blocks if the blocks view is active."""
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit(command)
 
-    def edit_from_menu(self, command: str) -> None:
-        """Run "cut", "copy", "paste" or "selectAll" on the page's focused text field, else on the blocks."""
+    def edit_from_menu(self, command: MenuEdit) -> None:
+        """Edit the page's focused text field, else the blocks, if the blocks view is active."""
         if self.editor is not None and self.mode == "blocks":
             self.editor.edit_from_menu(command)
 
@@ -467,9 +505,9 @@ class BehaviourPanel(PanelWidget):
             document.apply_edit(workspace)
             self.session.tabs.on_edited(document, was_blank=was_blank)
 
-    def rename_tab(self, key: str) -> None:
-        """Start in-place editing of a tab's name."""
-        self._bar.tabs.edit(key)
+    def rename_current(self) -> None:
+        """Start in-place editing of the name of the active tab."""
+        self._bar.tabs.edit(self.session.document.key)
 
     def _name_problem(self, key: str, name: str) -> str:
         document = self.session.documents.find_by_key(key)
@@ -480,7 +518,7 @@ class BehaviourPanel(PanelWidget):
         self._bar.redo.setEnabled(can_redo)
 
     def _key_pressed(self, key: str) -> None:
-        self.context.run(f"key:{key}")  # the shortcut table knows the command of this key
+        self.context.request(PressKey(key))  # the shortcut table knows the command of this key
 
     def save_state(self) -> dict[str, object]:
         return {"mode": self.mode}
@@ -571,6 +609,3 @@ def tab_states(documents: Iterable[OpenProject], runs: Runs) -> list[TabState]:
             )
         )
     return states
-
-
-PANEL = Panel("behaviour", lazy("Behaviour"), "blocks", (), BehaviourPanel)

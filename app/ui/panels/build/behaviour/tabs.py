@@ -8,6 +8,8 @@ from PySide6.QtCore import QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
+from app.intents import Intent
+from app.ui.intents import CloseOtherTabs, CloseTab, DuplicateTab, SaveTab, SaveTabAs, ShowTabFolder
 from app.ui.panels.build.behaviour.tab import BehaviourTab, NameField, TabState
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -32,7 +34,7 @@ class BehaviourTabs(QWidget):
     selected = Signal(str)
     close_requested = Signal(str)
     moved = Signal(str, int)
-    command_requested = Signal(str, str)  # command of a tab's context menu, key of the tab
+    intent_requested = Signal(object)  # intent of a tab's context menu
     renamed = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -288,27 +290,26 @@ class BehaviourTabs(QWidget):
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         rename = menu.addAction(self._theme.icon("pencil"), f"{_('Rename')}\tF2")
         rename.triggered.connect(lambda: self.edit(key))
-        for text, icon, command in (
-            (_("Duplicate"), "copy", "tab.duplicate"),
-            (_("Save"), "save", "tab.save"),
-            (_("Save as"), "", "tab.save_as"),
-            (_("Show in folder"), "folder-open", "tab.folder"),
-            ("", "", ""),
-            (_("Close"), "x", "tab.close"),
-            (_("Close other behaviours"), "", "tab.close_others"),
-        ):
-            if not command:
+        entries: tuple[tuple[str, str, Callable[[str], Intent] | None], ...] = (
+            (_("Duplicate"), "copy", DuplicateTab),
+            (_("Save"), "save", SaveTab),
+            (_("Save as"), "", SaveTabAs),
+            (_("Show in folder"), "folder-open", ShowTabFolder),
+            ("", "", None),
+            (_("Close"), "x", CloseTab),
+            (_("Close other behaviours"), "", CloseOtherTabs),
+        )
+        for text, icon, make in entries:
+            if make is None:
                 menu.addSeparator()
                 continue
             action = menu.addAction(text)
             if icon:
                 action.setIcon(self._theme.icon(icon))
-            action.triggered.connect(
-                lambda _on=False, command=command: self.command_requested.emit(command, key)
-            )
-            if command == "tab.folder":
+            action.triggered.connect(lambda _on=False, make=make: self.intent_requested.emit(make(key)))
+            if make is ShowTabFolder:
                 action.setEnabled(self.tabs[key].state.has_file)
-            if command == "tab.close_others":
+            if make is CloseOtherTabs:
                 action.setEnabled(len(self.tabs) > 1)
         return menu
 

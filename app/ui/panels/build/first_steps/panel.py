@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLay
 
 from app.core.projects.examples import example_block_ids
 from app.errors import SettingsError
+from app.intents import PointAtBlock
+from app.ui.intents import HideBlockHint, PointAtButton
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.build.first_steps.steps import (
     START_BLOCK,
@@ -21,6 +23,7 @@ from app.ui.panels.build.first_steps.steps import (
     completed_steps,
     find_tutorial_blocks,
 )
+from app.ui.panels.home import TabHome
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, label, paint
@@ -260,9 +263,9 @@ class FirstStepsPanel(PanelWidget):
         if step.id == "robot":
             self.context.run("robots.virtual")
         elif step.block_suffix:
-            self.context.run(f"point.block:{self._block_type(step.block_suffix)}")
+            self.context.request(PointAtBlock(self._block_type(step.block_suffix)))
         else:
-            self.context.run(f"point.button:{step.button_command}")
+            self.context.request(PointAtButton(step.button_command))
 
     def _block_type(self, suffix: str) -> str:
         if suffix == START_BLOCK:
@@ -273,7 +276,7 @@ class FirstStepsPanel(PanelWidget):
 
     def _clear_highlight(self) -> None:
         self._highlighted_step = ""
-        self.context.run("point.block:-")
+        self.context.request(HideBlockHint())
 
     def start_again(self) -> None:
         """Restart the tutorial in a new behaviour; existing blocks are not changed."""
@@ -290,4 +293,11 @@ class FirstStepsPanel(PanelWidget):
             self._clear_highlight()
 
 
-PANEL = Panel("first_steps", lazy("First steps"), "lightbulb", (), FirstStepsPanel)
+PANEL = Panel(
+    "first_steps",
+    lazy("First steps"),
+    "lightbulb",
+    (),
+    FirstStepsPanel,
+    home=(TabHome("behaviour", "camera", min_height=400),),
+)

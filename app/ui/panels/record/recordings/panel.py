@@ -21,8 +21,11 @@ from app.core.recording.topic_choice import file_stem
 from app.core.recording.topic_choice import free_path as free
 from app.core.storage.background_worker import BackgroundWorker
 from app.core.storage.settings import Settings
+from app.ui.intents import OpenRecording, SelectRecording
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.command import IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.panels.record.recordings.columns import THUMBNAIL_SIZE, columns, crop_to_thumbnail
 from app.ui.panels.record.recordings.details import RecordingDetails
 from app.ui.panels.record.recordings.table import RecordingTable
@@ -279,7 +282,7 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             action(str(info.path))
 
     def open_row(self, key: str) -> None:
-        self.context.run(f"recording.open:{key}")
+        self.context.request(OpenRecording(Path(key)))
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         return (
@@ -289,8 +292,10 @@ class RecordingsPanel(TablePanel[RecordingInfo]):
             RowAction(_("Delete"), "trash-2", lambda: self._delete(key)),
         )
 
-    def select_file(self, path: Path) -> None:
-        """Select a recording as soon as it appears in the list."""
+    def select_file(self, path: Path | None) -> None:
+        """Select a recording as soon as it appears in the list; None has no effect."""
+        if path is None:
+            return
         self.filter.clear()
         self._requested_path = str(path)
         self._ticks = 0
@@ -498,4 +503,12 @@ def _haystack(info: RecordingInfo) -> str:
     return " ".join((info.path.stem, info.note, *info.topics)).casefold()
 
 
-PANEL = Panel("recordings", TABLE_TEXTS.title, "film", (), RecordingsPanel)
+PANEL = Panel(
+    "recordings",
+    TABLE_TEXTS.title,
+    "film",
+    (),
+    RecordingsPanel,
+    home=(TabHome("developer", "topics"), TabHome("behaviour", "behaviour")),
+    intents=(IntentHandler(SelectRecording, lambda panel, intent: panel.select_file(intent.path)),),
+)

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 from app.core.recording.replay.replay import STEP_NS, Replay
 from app.core.timeline.lanes import Mark
 from app.core.timeline.selection import TimelineSelection
+from app.ui.intents import ExportRecording
 from app.ui.panels.act.armed_strip import ArmDurationMenu
 from app.ui.panels.base import PanelContext, PanelWidget
 from app.ui.panels.record.timeline.lanes import BOOKMARKS, ReplayLanes
@@ -323,14 +324,17 @@ class TimelinePanel(PanelWidget):
     def more_actions(self) -> list[QAction]:
         actions = []
         path = self._shown_replay.path if self._shown_replay is not None else None
-        rows = (
-            (_("Open a recording"), "folder-open", "replay.open"),
-            *([(_("Export a range"), "download", f"recording.export:{path}")] if path else []),
-            (_("Back to live"), "radio-tower", "replay.live"),
-        )
-        for text, icon, command in rows:
+        run, request = self.context.run, self.context.request
+        rows: list[tuple[str, str, Callable[[], object]]] = [
+            (_("Open a recording"), "folder-open", lambda: run("replay.open")),
+            (_("Back to live"), "radio-tower", lambda: run("replay.live")),
+        ]
+        if path is not None:
+            export = ExportRecording(path)
+            rows.insert(1, (_("Export a range"), "download", lambda: request(export)))
+        for text, icon, act in rows:
             action = QAction(self.theme.icon(icon), text, self)
-            action.triggered.connect(lambda _on=False, command=command: self.context.run(command))
+            action.triggered.connect(lambda _on=False, act=act: act())
             actions.append(action)
         for old in self._menu_actions:
             old.deleteLater()

@@ -15,7 +15,10 @@ from app.errors import SettingsError, UnknownRobotError
 from app.robots.description.description import Event
 from app.robots.virtual.room import Ball, Box, Room
 from app.robots.virtual.room_map import kind_of
+from app.ui.intents import OpenPanel, RemoveVirtualRobot
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.command import Command
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.robot.large_room import LargeRoom
@@ -179,7 +182,7 @@ class RobotPanel(OneRobotPanel):
                 plain.escape_menu_text(_("Remove {robot}").format(robot=self._robot))
             )
             remove_action.triggered.connect(
-                lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
+                lambda _on=False, name=self._robot: self.context.request(RemoveVirtualRobot(name))
             )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         open_below(menu, self.choose_button)
@@ -200,7 +203,9 @@ class RobotPanel(OneRobotPanel):
             self.empty.set_actions([])
         else:
             self.empty.set_texts(link.name, _hint_text(link))
-            show_action = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
+            show_action = EmptyAction(
+                _("Show actions"), lambda: self.context.request(OpenPanel("robots")), "bot"
+            )
             self.empty.set_actions([show_action])
 
     def _awaited_values(self, event: Event, name: str) -> Sequence[str]:
@@ -388,4 +393,28 @@ def _hint_text(link: RobotLink) -> str:
     return _("This robot reports no state, but you can try its actions.")
 
 
-PANEL = Panel("robot", lazy("Robot"), "bot", (), RobotPanel)
+def _room_disabled_reason(context: PanelContext) -> str:
+    has_virtual_robot = any(link.is_virtual for link in context.session.fleet.connected)
+    return "" if has_virtual_robot else _("No virtual robots")
+
+
+PANEL = Panel(
+    "robot",
+    lazy("Robot"),
+    "bot",
+    (),
+    RobotPanel,
+    home=(RowHome("behaviour", 1, 0, 327), TabHome("developer", "image")),
+    commands=(
+        Command(
+            "robots.room",
+            lazy("Room in full screen"),
+            RobotPanel.toggle_full_screen,
+            "Robots",
+            ("F11",),
+            "fullscreen",
+            disabled_reason=_room_disabled_reason,
+            after="robots.end_virtual",
+        ),
+    ),
+)

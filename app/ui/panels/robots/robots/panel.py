@@ -19,7 +19,10 @@ from PySide6.QtWidgets import (
 from app.core.robots.motion.permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, InputProblem, RobotInputError
+from app.ui.intents import ShowRobot
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.panels.no_robot import NoRobotController
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.robots.action_card import ActionCard
@@ -418,4 +421,23 @@ class RobotsPanel(OneRobotPanel):
             card.form.dispose()
 
 
-PANEL = Panel("robots", lazy("Robots"), "bot", (), RobotsPanel)
+PANEL = Panel(
+    "robots",
+    lazy("Robots"),
+    "bot",
+    (),
+    RobotsPanel,
+    home=(TabHome("behaviour", "behaviour"), TabHome("developer", "topics")),
+    commands=(
+        Command(
+            "robots.show",
+            lazy("Try what a robot can do"),
+            lambda _panel: None,
+            "Robots",
+            icon="eye",
+            separator_above=True,
+            after="robots.room",
+        ),
+    ),
+    intents=(IntentHandler(ShowRobot, lambda panel, intent: panel.select_robot(intent.name)),),
+)

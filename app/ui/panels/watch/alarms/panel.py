@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,11 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from app.core.parts.alarms import severity_of
 from app.core.recording.recordings import saved_file_name
 from app.core.storage.atomic_file import write_atomically
+from app.intents import ShowAlarms
+from app.ui.intents import NewAlarm, NewValueAlarm, OpenRecording
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
+from app.ui.panels.command import Command, IntentHandler
+from app.ui.panels.home import TabHome
 from app.ui.panels.watch.alarms.columns import (
     csv_text,
     history_columns,
@@ -50,12 +55,12 @@ from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import Menu, open_below
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
-from nep.errors import DecodeError
+from nep.errors import DecodeError, NepError
 from nep.i18n import _, lazy, ngettext
-from nep.messages.fields import leaf_paths
+from nep.messages.fields import leaf_paths, parse_path, value_at
 from nep.programs.alarms import AlarmCondition, AlarmRule
 from nep.programs.alarms.history import AlarmRecord
-from nep.programs.alarms.rule import new_id
+from nep.programs.alarms.rule import NUMBER_KINDS, new_id
 from nep.programs.alarms.sentences import condition_text, duration_text
 
 if TYPE_CHECKING:
@@ -263,6 +268,33 @@ class AlarmsPanel(PanelWidget):
     def add_alarm(self) -> None:
         """Create an alarm and start editing its topic."""
         self.edit(self.alarms.create(AlarmCondition("silent", for_s=2.0)).id, "subject")
+
+    def create_alarm(self, condition: AlarmCondition) -> None:
+        """Create an alarm and open it for editing.
+
+        An alarm on a number stays off until the user has confirmed the limit.
+        """
+        rule = self.alarms.create(condition)
+        needs_limit = condition.kind in NUMBER_KINDS  # the limit has to be entered first
+        if needs_limit:
+            self.alarms.set_rule(replace(rule, is_enabled=False))
+        self.edit(rule.id, "limit" if needs_limit else "")
+
+    def create_value_alarm(self, topic: str, path: str) -> None:
+        """Create an alarm on a field of a topic: on a limit for a number, else on any change.
+
+        Args:
+            topic: Key of the topic.
+            path: Path of the field; "" is the path of the whole payload.
+        """
+        topic_state = self.session.shown.topics.get(topic)
+        newest = topic_state.newest if topic_state is not None else None
+        value: object = None
+        with suppress(NepError):
+            value = value_at(newest.payload, parse_path(path or ".")) if newest is not None else None
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        limit = value if isinstance(value, int | float) and is_number else None
+        self.create_alarm(AlarmCondition("below" if is_number else "changes", topic, path or ".", limit))
 
     def edit(self, rule_id: str, slot: str) -> None:
         """Scroll to an alarm and start editing one of its slots.
@@ -536,7 +568,7 @@ class AlarmsPanel(PanelWidget):
         menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._scroll_to_alarm, key))
         for name in filter(None, file_names):
             path = self.session.recordings.folder / name
-            run = partial(self.context.run, f"recording.open:{path}")
+            run = partial(self.context.request, OpenRecording(path))
             menu.addAction(self.theme.icon("history"), _("Open the recording"), run)
         menu.popup(position)
 
@@ -588,4 +620,34 @@ class AlarmsPanel(PanelWidget):
             self._value_watch.close()
 
 
-PANEL = Panel("alarms", lazy("Alarms"), "bell", (), AlarmsPanel)
+def _new_alarm_disabled_reason(context: PanelContext) -> str:
+    return "" if context.layout() else _("The start page has no panels")
+
+
+PANEL = Panel(
+    "alarms",
+    lazy("Alarms"),
+    "bell",
+    (),
+    AlarmsPanel,
+    home=(TabHome("behaviour", "behaviour"), TabHome("developer", "topics")),
+    commands=(
+        Command(
+            "alarm.new",
+            lazy("New alarm"),
+            AlarmsPanel.add_alarm,
+            "View",
+            icon="bell",
+            separator_above=True,
+            disabled_reason=_new_alarm_disabled_reason,
+            after="network.web",
+        ),
+    ),
+    intents=(
+        IntentHandler(ShowAlarms, lambda _panel, _intent: None),
+        IntentHandler(NewAlarm, lambda panel, intent: panel.create_alarm(intent.condition)),
+        IntentHandler(
+            NewValueAlarm, lambda panel, intent: panel.create_value_alarm(intent.topic, intent.path)
+        ),
+    ),
+)

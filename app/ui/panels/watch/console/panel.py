@@ -10,7 +10,10 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
 
+from app.intents import ShowConsole
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, filter_blocker
+from app.ui.panels.command import IntentHandler
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.watch.console.list import (
     LEVEL_STYLES,
     RECORD_ROLE,
@@ -284,4 +287,12 @@ class ConsolePanel(PanelWidget):
         self.set_level(str(state.get("level", "all")))
 
 
-PANEL = Panel("console", lazy("Console"), "terminal", (), ConsolePanel)
+PANEL = Panel(
+    "console",
+    lazy("Console"),
+    "terminal",
+    (),
+    ConsolePanel,
+    home=(TabHome("behaviour", "problems"), RowHome("developer", 2, 1, 394)),
+    intents=(IntentHandler(ShowConsole, lambda _panel, _intent: None),),
+)

@@ -12,6 +12,8 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout
 
 from app.core.graph.node_graph import DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
+from app.ui.intents import NewAlarm
+from app.ui.panels.row_actions import departure_alarm, silence_alarm
 from app.ui.panels.watch.graph.texts import finite_or_none, percent_text, short_rate
 from app.ui.text.nodes import cpu_text, generation_text
 from app.ui.text.numbers import age_text, bandwidth_text, group_digits, latency_text, rate_text, size_text
@@ -101,8 +103,8 @@ class CardContent:
     """Key of the topic for the buttons *Inspect*, *Plot a field* and *Record topic*; "" hides the buttons."""
     has_fields: bool = False
     """True if the messages have fields to plot."""
-    alarm: str = ""
-    """Command that creates an alarm for the item; "" if none is possible."""
+    alarm: NewAlarm | None = None
+    """Intent to create an alarm for the item; None if that isn't possible."""
 
 
 class GraphCard(QWidget):
@@ -113,14 +115,14 @@ class GraphCard(QWidget):
         inspect_requested: Key of a topic to inspect.
         plot_requested: Key of a topic to plot.
         record_requested: Key of a topic to record.
-        alarm_requested: Command that creates an alarm.
+        alarm_requested: Intent to create an alarm.
         select_requested: Kind and key of an item to select.
     """
 
     closed = Signal()
     inspect_requested = Signal(str)
     plot_requested = Signal(str)
-    alarm_requested = Signal(str)
+    alarm_requested = Signal(object)
     record_requested = Signal(str)
     select_requested = Signal(str, str)
 
@@ -416,7 +418,7 @@ def _topic_content(topic: Topic, sources: CardSources) -> CardContent:
         clock_offset_text(sources.view) if not topic.network else "",
         topic.key,
         content_of(topic.codec) != "image",
-        "" if topic.network else f"alarm.topic:{topic.name}",  # alarms work on Studio's own network only
+        None if topic.network else silence_alarm(topic.name),  # alarms work on Studio's own network only
     )
 
 
@@ -510,7 +512,7 @@ def node_card(
         stats if entry.cpu_ratio is not None else (),
         (", ".join(lines),) if lines else (),
         tuple(table for table in tables if table.rows),
-        alarm="" if entry.network else f"alarm.node:{entry.name}",
+        alarm=None if entry.network else departure_alarm(entry.name),
     )
 
 

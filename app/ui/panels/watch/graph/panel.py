@@ -33,7 +33,9 @@ from app.core.graph.walk import GraphSelection
 from app.core.network.topics import split_key
 from app.core.network.web_texts import page_nodes
 from app.core.storage.atomic_file import write_atomically
+from app.ui.intents import RecordTopic
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.home import TabHome
 from app.ui.panels.row_actions import (
     RowAction,
     copy_action,
@@ -164,8 +166,8 @@ class GraphPanel(PanelWidget):
         self.card.closed.connect(lambda: canvas.select(None))
         self.card.inspect_requested.connect(self._open)
         self.card.plot_requested.connect(lambda key: self.context.plot(key, ""))
-        self.card.alarm_requested.connect(self.context.run)
-        self.card.record_requested.connect(lambda key: self.context.run(f"record.topic:{key}"))
+        self.card.alarm_requested.connect(self.context.request)
+        self.card.record_requested.connect(lambda key: self.context.request(RecordTopic(key)))
         self.card.select_requested.connect(self._select_item)
 
     def _make_page(self) -> QWidget:
@@ -622,4 +624,11 @@ class GraphPanel(PanelWidget):
         self._thread.close()
 
 
-PANEL = Panel("graph", lazy("Graph"), "workflow", (), GraphPanel)
+PANEL = Panel(
+    "graph",
+    lazy("Graph"),
+    "workflow",
+    (),
+    GraphPanel,
+    home=(TabHome("developer", "topics"), TabHome("behaviour", "behaviour")),
+)

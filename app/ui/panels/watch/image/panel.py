@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResizeEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QVBoxLayout, QWidget
 
-from app.core.alerts.intents import ShowConsole
 from app.core.messages.image_style import PLAIN, PictureStyle, parse_style
 from app.core.networks.networks import topic_label
+from app.intents import Inspect, ShowConsole
+from app.ui.intents import ExportRecording, RecordTopic
 from app.ui.other_programs import open_externally
 from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, paused_blocker
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.watch.image.actions import PictureActions
 from app.ui.panels.watch.image.overlays import Overlays
 from app.ui.panels.watch.image.point_bar import PointBar
@@ -272,9 +274,9 @@ class ImagePanel(PanelWidget):
         """Start recording the images or, if a recording is open, show the export of its images."""
         replay = self.session.replay
         if replay is None:
-            self.context.run(f"record.topic:{self._topic}")
+            self.context.request(RecordTopic(self._topic))
         else:
-            self.context.run(f"recording.export:{replay.path}")
+            self.context.request(ExportRecording(replay.path))
 
     def copy_image(self) -> None:
         """Copy the image to the clipboard at its original size."""
@@ -310,7 +312,7 @@ class ImagePanel(PanelWidget):
         menu.popup(self.view.mapToGlobal(position))
 
     def _inspect(self) -> None:
-        self.context.run(f"inspect:{self._topic}")
+        self.context.request(Inspect(self._topic))
 
     def _show_layers(self) -> None:
         menu = Menu(self.theme, self)
@@ -376,6 +378,9 @@ class ImagePanel(PanelWidget):
             self._watch.close()
         self._watch, self._watched_robot = None, ""
 
+    def freeze_button(self) -> QAbstractButton:
+        return self.freeze
+
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._stream, self._watch, *self.overlays.suspendables())
 
@@ -392,4 +397,12 @@ class ImagePanel(PanelWidget):
             self._stream = None
 
 
-PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel, allows_multiple=True)
+PANEL = Panel(
+    "image",
+    lazy("Image"),
+    "image",
+    (CODEC,),
+    ImagePanel,
+    allows_multiple=True,
+    home=(TabHome("behaviour", "camera"), RowHome("developer", 2, 0, 380)),
+)

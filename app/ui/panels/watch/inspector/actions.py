@@ -48,7 +48,7 @@ class InspectorActions(QObject):
         *,
         find: Callable[[], object],
         toast: Callable[[str], None],
-        plot: Callable[[str], None],
+        plot: Callable[[str], object],
     ) -> None:
         super().__init__(panel)
         self._body, self._current_message, self._value, self._toast, self._plot = (

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QModelIndex, QPoint, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QVBoxLayout
+from PySide6.QtWidgets import QAbstractButton, QVBoxLayout
 
 from app.core.messages.reader import LARGE_BYTES, MessageReader, ReadResult
 from app.core.network.topics import split_key
 from app.core.networks.kinds import find_kind
 from app.core.networks.networks import topic_label
 from app.core.timeline.times import clock_text
+from app.ui.intents import NewValueAlarm, OpenPanel, PublishMessage
 from app.ui.panels.base import ANY_TYPE, Blocker, Panel, PanelContext, PanelWidget, paused_blocker
+from app.ui.panels.home import RowHome
 from app.ui.panels.watch.inspector.actions import InspectorActions
 from app.ui.panels.watch.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
 from app.ui.panels.watch.inspector.diff import NO_BASE, count_changes
@@ -312,7 +314,7 @@ class InspectorPanel(PanelWidget):
         self.inspector_actions.set_enabled(page == TREE)
 
     def _show_empty(self) -> None:
-        choose = lambda: self.context.run("panel:topics")  # noqa: E731
+        choose = lambda: self.context.request(OpenPanel("topics"))  # noqa: E731
         self.body.show_empty(topic_label(self._topic), choose, self.doctor_action(self._topic))
         if not self._topic:
             self.live.set("")
@@ -414,13 +416,12 @@ class InspectorPanel(PanelWidget):
         menu.addActions(self.inspector_actions.menu_actions())
         index = self.tree.currentIndex()
         if index.isValid() and self._topic and not split_key(self._topic)[0]:
-            command = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
+            request = self.context.request
+            alarm = NewValueAlarm(self._topic, path_text(steps_of(self.model.node(index))))
             menu.addSeparator()
-            menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(command))
-            publish = f"publish.topic:{self._topic}"
-            menu.addAction(
-                self.theme.icon("send"), _("Publish to this topic"), lambda: self.context.run(publish)
-            )
+            menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: request(alarm))
+            publish = PublishMessage(self._topic)
+            menu.addAction(self.theme.icon("send"), _("Publish to this topic"), lambda: request(publish))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(position))
 
@@ -475,6 +476,9 @@ class InspectorPanel(PanelWidget):
         self.history.pause()
         super().suspend()
 
+    def freeze_button(self) -> QAbstractButton:
+        return self.freeze
+
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)
 
@@ -514,4 +518,12 @@ def chip_state(
     return pgettext("message", "live"), "info", ""
 
 
-PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel, allows_multiple=True)
+PANEL = Panel(
+    "inspector",
+    lazy("Inspector"),
+    "list-tree",
+    (ANY_TYPE,),
+    InspectorPanel,
+    allows_multiple=True,
+    home=(RowHome("developer", 1, 0, 780),),
+)

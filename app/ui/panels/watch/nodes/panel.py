@@ -12,6 +12,7 @@ from app.core.network.source import NODE_NAME
 from app.core.networks.networks import network_label
 from app.core.networks.parameters import NodeParameters
 from app.ui.panels.base import Density, Panel, PanelContext
+from app.ui.panels.home import RowHome, TabHome
 from app.ui.panels.network_table import NetworkTable, are_own_nodes
 from app.ui.panels.row_actions import RowAction, copy_action, node_actions, show_messages, topic_actions
 from app.ui.panels.table_panel import TableTexts
@@ -224,4 +225,11 @@ def _haystack(node: NodeEntry) -> str:
     return f"{own_fields} {topics}".casefold()
 
 
-PANEL = Panel("nodes", TABLE_TEXTS.title, "network", (), NodesPanel)
+PANEL = Panel(
+    "nodes",
+    TABLE_TEXTS.title,
+    "network",
+    (),
+    NodesPanel,
+    home=(TabHome("behaviour", "problems"), RowHome("developer", 2, 1, 394, tab=2)),
+)

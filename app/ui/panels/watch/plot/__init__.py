@@ -7,7 +7,10 @@ toolbar. The package is imported when the first plot opens, because importing py
 
 from __future__ import annotations
 
+from app.ui.intents import PlotField
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
+from app.ui.panels.command import IntentHandler
+from app.ui.panels.home import TabHome
 from nep.i18n import lazy
 
 
@@ -17,4 +20,13 @@ def _make_panel(context: PanelContext) -> PanelWidget:
     return PlotPanel(context)
 
 
-PANEL = Panel("plot", lazy("Plot"), "chart-line", (), _make_panel, allows_multiple=True)
+PANEL = Panel(
+    "plot",
+    lazy("Plot"),
+    "chart-line",
+    (),
+    _make_panel,
+    allows_multiple=True,
+    home=(TabHome("developer", "topics"), TabHome("behaviour", "behaviour")),
+    intents=(IntentHandler(PlotField, lambda panel, intent: panel.plot_field(intent.topic, intent.path)),),
+)

@@ -13,6 +13,7 @@ from app.core.network.topic_tree import TopicFolder, TopicTree, TreeRow, folders
 from app.core.network.topics import split_key
 from app.core.networks.networks import network_label
 from app.ui.panels.base import Panel, PanelContext
+from app.ui.panels.home import RowHome
 from app.ui.panels.network_table import NetworkTable, are_own_nodes
 from app.ui.panels.row_actions import RowAction, copy_action, show_messages, topic_actions
 from app.ui.panels.table_panel import TableTexts
@@ -290,4 +291,4 @@ def _haystack(topic: Topic) -> str:
     return " ".join(parts)
 
 
-PANEL = Panel("topics", TABLE_TEXTS.title, "list", (), TopicsPanel)
+PANEL = Panel("topics", TABLE_TEXTS.title, "list", (), TopicsPanel, home=(RowHome("developer", 0, 0, 780),))

@@ -14,9 +14,8 @@ from PySide6.QtPdf import QPdfDocument
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.core.session import Session
-from app.ui.shell.commands.printing import PrintCommands, default_page_layout, paint_pdf
-from app.ui.shell.commands.shell import Shell
+from app.ui.panels.base import PanelContext
+from app.ui.panels.build.behaviour.printing import PrintCommands, default_page_layout, paint_pdf
 from tests.ui.shell_parts import Answers
 
 
@@ -51,13 +50,13 @@ class Case:
         self.said: list[str] = []
         self.editor, self.window = Editor(data), QWidget()
         qtbot.addWidget(self.window)
-        surface = SimpleNamespace(window=lambda: self.window)
-        shell = SimpleNamespace(editor=lambda: self.editor, show_toast=self.said.append, surface=surface)
+        self.window.case = self  # a reference cycle: the window must outlive its print dialog
         session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
         self.answers = Answers()
-        self.printing = PrintCommands(
-            cast("Shell", shell), cast("Session", session), self.answers, lambda: printers
+        context = SimpleNamespace(
+            show_toast=self.said.append, surface=self.window, session=session, files=self.answers
         )
+        self.printing = PrintCommands(cast("PanelContext", context), self.editor.render_pdf, lambda: printers)
 
 
 def dialogs(kind: type) -> list[QWidget]:

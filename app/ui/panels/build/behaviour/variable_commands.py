@@ -1,49 +1,36 @@
-"""Commands for variables of the current behaviour: create, rename, delete, watch, find uses, set values."""
+"""Commands for variables of the current behaviour: create, rename, delete, watch and find uses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import chain, count
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.blocks.model.workspace import PlacedBlock, Workspace, parse_workspace
-from app.core.session import Session
-from app.robots.description.typed_number import TypedNumberError, parse_number
-from app.ui.shell.commands.shell import Shell
-from app.ui.shell.projects import ProjectController
+from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext, pgettext
-from nep.system.lazy_import import lazy_module
-
-if TYPE_CHECKING:
-    from app.ui.shell.dialogs import name as name_sheet
-else:
-    name_sheet = lazy_module("app.ui.shell.dialogs.name")
 
 MAX_NAME_LENGTH = 60
-
-
-@runtime_checkable
-class SupportsVariables(Protocol):
-    """Interface of a panel in which variables can be edited."""
-
-    def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Apply an edit of a variable as one step on the undo stack.
-
-        Args:
-            edit: Edit for the page of the block editor: "do" with "new", "rename", "delete", "watch",
-                "show" or "undo", and the arguments.
-        """
 
 
 class VariableCommands:
     """Handlers of the commands for variables.
 
     The handlers ask for names and show toasts; the block editor applies the edits.
+
+    Args:
+        context: Functions of the window.
+        flush: Applies pending edits of the blocks, then calls a function.
+        edit: Applies an edit of a variable as one step on the undo stack; it is a JSON object for the page
+            of the block editor, with "new", "rename", "delete", "watch", "show" or "undo" in "do".
     """
 
-    def __init__(self, shell: Shell, session: Session, files: ProjectController) -> None:
-        self._shell, self._session, self._files = shell, session, files
-        self._sheet: name_sheet.NameSheet | None = None
+    def __init__(
+        self,
+        context: PanelContext,
+        flush: Callable[[Callable[[], None]], object],
+        edit: Callable[[Mapping[str, object]], object],
+    ) -> None:
+        self._context, self._flush, self._edit = context, flush, edit
         self._last_found_ids: dict[str, str] = {}  # id of the block found last, by variable
 
     def new(self, *, is_list: bool) -> None:
@@ -53,11 +40,11 @@ class VariableCommands:
 
         def ask_name() -> None:
             callback = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
-            self._get_name_sheet().ask(
+            self._context.ask_name(
                 question, verb, self.rejection_reason, callback, self._free_name(is_list=is_list)
             )
 
-        self._run_after_flush(ask_name)
+        self._flush(ask_name)
 
     def _free_name(self, *, is_list: bool) -> str:
         # Suggests a name so that none has to be typed: "count", "count 2", "count 3".
@@ -77,7 +64,7 @@ class VariableCommands:
             if old_name is None:
                 return
             has_name = id not in workspace.nameless_variables
-            self._get_name_sheet().ask(
+            self._context.ask_name(
                 _("New name for “{name}”").format(name=old_name) if has_name else _("Variable name"),
                 _("Rename") if has_name else _("Name the variable"),
                 lambda name: "" if name == old_name else self.rejection_reason(name, id),
@@ -85,7 +72,7 @@ class VariableCommands:
                 old_name if has_name else "",
             )
 
-        self._run_after_flush(ask_name)
+        self._flush(ask_name)
 
     def delete(self, id: str) -> None:
         """Delete a variable and the blocks that use it, and show a toast with an Undo button."""
@@ -103,9 +90,9 @@ class VariableCommands:
                     "Deleted “{name}” and {count} blocks that used it",
                     count,
                 ).format(name=name, count=count)
-            self._shell.show_toast(message, _("Undo"), lambda: self._edit({"do": "undo"}))
+            self._context.show_toast(message, _("Undo"), lambda: self._edit({"do": "undo"}))
 
-        self._run_after_flush(delete)
+        self._flush(delete)
 
     def toggle_watch(self, id: str) -> None:
         """Show or hide the value of the variable with this id next to the blocks."""
@@ -122,30 +109,7 @@ class VariableCommands:
                 self._last_found_ids = {id: uses[index]}
                 self._edit({"do": "show", "id": uses[index]})
 
-        self._run_after_flush(show)
-
-    def ask_value(self, id: str) -> None:
-        """Ask for a value and assign it to a variable of the running program."""
-        runs = self._session.runs
-        name = self._workspace().variables.get(id)
-        current_value = runs.values.get(id)
-        if name is None or not runs.active:
-            return
-
-        def set_value(text: str) -> None:
-            if not runs.set_variable(id, parse_value(text)):
-                self._shell.show_toast(_("The behaviour ended: “{name}” wasn't changed").format(name=name))
-
-        is_number = current_value is not None and current_value.kind == "number"
-        self._get_name_sheet().ask(
-            _("New value for “{name}”").format(name=name),
-            _("Apply"),
-            lambda words: separator_problem(words) if is_number else "",
-            set_value,
-            current_value.text
-            if current_value is not None and current_value.kind in ("number", "text", "boolean")
-            else "",
-        )
+        self._flush(show)
 
     def rejection_reason(self, name: str, own_id: str = "") -> str:
         """Return the reason why a variable name is invalid, as a sentence, or "".
@@ -163,22 +127,8 @@ class VariableCommands:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
 
-    def _run_after_flush(self, act: Callable[[], None]) -> None:
-        self._shell.show_layout("behaviour")
-        self._files.run_after_flush(act)
-
     def _workspace(self) -> Workspace:
-        return parse_workspace(self._session.document.workspace)
-
-    def _edit(self, edit: Mapping[str, object]) -> None:
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsVariables):
-            editor.edit_variable(edit)
-
-    def _get_name_sheet(self) -> name_sheet.NameSheet:
-        if self._sheet is None:
-            self._sheet = name_sheet.NameSheet(self._shell.theme, self._shell.surface)
-        return self._sheet
+        return parse_workspace(self._context.session.document.workspace)
 
 
 def uses_of(workspace: Workspace, id: str) -> list[str]:
@@ -199,32 +149,3 @@ def uses_of(workspace: Workspace, id: str) -> list[str]:
 
 def _refers_to(field: object, id: str) -> bool:
     return isinstance(field, Mapping) and field.get("id") == id
-
-
-def separator_problem(text: str) -> str:
-    """Return an error sentence if the text is a number with ambiguous separators, else ""."""
-    try:
-        parse_number(text)
-    except TypedNumberError as error:
-        return str(error) if error.has_separators else ""
-    return ""
-
-
-def parse_value(text: str) -> str | float | bool:
-    """Parse a typed value of a variable.
-
-    Returns:
-        A number, a boolean for "yes", "no" (in the user's language), "true" or "false", or else the
-        text.
-    """
-    stripped = text.strip()
-    folded = stripped.casefold()
-    if folded in ("true", _("yes").casefold()):
-        return True
-    if folded in ("false", _("no").casefold()):
-        return False
-    try:
-        number = parse_number(stripped)
-        return int(stripped) if stripped.lstrip("+-").isdecimal() else number
-    except ValueError:
-        return text

@@ -5,17 +5,16 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QLocale, QMarginsF, QRectF, QSize, Qt
 from PySide6.QtGui import QPageLayout, QPageSize, QPainter
 from PySide6.QtWidgets import QDialog
 
-from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
-from app.ui.shell.commands.program_pictures import suggested_path
-from app.ui.shell.commands.shell import Shell
-from app.ui.widgets.file_dialogs import FileDialogs, FileKind
+from app.ui.panels.base import PanelContext
+from app.ui.panels.build.behaviour.program_pictures import suggested_path
+from app.ui.widgets.file_dialogs import FileKind
 from nep.i18n import _, day_text
 
 if TYPE_CHECKING:
@@ -25,49 +24,39 @@ MAX_DPI = 300
 """Maximum resolution. Blocks don't look better above it, and a page at 1200 dpi takes 500 MB."""
 
 
-@runtime_checkable
-class SupportsPrinting(Protocol):
-    """Interface of a panel whose contents can be printed."""
-
-    def render_pdf(
-        self, title: str, date: str, layout: QPageLayout, callback: Callable[[bytes], None]
-    ) -> None:
-        """Render the contents as a PDF document.
-
-        Args:
-            title: Title of the document.
-            date: Formatted date, printed on each page.
-            layout: Page size, orientation and margins.
-            callback: Called with the PDF data; b"" if there is nothing to print.
-        """
-
-
 class PrintCommands:
-    """Handlers that print the blocks of the current behaviour or save them as PDF."""
+    """Handlers that print the blocks of the current behaviour or save them as PDF.
+
+    Args:
+        context: Functions of the window.
+        render: Renders all blocks as PDF. Receives title, formatted date, page layout, and a function for
+            the PDF data; b"" stands for no blocks.
+        printers: Returns the names of the computer's printers.
+    """
 
     def __init__(
         self,
-        shell: Shell,
-        session: Session,
-        dialogs: FileDialogs,
+        context: PanelContext,
+        render: Callable[[str, str, QPageLayout, Callable[[bytes], None]], object],
         printers: Callable[[], list[str]] | None = None,
     ) -> None:
-        # `printers` returns the names of the computer's printers.
-        self._shell, self._session, self._dialogs = shell, session, dialogs
+        self._context, self._render_pdf = context, render
         self._printers = printers if printers is not None else printer_names
 
     def show_dialog(self) -> None:
         """Show the print dialog or, if there are no printers, the dialog to save a PDF."""
         if not self._printers():
-            self._shell.show_toast(_("No printer is set up on this computer. Save the pages as PDF instead."))
+            self._context.show_toast(
+                _("No printer is set up on this computer. Save the pages as PDF instead.")
+            )
             self.ask_save_pdf()
             return
         from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - needed for printing only
 
         printer = QPrinter(QPrinter.PrinterMode.HighResolution)
-        printer.setDocName(self._session.document.name)
+        printer.setDocName(self._context.session.document.name)
         printer.setPageLayout(default_page_layout())
-        dialog = QPrintDialog(printer, self._shell.surface.window())
+        dialog = QPrintDialog(printer, self._context.surface)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowModality(Qt.WindowModality.NonModal)  # keeps Stop accessible
         dialog.finished.connect(
@@ -82,9 +71,9 @@ class PrintCommands:
             if not data:
                 self._notify_no_blocks()
             elif paint_pdf(data, printer):
-                self._shell.show_toast(_("Sent to the printer {name}").format(name=printer.printerName()))
+                self._context.show_toast(_("Sent to the printer {name}").format(name=printer.printerName()))
             else:
-                self._shell.show_toast(
+                self._context.show_toast(
                     _("The printer {name} isn't responding").format(name=printer.printerName())
                 )
 
@@ -92,9 +81,9 @@ class PrintCommands:
 
     def ask_save_pdf(self) -> None:
         """Ask for a file and save the blocks to it as PDF."""
-        self._dialogs.save_as(
+        self._context.files.save_as(
             _("Save blocks as PDF"),
-            suggested_path(self._session.document),
+            suggested_path(self._context.session.document),
             (FileKind("PDF", ".pdf"),),
             lambda path, _kind: self.save(path),
         )
@@ -110,23 +99,21 @@ class PrintCommands:
             try:
                 write_atomically(pdf_path, data)
             except OSError as error:
-                self._shell.show_toast(
+                self._context.show_toast(
                     _("Can't save the PDF: {why}").format(why=error.strerror or str(error))
                 )
             else:
-                self._shell.show_toast(_("Saved {name}").format(name=pdf_path.name))
+                self._context.show_toast(_("Saved {name}").format(name=pdf_path.name))
 
         self._render(default_page_layout(), write)
 
     def _render(self, layout: QPageLayout, callback: Callable[[bytes], None]) -> None:
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsPrinting):
-            today = dt.datetime.now().astimezone()
-            date = day_text(today.day, today.month, today.year)
-            editor.render_pdf(self._session.document.name, date, layout, callback)
+        today = dt.datetime.now().astimezone()
+        date = day_text(today.day, today.month, today.year)
+        self._render_pdf(self._context.session.document.name, date, layout, callback)
 
     def _notify_no_blocks(self) -> None:
-        self._shell.show_toast(_("This page has no blocks"))
+        self._context.show_toast(_("This page has no blocks"))
 
 
 def printer_names() -> list[str]:

@@ -11,9 +11,8 @@ import pytest
 from PySide6.QtGui import QColor, QGuiApplication, QImage
 from pytestqt.qtbot import QtBot
 
-from app.core.session import Session
-from app.ui.shell.commands.program_pictures import ImageCommands
-from app.ui.shell.commands.shell import Shell
+from app.ui.panels.base import PanelContext
+from app.ui.panels.build.behaviour.program_pictures import ImageCommands
 from tests.ui.shell_parts import Answers
 
 
@@ -30,9 +29,9 @@ class Editor:
 
 
 def made(editor: Editor, said: list[str], answers: Answers | None = None) -> ImageCommands:
-    shell = SimpleNamespace(editor=lambda: editor, show_toast=said.append)
     session = SimpleNamespace(document=SimpleNamespace(name="Tea", path=None))
-    return ImageCommands(cast("Shell", shell), cast("Session", session), answers or Answers())
+    context = SimpleNamespace(show_toast=said.append, session=session, files=answers or Answers())
+    return ImageCommands(cast("PanelContext", context), editor.render_picture)
 
 
 def test_typed_file_extension_selects_the_image_format(tmp_path: Path) -> None:

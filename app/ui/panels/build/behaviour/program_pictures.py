@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 from PySide6.QtGui import QGuiApplication, QImage
 
 from app.core.projects.open_project import OpenProject
-from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
 from app.core.storage.folders import closed_tabs_folder
-from app.ui.shell.commands.shell import Shell
-from app.ui.widgets.file_dialogs import FileDialogs, FileKind
+from app.ui.panels.base import PanelContext
+from app.ui.widgets.file_dialogs import FileKind
 from nep.i18n import _, lazy
 
 OPAQUE_IMAGE_KINDS = (
@@ -38,34 +36,28 @@ def suggested_path(document: OpenProject) -> Path:
     return folder / document.name
 
 
-@runtime_checkable
-class SupportsPicture(Protocol):
-    """Interface of a panel that can render an image of its contents."""
-
-    def render_picture(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
-        """Render all blocks.
-
-        Args:
-            kind: Image format, "png" or "svg".
-            white: True for a white background, False for a transparent one.
-            callback: Called with the image data; b"" if there are no blocks.
-        """
-
-
 class ImageCommands:
-    """Handlers that save or copy an image of the current behaviour's blocks."""
+    """Handlers that save or copy an image of the current behaviour's blocks.
 
-    def __init__(self, shell: Shell, session: Session, dialogs: FileDialogs) -> None:
-        self._shell, self._session, self._dialogs = shell, session, dialogs
+    Args:
+        context: Functions of the window.
+        render: Renders all blocks. Receives the format "png" or "svg", True for a white background or False
+            for a transparent one, and a function for the image data; b"" stands for no blocks.
+    """
+
+    def __init__(
+        self, context: PanelContext, render: Callable[[str, bool, Callable[[bytes], None]], object]
+    ) -> None:
+        self._context, self._render = context, render
 
     def save_as(self) -> None:
         """Ask for a file and format, then save the image."""
-        suggestion = suggested_path(self._session.document)
+        suggestion = suggested_path(self._context.session.document)
 
         def save_image(path: Path, kind: FileKind) -> None:
             self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_IMAGE_KINDS)
 
-        self._dialogs.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, save_image)
+        self._context.files.save_as(_("Save blocks as image"), suggestion, IMAGE_KINDS, save_image)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Save an image of the blocks, adding the file extension if it is missing.
@@ -84,11 +76,11 @@ class ImageCommands:
             try:
                 write_atomically(image_path, data)
             except OSError as error:
-                self._shell.show_toast(
+                self._context.show_toast(
                     _("Can't save the image: {why}").format(why=error.strerror or str(error))
                 )
             else:
-                self._shell.show_toast(_("Saved {name}").format(name=image_path.name))
+                self._context.show_toast(_("Saved {name}").format(name=image_path.name))
 
         self._render(kind, white, write)
 
@@ -101,14 +93,9 @@ class ImageCommands:
                 self._notify_no_blocks()
                 return
             QGuiApplication.clipboard().setImage(image)
-            self._shell.show_toast(_("Copied the image"))
+            self._context.show_toast(_("Copied the image"))
 
         self._render("png", True, copy_image)
 
-    def _render(self, kind: str, white: bool, callback: Callable[[bytes], None]) -> None:
-        editor = self._shell.editor()
-        if isinstance(editor, SupportsPicture):
-            editor.render_picture(kind, white, callback)
-
     def _notify_no_blocks(self) -> None:
-        self._shell.show_toast(_("This page has no blocks"))
+        self._context.show_toast(_("This page has no blocks"))
